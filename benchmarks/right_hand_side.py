@@ -25,9 +25,9 @@ ROUNDS, EVALUATIONS = 15, 5000
 
 
 @numba.njit(error_model="numpy")
-def _again_and_again(rhs, count, t, x, u, c, dx, g):
+def _again_and_again(rhs, count, t, x, u, c, dx, g, m):
     for _ in range(count):
-        call_rhs(rhs, t, x, u, c, dx, g)
+        call_rhs(rhs, t, x, u, c, dx, g, m)
         for k in range(t.size):
             x[0, k] += 1e-14 * dx[1, k]
             t[k] += 1e-6
@@ -45,9 +45,9 @@ def evaluation_time(compiled: Any, width: int) -> float:
     """Return the time of a right-hand side per member (ns)."""
     code, c = prepared_parameters(compiled, compiled.parameter_vector(), width)
     assert isinstance(code, Machine)
-    states, events = compiled.system.nstates, compiled.program.events
-    x, dx, g = np.full((states, width), 0.1), np.zeros((states, width)), np.zeros((events, width))
-    arguments = np.ones(width), x, np.zeros((0, width)), c, dx, g
+    dx, g, m = (np.zeros((code.lowered.rows[name], width)) for name in ("dx", "g", "m"))
+    x = np.full(dx.shape, 0.1)
+    arguments = np.ones(width), x, np.zeros((0, width)), c, dx, g, m
     times = []
     for _ in range(ROUNDS):
         begin = time.process_time()

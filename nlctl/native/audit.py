@@ -153,15 +153,16 @@ def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     """Return what machine code computes at a point."""
     events = code.lowered.rows["g"]
-    declared = declared_rows(compiled.schedule, compiled.program, events - compiled.program.events)
+    located = events - compiled.program.events
+    declared = declared_rows(compiled.schedule, compiled.program, located)
     rows, jumping = np.array(compiled.program.sampled, dtype=int), compiled.program.resets
-    room = code.lowered.rows["s"]
+    memories, room = code.lowered.rows["m"], code.lowered.rows["s"]
 
     def several(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
         dx, y = np.empty_like(xx), np.empty((len(compiled.schedule.outputs), code.width))
-        g, after = np.empty((events, code.width)), np.empty((room, code.width))
-        code.rhs(tt[0].copy(), xx, uu, c, dx, g)
+        g, m, after = (np.empty((rows, code.width)) for rows in (events, memories, room))
+        code.rhs(tt[0].copy(), xx, uu, c, dx, g, m)
         code.out(tt[0].copy(), xx, uu, c, y)
         found = [dx[:, -1], y[:, -1]]
         for sample in code.samples:
@@ -170,7 +171,7 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
             found.append(s[:, -1])
         if code.resets is not None:
             code.resets(tt[0].copy(), xx, uu, c, after)
-        return *found, *without_nan(g[declared, -1], after[:jumping, -1])
+        return *found, *without_nan(np.append(g[:, -1], m[:, -1])[declared], after[:jumping, -1])
 
     return several
 
@@ -404,7 +405,7 @@ def rounding(
     t, x, u = point
     arrays = {"t": [t], "x": x, "u": u, "p": trial.p}
     meetings = [f"sample{k}" for k in range(len(trial.meetings))]
-    names = [name for name in ("dx", "y", *meetings, "g", "reset") if name in found.results]
+    names = [name for name in ("dx", "y", *meetings, "g", "m", "reset") if name in found.results]
     values = iter(
         nudged_values(
             [expr for name in names for expr, _ in found.pieces(name)],
@@ -416,7 +417,10 @@ def rounding(
     )
     located, program = found.conditions.rows, compiled.program
     sizes = [x.size, len(schedule.outputs), *[len(program.sampled)] * len(meetings)]
-    moved = [np.zeros(size) for size in (*sizes, program.events + located, program.resets)]
+    moved = [
+        np.zeros(size)
+        for size in (*sizes, program.events + located, len(program.memory), program.resets)
+    ]
     for name, total in zip(names, moved, strict=False):  # there may be no resets
         for row, array in found.results[name]:
             at = row
@@ -425,8 +429,8 @@ def rounding(
                 far = np.abs(ways - ways[:, :1])
                 total[at : at + size] = np.where(np.isfinite(far), far, 0.0).max(axis=1)
                 at += size
-    moved[-2] = moved[-2][declared_rows(schedule, program, located)]
-    return tuple(moved)
+    *others, g, m, after = moved
+    return *others, np.append(g, m)[declared_rows(schedule, program, located)], after
 
 
 def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarray]:

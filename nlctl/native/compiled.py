@@ -193,8 +193,8 @@ class Compiled(StandIn):
         ParameterError, UnknownNameError
             If x or u has another length, or an override is refused.
         """
-        g = np.empty(self.lowered.rows["g"])
-        return self._call(self.native[0], self.system.nstates, t, x, u, params, g)
+        g, m = (np.empty(self.lowered.rows[name]) for name in "gm")
+        return self._call(self.native[0], self.system.nstates, t, x, u, params, g, m)
 
     @as_annotated
     def output(

@@ -1,7 +1,7 @@
 """What blocks say of jumps, in python-control: switching functions, guards, memories, resets.
 
-Machine code computes the same in its arrays ``g`` and ``reset``.  What it locates beyond that are
-conditions of the very expressions whose rates are compared.
+Machine code computes the same in its arrays ``g``, ``m`` and ``reset``.  What it locates beyond
+that are conditions of the very expressions whose rates are compared.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ _DECLARED = {  # the functions of a block, and how many values of each are compa
 
 
 def declared_rows(schedule: Schedule, program: Program, located: int) -> np.ndarray:
-    """Return which rows of ``g`` blocks and event functions compute, among `located` others.
+    """Return which rows of ``g`` and ``m`` blocks and event functions compute.
+
+    The others, of the `located` ones, are conditions of expressions.
 
     What an ideal relay declares is of its input's rate too, and is compared as it slides.
     """

@@ -11,7 +11,7 @@ from ..wording import numbered
 from .codegen.program import count_guards, count_switching_functions
 from .compiled import Compiled
 from .integrate.log import OF_TIME, log_room
-from .integrate.workspace import grown
+from .integrate.memory import grown, replaced
 
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
@@ -29,11 +29,12 @@ def with_log(task: Any, work: Any) -> Any:
     task, work : Task, Work
         See `workspace`.
     """
-    free = work.log_t.size - int(work.lanes["noted"][0])
-    least = log_room(task, work.g.shape[0])
+    free = work.log.t.size - int(work.lanes["noted"][0])
+    least = log_room(task, work.events.g.shape[0])
     if not least or free >= least:
         return work
-    return grown(work, ("log_t", "log_row"), 2 * work.log_t.size + 2 * least)
+    room = 2 * work.log.t.size + 2 * least
+    return replaced(work, log=grown(work.log, ("t", "row"), room))
 
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
@@ -71,9 +72,9 @@ def happened(compiled: Compiled, run: Any) -> EventLog:
     rows = row_labels(compiled, run.machine.lowered.conditions)
     labels = [(*row, direction) for row in rows for direction in ("falling", "rising")]
     count = int(run.lanes["noted"][0])
-    coded = run.work.log_row[:count]
+    coded = run.work.log.row[:count]
     return EventLog(
-        time=run.work.log_t[:count].copy(),
+        time=run.work.log.t[:count].copy(),
         label=np.where(coded // 2 == OF_TIME, len(labels), coded),
         labels=(*labels, ("", "condition of t", "")),
     )

@@ -10,15 +10,16 @@ import numpy as np
 from ..delays.pieces import smooth_pieces
 from ..delays.variation import Variation, check_positive, variation, variation_table
 from ..errors import ParameterError
+from .integrate.delayed import Lines
 from .integrate.delays import SMOOTH
-from .integrate.workspace import grown
+from .integrate.memory import grown, replaced, with_table
 
 if TYPE_CHECKING:
     from .compiled import Compiled
     from .diagram.schedule import Schedule
 
 _ROOM = 256  # steps that are kept at first
-_KEPT = ("past", "past_t", "past_h", "level")
+_KEPT = ("powers", "t", "h", "level")
 
 
 def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
@@ -31,28 +32,29 @@ def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
 
 
 def lines_of(
-    compiled: Compiled, p: np.ndarray, varied: list[Variation | None]
-) -> dict[str, np.ndarray]:
-    """Return the delays of all lines (lines, lanes), how they vary, and what acts on what."""
+    compiled: Compiled, p: np.ndarray, varied: list[Variation | None], signals: np.ndarray
+) -> Lines:
+    """Return the delays of all lines, how they vary, what acts on what, and where signals are."""
     read = compiled.schedule
     delays = np.zeros((len(read.lines), p.shape[1]))
     for row, line in enumerate(read.lines):
         delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
         check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
-    return {
-        "delays": delays, "direct": direct_lines(read).astype(np.int64), **variation_table(varied)
-    }  # fmt: skip
+    return with_table(
+        Lines, delays=delays, direct=direct_lines(read).astype(np.int64), signals=signals,
+        **variation_table(varied),
+    )  # fmt: skip
 
 
 def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
     """Return the workspace of a run that begins with what signals were before it."""
-    lines, lanes = task.delays.shape
+    lines, lanes = task.lines.delays.shape
     if not lines:
         return work
     begin = float(task.times[0])
     nodes, read = compiled.schedule.nodes, compiled.schedule.lines
     specs = [nodes[line.block or 0].system.current_spec for line in read]
-    reach = task.delays + np.array([[spec.varied(begin)] for spec in specs])
+    reach = task.lines.delays + np.array([[spec.varied(begin)] for spec in specs])
     before = _before(compiled)
     earliest = begin - reach.max(axis=1)
     told = [row for row, spec in enumerate(specs) if spec.history is not None]
@@ -61,24 +63,24 @@ def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
         return before(t, earliest)[told]
 
     found = list(smooth_pieces(histories, float(earliest.min()), begin, len(told)))
-    work = grown(work, _KEPT, max(_ROOM, 2 * len(found)))
-    work.level[: len(found)] = SMOOTH
+    work = _with_places(work, max(_ROOM, 2 * len(found)))
+    work.past.level[: len(found)] = SMOOTH
     for row, line in enumerate(read):
         slot = compiled.program.layout[line.block or 0]["before"]
-        work.past[: len(found), row, 0] = p[slot.offset]
+        work.past.powers[: len(found), row, 0] = p[slot.offset]
     for k, piece in enumerate(found):
-        work.past_t[k], work.past_h[k] = piece.start, piece.length
-        work.past[k, told] = piece.powers[:, :, None]
-        work.level[k, told] = 0 if piece.breaks else SMOOTH
-    work.kept[:], work.shown_to[:] = len(found), -1
+        work.past.t[k], work.past.h[k] = piece.start, piece.length
+        work.past.powers[k, told] = piece.powers[:, :, None]
+        work.past.level[k, told] = 0 if piece.breaks else SMOOTH
+    work.past.kept[:], work.past.shown_to[:] = len(found), -1
     for row in range(len(read)):
         for j in range(lanes):
-            starts = work.past_t[: len(found), j]
+            starts = work.past.t[: len(found), j]
             first = int(np.searchsorted(starts, begin - reach[row, j], "right")) - 1
-            breaks = np.flatnonzero(work.level[: len(found), row, j] < SMOOTH)
+            breaks = np.flatnonzero(work.past.level[: len(found), row, j] < SMOOTH)
             later = breaks[breaks > max(first, 0)]
-            work.first[row, j] = max(first, 0)
-            work.next[row, j] = later[0] if later.size else -1
+            work.past.first[row, j] = max(first, 0)
+            work.past.next[row, j] = later[0] if later.size else -1
     return work
 
 
@@ -87,23 +89,28 @@ def with_room(task: Any, work: Any) -> Any:
 
     What no delay reaches back to is forgotten; if that is less than half, there is more room.
     """
-    room = work.past_t.shape[0]
-    if not task.delays.size or work.kept.max() < room:
+    room = work.past.t.shape[0]
+    if not task.lines.delays.size or work.past.kept.max() < room:
         return work
-    longest = np.abs(task.vary).sum(axis=2).max(axis=0)  # and more: powers of z in [-1, 1]
-    for j in range(task.delays.shape[1]):
-        kept = work.kept[j]
-        oldest = work.lanes["t"][j] - (task.delays[:, j] + longest).max()
-        gone = int(np.searchsorted(work.past_t[:kept, j], oldest, "right")) - 1
-        gone = min(max(gone, 0), int(work.first[:, j].max()))
-        gone = max(0, min(gone, *(i - 1 for i in work.next[:, j] if i >= 0), kept - 1))
+    longest = np.abs(task.lines.vary).sum(axis=2).max(axis=0)  # and more: powers of z in [-1, 1]
+    for j in range(task.lines.delays.shape[1]):
+        kept = work.past.kept[j]
+        oldest = work.lanes["t"][j] - (task.lines.delays[:, j] + longest).max()
+        gone = int(np.searchsorted(work.past.t[:kept, j], oldest, "right")) - 1
+        gone = min(max(gone, 0), int(work.past.first[:, j].max()))
+        gone = max(0, min(gone, *(i - 1 for i in work.past.next[:, j] if i >= 0), kept - 1))
         for name in _KEPT:
-            array = getattr(work, name)
+            array = getattr(work.past, name)
             array[: kept - gone, ..., j] = array[gone:kept, ..., j].copy()
-        work.kept[j] = kept - gone
-        work.first[:, j] = np.maximum(work.first[:, j] - gone, 0)
-        work.next[:, j] = np.where(work.next[:, j] >= 0, work.next[:, j] - gone, -1)
-    return work if work.kept.max() <= room // 2 else grown(work, _KEPT, 2 * room)
+        work.past.kept[j] = kept - gone
+        work.past.first[:, j] = np.maximum(work.past.first[:, j] - gone, 0)
+        work.past.next[:, j] = np.where(work.past.next[:, j] >= 0, work.past.next[:, j] - gone, -1)
+    return work if work.past.kept.max() <= room // 2 else _with_places(work, 2 * room)
+
+
+def _with_places(work: Any, room: int) -> Any:
+    """Return the workspace with places for so many steps."""
+    return replaced(work, past=grown(work.past, _KEPT, room))
 
 
 def direct_lines(read: Schedule) -> np.ndarray:

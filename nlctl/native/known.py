@@ -65,16 +65,17 @@ def _longest(found: dict[str, Any], times: np.ndarray) -> Callable[[float], floa
     return longest
 
 
-def _crossings(compiled: Compiled, p: np.ndarray, rows: slice) -> Callable[..., np.ndarray]:
+def _crossings(compiled: Compiled, p: np.ndarray, which: slice) -> Callable[..., np.ndarray]:
     code, c = prepared_parameters(compiled, p)
-    sizes = compiled.system.nstates or 0, compiled.schedule.ninputs, code.lowered.rows["g"]
-    now, (x_now, u_now, g) = np.empty(1), (np.empty((n, 1)) for n in sizes)
-    given = now, x_now, u_now, c, np.empty_like(x_now), g
+    rows = code.lowered.rows
+    x_now, u_now, dx, g, m = (np.empty((rows[name], 1)) for name in ("x", "u", "dx", "g", "m"))
+    now = np.empty(1)
+    given = now, x_now, u_now, c, dx, g, m
     rhs = code.rhs.bound(*given) if isinstance(code.rhs, Routine) else partial(code.rhs, *given)
 
     def crossings(t: float, x: Any, u: Any) -> np.ndarray:
         now[0], x_now[:, 0], u_now[:, 0] = t, x, u
         rhs()
-        return g[rows, 0].copy()
+        return g[which, 0].copy()
 
     return crossings

@@ -40,7 +40,7 @@ def source_files(*modules: str) -> list[str]:
 
     By default those of the integrators.
     """
-    found = [*(modules or ("integrate/advance.py", "integrate/start.py"))]
+    found = [*(modules or ("integrate/advance.py", "integrate/start.py", "integrate/workspace.py"))]
     for name in found:  # which grows meanwhile
         found += [other for other in dict.fromkeys(_imported(HERE / name)) if other not in found]
     return sorted(found)

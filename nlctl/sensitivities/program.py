@@ -216,6 +216,7 @@ class _Maker:
         results: dict[str, list[tuple[int, Tracer]]] = {
             "dx": self._flow(),
             "g": self._switching(),
+            "m": found.results["m"],
             "y": self._outputs(),
         }
         if found.results.get("reset") or self.sides.watches or self.source.carried:
@@ -271,7 +272,7 @@ class _Maker:
         rows = [self.sides.carried] if source.carried else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
-        return [*found, *self._rows(first, [(e, 1) for e in (*rows, *source.committed)])]
+        return [*found, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
         source = self.source

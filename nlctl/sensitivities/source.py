@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import CompileError
+from ..expressions.arrays import Tracer
 from ..expressions.continuity import may_jump
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
@@ -183,13 +184,8 @@ def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> Equatio
     """
     program = compiled.program
     found = equations(made.schedule, made.layout, p, program.meetings)
-    rows: dict[int, Expr] = {}
-    for row, array in found.results["g"]:
-        for expr, size in array.pieces():
-            rows |= {row + k: found.graph.item(expr, k) for k in range(size)}
-            row += size
     graph, first = found.graph, program.switching + found.conditions.rows
-    count = len(program.guards)
+    rows = _single(graph, found.results["g"])
     del graph.lengths["x"]  # there are more of them now
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
@@ -197,10 +193,20 @@ def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> Equatio
     return EquationParts(
         found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
-        guards=[rows[first + k] for k in range(count)],
-        committed=[rows[first + count + k] for k in range(len(program.memory))],
+        guards=[rows[first + k] for k in range(len(program.guards))],
+        committed=list(_single(graph, found.results["m"]).values()),
         switched=frozenset(jump), owners=tuple(owners), p=p,
     )  # fmt: skip
+
+
+def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Expr]:
+    """Return the expression of each row of some results."""
+    found: dict[int, Expr] = {}
+    for row, array in results:
+        for expr, size in array.pieces():
+            found |= {row + k: graph.item(expr, k) for k in range(size)}
+            row += size
+    return found
 
 
 def _jumps(node: Node) -> bool:

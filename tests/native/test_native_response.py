@@ -16,9 +16,9 @@ from nlctl.native import Status
 from nlctl.native.integrate.methods.tsit5 import TSIT5
 from nlctl.native.machine.store import cache_folder
 
-TABLEAU = TSIT5.arrays()
-B, C, E = TABLEAU["B"], TABLEAU["C"], TABLEAU["E"]
-A = TABLEAU["A"][:, : TSIT5.stages]
+TABLEAU = TSIT5.pair()
+B, C, E = TABLEAU.B, TABLEAU.C, TABLEAU.E
+A = TABLEAU.A[:, : TSIT5.stages]
 
 OSCILLATOR = ct.ss([[0.0, 1.0], [-1.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]], name="osc")
 

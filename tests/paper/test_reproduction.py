@@ -23,7 +23,7 @@ def fused(diagram):
     """
     compiled = nlctl.compile(diagram)
     (rhs, out), p = compiled.native, compiled.parameter_vector()
-    g = np.empty(compiled.program.events)
+    g, m = (np.empty(compiled.lowered.rows[name]) for name in "gm")
 
     def filled(function, size, t, x, u, *more):
         result = np.empty(size)
@@ -31,7 +31,7 @@ def fused(diagram):
         return result
 
     return ct.nlsys(
-        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g),
+        lambda t, x, u, params: filled(rhs, x.size, t, x, u, g, m),
         lambda t, x, u, params: filled(out, diagram.noutputs, t, x, u),
         inputs=0,
         outputs=diagram.output_labels,

@@ -12,7 +12,7 @@ from nlctl.upstream.control_internals import outputs_now, rates_now
 
 
 def interpreted(compiled):
-    """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)``, without machine code."""
+    """Return ``rhs(t, x, u, p, dx, g, m)`` and ``out(t, x, u, p, y)``, without machine code."""
 
     def prepared(p):
         found = equations(compiled.schedule, compiled.program.layout, p)
@@ -20,20 +20,17 @@ def interpreted(compiled):
         prepare, rhs, out = plain_functions(lowered)
         c = np.full((lowered.size, 1), np.nan)
         prepare(p[:, None], c)
-        return c, rhs, out, lowered.rows["g"]
+        return c, rhs, out
 
     def column(values):
         return np.array(values, dtype=float).reshape(-1, 1)
 
-    def right_hand_side(t, x, u, p, dx, g):
-        c, rhs, _, rows = prepared(p)
-        declared, every = compiled.program.switching, np.full((rows, 1), np.nan)
-        rhs(np.array([t]), column(x), column(u), c, dx[:, None], every)
-        located = rows - compiled.program.events  # conditions that no block declares
-        g[:declared], g[declared:] = every[:declared, 0], every[declared + located :, 0]
+    def right_hand_side(t, x, u, p, dx, g, m):
+        c, rhs, _ = prepared(p)
+        rhs(np.array([t]), column(x), column(u), c, dx[:, None], g[:, None], m[:, None])
 
     def outputs(t, x, u, p, y):
-        c, _, out, _ = prepared(p)
+        c, _, out = prepared(p)
         out(np.array([t]), column(x), column(u), c, y[:, None])
 
     return right_hand_side, outputs
@@ -92,9 +89,9 @@ def compare(system, *, native=False, params=None, points=3, seed=0):
         p = compiled.parameter_vector(params)
         rhs, out = compiled.native if native else interpreted(compiled)
         close = {"rtol": 1e-13, "atol": 1e-13}
-        g = np.empty(compiled.program.events)
+        g, m = (np.empty(compiled.lowered.rows[name]) for name in "gm")
         for function, size, reference, more in (
-            (rhs, system.nstates, system.dynamics, (g,)),
+            (rhs, system.nstates, system.dynamics, (g, m)),
             (out, system.noutputs, system.output, ()),
         ):
             found = evaluated(function, size, t, x, u, p, *more)

@@ -147,10 +147,10 @@ class Plain:
             found = equations(read, self.compiled.program.layout, p[:, 0])
             lowered = lower(read, self.compiled.program, lanes, found)
         prepare, rhs, out = plain_functions(lowered)
-        sizes = (lowered.size, self.system.nstates, lowered.rows["g"], self.system.noutputs)
-        c, dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
+        rows = {**lowered.rows, "c": lowered.size, "y": self.system.noutputs or 0}
+        c, dx, g, m, y = (np.full((rows[k], lanes), np.nan) for k in ("c", "dx", "g", "m", "y"))
         prepare(p, c)
-        rhs(at.t.copy(), at.x.copy(), at.u.copy(), c, dx, g)
+        rhs(at.t.copy(), at.x.copy(), at.u.copy(), c, dx, g, m)
         out(at.t.copy(), at.x.copy(), at.u.copy(), c, y)
         return dx, y
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba.core import config, event
 
-from nlctl.native.integrate.memory import type_of, with_table
+from nlctl.native.integrate.memory import Places2, Reals2, type_of, with_table
 from nlctl.upstream import numba_internals as internals
 
 REAL = numba.float64(numba.float64)
@@ -160,15 +160,15 @@ def test_a_plain_function_can_be_an_intrinsic():
 
 class Pair(NamedTuple):
     factor: float
-    rows: np.ndarray
-    table: np.ndarray
+    rows: Reals2
+    table: Places2
 
 
 def test_the_attributes_of_a_type_can_be_read_from_memory():
     """`AttributeTemplate`, `infer_getattr`, `populate_array`, `pack_array`, `as_dtype`."""
     rows = np.arange(6.0).reshape(2, 3)
     record = with_table(Pair, factor=2.0, rows=rows)
-    kind = type_of(record)
+    kind = type_of(Pair)
     assert {name: str(dtype) for name, (dtype, _) in kind.formats.items()} == {
         "factor": "float64", "rows": "float64",
     }  # fmt: skip

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
-from ..integrate.workspace import TAYLOR
 from .steps import Attempt, Jump, LaneEquations
 
 __all__ = ["accumulated", "accumulating"]
@@ -30,7 +29,7 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     """Return the last switch of a lane whose switches accumulate in the steps that it has tried."""
     run, j = evaluated.run, evaluated.j
     lane = run.lanes[j]
-    if run.task.method != TAYLOR and lane["accepted"] > _STEPS * lane["events"]:
+    if not run.task.taylor.highest and lane["accepted"] > _STEPS * lane["events"]:
         return None  # at once: what usual runs take must not cost them anything
     t = np.array([a.t[j] for a in attempts])
     first = np.flatnonzero(np.diff(t, prepend=-np.inf) > 0)  # rejected steps begin where others do
@@ -73,7 +72,7 @@ def accumulated(run: Any, end: float) -> Crowd | None:
 def _log(run: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return which conditions were at 0, and when: of a single run they are all noted."""
     log = slice(int(run.lanes["noted"][0]) if run.task.alone else 0)
-    rows, times = run.work.log_row[log] // 2, run.work.log_t[log]
+    rows, times = run.work.log.row[log] // 2, run.work.log.t[log]
     return rows[rows >= 0], times[rows >= 0]
 
 
@@ -103,5 +102,5 @@ def _tolerance(evaluated: LaneEquations, point: tuple, row: int) -> float:
     t, x, u = point
     task = evaluated.run.task
     away = task.atol + task.rtol * np.abs(x)
-    away[task.memory] = 0.0
+    away[task.rows.memory] = 0.0
     return tolerance_of(lambda s, z: evaluated.switching(s, z, u)[row], t, x, away)

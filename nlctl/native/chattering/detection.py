@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from ..integrate.state import RUNNING
-from ..integrate.workspace import TAYLOR
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
@@ -75,7 +74,7 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
 
 def probe_of(task: Any) -> int:
     """Return how many steps are looked at, at the end of a window of a run."""
-    return PROBE * (_PROBES if task.method == TAYLOR else 1)
+    return PROBE * (_PROBES if task.taylor.highest else 1)
 
 
 def snapshot(work: Any, advance: Callable[[], Any]) -> tuple[Any, Attempt]:
@@ -117,10 +116,12 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     if not np.all(step * extent <= _WITHIN * scale):
         return None
     evaluated = _Places(run=run, j=j, c=c)
-    weights = np.zeros(extent.size + task.memory.size)
+    weights = np.zeros(extent.size + task.rows.memory.size)
     weights[: extent.size] = 1.0 / scale
     weights[extent.size :] = 1.0 / (task.atol + task.rtol)  # memories jump by what they are
-    least = np.append(_LEAST * extent, np.full(task.memory.size, 1e3 * (task.atol + task.rtol)))
+    least = np.append(
+        _LEAST * extent, np.full(task.rows.memory.size, 1e3 * (task.atol + task.rtol))
+    )
     found, last = 0, None
     for attempt in free:
         jump = evaluated.jump(attempt, weights, least)

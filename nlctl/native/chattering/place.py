@@ -68,8 +68,8 @@ def _accumulation(compiled: Compiled, crowd: Crowd) -> str:
 def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:
     """Whether what jumps is the mode of an ideal relay."""
     nodes, program = compiled.schedule.nodes, compiled.program
-    sides = [_events(compiled, p, side) for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])[-len(program.memory) or sides[0].size :]
+    sides = [_declared(compiled, p, side)[1] for side in jump.sides()]
+    changes = np.abs(sides[1] - sides[0])
     if not changes.size or not changes.max() > 1e-3:
         return False
     m = program.memory[int(changes.argmax())]
@@ -79,24 +79,24 @@ def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:
 def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     """Return which memory switches, if one does and that is what jumps."""
     program, nodes = compiled.program, compiled.schedule.nodes
-    sides = [_events(compiled, p, side) for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])[-len(program.memory) or sides[0].size :]
+    sides = [_declared(compiled, p, side)[1] for side in jump.sides()]
+    changes = np.abs(sides[1] - sides[0])
     if not changes.size or not changes.max() > 1e-3:
         return ""
-    m = program.memory[int(changes.argmax())]
-    place = sides[0].size - changes.size + int(changes.argmax())
+    place = int(changes.argmax())
+    m = program.memory[place]
     node = next(node for node in nodes if m in memory(node))
     label = node.system.state_labels[m - node.state_offset]
     return _between(label, node.path, sides[0][place], sides[1][place])
 
 
-def _events(compiled: Compiled, p: np.ndarray, side: Any) -> np.ndarray:
-    """Return switching functions, and what memories would become."""
+def _declared(compiled: Compiled, p: np.ndarray, side: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return switching functions, and what memories would become, on a side of a jump."""
     rhs, _ = compiled.native
-    g = np.zeros(compiled.lowered.rows["g"])
+    g, m = (np.zeros(compiled.lowered.rows[name]) for name in "gm")
     t, x, u = side
-    rhs(t, x.copy(), u.copy(), p, np.empty(x.size), g)
-    return g
+    rhs(t, x.copy(), u.copy(), p, np.empty(x.size), g, m)
+    return g, m
 
 
 def _changed(
@@ -155,7 +155,7 @@ def _switching_function(compiled: Compiled, i: int, p: np.ndarray, jump: Jump) -
     """Return which switching function of a block changes its sign, of a block that has several."""
     nodes = compiled.schedule.nodes
     counts = np.cumsum([0, *(count_switching_functions(node) for node in nodes)])
-    sides = [_events(compiled, p, side)[counts[i] :] for side in jump.sides()]
+    sides = [_declared(compiled, p, side)[0][counts[i] :] for side in jump.sides()]
     count = int(counts[i + 1] - counts[i])
     changed = np.flatnonzero(np.sign(sides[0][:count]) != np.sign(sides[1][:count]))
     if count < 2 or not changed.size:

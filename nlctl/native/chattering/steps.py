@@ -76,32 +76,31 @@ class LaneEquations:
     c: np.ndarray  # its parameters, in every lane
 
     def __call__(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        dx, g = self._at(t, x, u)
-        return np.concatenate([dx, g[self.run.task.switching :]])
+        dx, _, m = self._at(t, x, u)
+        return np.concatenate([dx, m])
 
     def switching(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Return the switching functions and conditions, also those that another method finds."""
-        task = self.run.task
-        g = self._at(t, x, u)[1]
-        return g[: g.size - task.memory.size - task.owned.shape[0]]
+        return self._at(t, x, u)[1][: self.run.task.rows.guarded]
 
-    def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
         width = self.run.machine.width
         tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), width, axis=1) for v in (t, x, u))
-        dx, g = np.empty_like(xx), np.empty((self.run.work.g.shape[0], width))
-        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g)
-        dx[self.run.task.memory] = 0.0
-        return dx[:, 0], g[:, 0]
+        rows = self.run.machine.lowered.rows
+        dx, g, m = (np.empty((rows[name], width)) for name in ("dx", "g", "m"))
+        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g, m)
+        dx[self.run.task.rows.memory] = 0.0
+        return dx[:, 0], g[:, 0], m[:, 0]
 
     def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
         """Yield where a step has been: at its ends and, of an explicit pair, at its stages."""
         j, h = self.j, attempt.h[self.j]
-        t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.A, self.run.task.C
+        t, x, A, C = attempt.t[j], attempt.x[:, j], self.run.task.pair.A, self.run.task.pair.C
         yield t, x
         if attempt.stiff:
             yield t, attempt.x_new[:, j]
             return
-        if self.run.task.highest:
+        if attempt.k.shape[0] != C.size:  # of Taylor's method
             yield t + h, attempt.x_new[:, j]
             return
         slopes = np.vstack([attempt.first[None, :, j], attempt.k[1:, :, j]])

@@ -29,7 +29,7 @@ from .rewrite import rewritten
 from .solver import Solver
 
 PREPARE = {"prepare": ("p", "c")}
-EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g"), "out": ("t", "x", "u", "c", "y")}
+EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g", "m"), "out": ("t", "x", "u", "c", "y")}
 SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks, and of resets
 POINT, DIRECTION = "point", "v"
 ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "dx")}
@@ -42,7 +42,7 @@ class Lowered:
     Attributes
     ----------
     functions : mapping
-        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g)``,
+        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``,
         ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
         sampled blocks, or ``point(t, x, u, c)`` and then, as often as there are directions,
         ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
@@ -131,7 +131,7 @@ def lower(
     if found is None:
         found = equations(schedule, program.layout, meetings=program.meetings)
     stores = stores_of(found, found.results)
-    wanted = {"rhs": [*stores["dx"], *stores["g"]], "out": stores["y"]}
+    wanted = {"rhs": [*stores["dx"], *stores["g"], *stores["m"]], "out": stores["y"]}
     samples = {name: SAMPLE for name in stores if name.startswith("sample")}
     samples |= {name: SAMPLE for name in stores if name == "reset"}
     wanted |= {name: stores[name] for name in samples}
@@ -185,7 +185,7 @@ def _lowered(
     n, m = schedule.system.nstates or 0, schedule.ninputs
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n,
-        "g": program.events + found.conditions.rows,
+        "g": program.events + found.conditions.rows, "m": len(program.memory),
         "y": len(schedule.outputs), "v": n + m + 1, "s": max(len(program.sampled), program.resets),
     }  # fmt: skip
     return Lowered(

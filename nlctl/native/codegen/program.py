@@ -78,10 +78,8 @@ class Program:
 
     @property
     def events(self) -> int:
-        """Size of the array `g` but for located conditions: the switching functions of all
-        blocks, their guards, then what the memory states would be committed to.
-        """
-        return self.switching + len(self.guards) + len(self.memory)
+        """Size of the array `g` but for located conditions: switching functions and guards."""
+        return self.switching + len(self.guards)
 
     @property
     def resets(self) -> int:

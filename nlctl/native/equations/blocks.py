@@ -31,9 +31,9 @@ class Equations:
     ----------
     graph : Graph
     results : dict
-        For ``"dx"``, ``"g"`` and ``"y"`` pairs of a row and the array that is to be written there.
-        For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting, and
-        for ``"reset"`` the states after jumps of all blocks with guards, if there are any.
+        For ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be
+        written there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each
+        meeting, and for ``"reset"`` the states after jumps of all blocks with guards, if any.
     calls : dict
         Opaque functions by name.
     solvers : dict
@@ -103,10 +103,8 @@ def equations(
         found = replace(found, located=(*found.located, *watched_conditions(reader, schedule)))
         results = {
             "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
-            "g": declared
-            + _located(reader, found)
-            + _guards(reader, found.rows)
-            + [(row + found.rows, a) for row, a in committed],
+            "g": declared + _located(reader, found) + _guards(reader, found.rows),
+            "m": committed,
             "y": [(0, y)],
         }
         if any(count_guards(node) for node in reader.blocks):
@@ -185,8 +183,7 @@ def _next(reader: Reader) -> list[tuple[int, Tracer]]:
 def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], list[tuple[int, Tracer]]]:
     """Return switching functions of all blocks, and what memories are committed to."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
-    at, behind, declared, committed = 0, sum(count for count, _ in counts), [], []
-    behind += sum(count_guards(node) for node in reader.blocks)
+    at, behind, declared, committed = 0, 0, [], []
     for i, (own, kept) in enumerate(counts):
         if own or kept:
             events = reader.events(i)

@@ -13,8 +13,10 @@ import numpy as np
 
 from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
+from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
+from .events.functions import begins, has_events
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -29,12 +31,11 @@ from .events.near_side import look_before
 from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
-from .methods.stiff import stiff_attempt
+from .methods.stiff import UNKNOWN, stiff_attempt
 from .resets import fall
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
-from .state import DERIVATIVES, ENDED, INNER, RUNNING, is_stiff
-from .workspace import AUTO, UNKNOWN, inputs_at
+from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff
 
 
 @numba.njit(**INNER)
@@ -60,7 +61,7 @@ def _judge(task, lanes, w, found):
         found[j] = REFUSED
         if lane.status != RUNNING:
             continue
-        if task.switching > task.declared:
+        if task.rows.switching > task.rows.declared:
             found[j] = crossing(task, lane, w, j)
             if found[j] == AGAIN:
                 lane.rejected += 1
@@ -70,11 +71,11 @@ def _judge(task, lanes, w, found):
             found[j] = REFUSED
             continue
         found[j] = CLEAR
-        is_behind = task.memory.size > 0 and jumped(task, lane, w, j)
+        is_behind = task.rows.memory.size > 0 and jumped(task, lane, w, j)
         if is_behind or lane.seeks > 0:
             found[j] = locate_jump(lane, task.rtol, is_behind)
-        elif w.e.shape[0]:
-            found[j] = locate(lane, task, w.e_start, w.e_low, w.e_high, w.e, w.behind, j)
+        elif has_events(w):
+            found[j] = locate(lane, task, w, j)
         if found[j] == AGAIN:
             lane.rejected += 1
             lane.cross = 0.0
@@ -87,18 +88,20 @@ def _accept(task, lanes, w, found, done, passed):
     ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
     memory in motion.  Return whether any lane has passed.
     """
-    any_passed, switching, memories = False, task.switching, task.memory.size
+    any_passed, memories = False, task.rows.memory.size
     for j in range(lanes.size):
         lane, event = lanes[j], found[j] == EVENT
         done[j] = passed[j] = False
-        if found[j] <= AGAIN or (task.delays.shape[0] and unresolved(task, lane, w, j, event)):
+        if found[j] <= AGAIN or (
+            task.lines.delays.shape[0] and unresolved(task, lane, w, j, event)
+        ):
             continue
         t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, event)
         lane.t = t_new
-        if task.opaque:
+        if task.timed.opaque:
             lane.rests = _rests(task, w, j)
         if lane.across:
             lane.left_zero = _was_zero(task, w, j)
@@ -106,12 +109,12 @@ def _accept(task, lanes, w, found, done, passed):
         else:
             lane.left_zero = lane.left_zero and _was_zero(task, w, j)
             next_step(lane, w.error[j], w.rate[j], task)
-        if task.fixed == 0.0 and w.e.shape[0]:
-            lane.h = min(lane.h, w.resolved[j])
+        if task.fixed == 0.0 and has_events(w):
+            lane.h = min(lane.h, w.inside.resolved[j])
         done[j] = True
         if memories:  # at a break point of the inputs memories may reverse as well
             at_break_point = lane.ends and w.u.shape[0] > 0
-            passed[j] = at_break_point or _began_to_move(switching, w.e_start, w.e, j)
+            passed[j] = at_break_point or _began_to_move(w, j)
         passed[j] |= event
         any_passed |= passed[j]
         if task.method == AUTO:
@@ -122,8 +125,8 @@ def _accept(task, lanes, w, found, done, passed):
 @numba.njit(**INNER)
 def _was_zero(task, w, j):
     """Whether a step began where a condition was exactly 0."""
-    for i in range(task.declared, task.guarded):
-        if w.e_start[i, j] == 0.0:
+    for i in range(task.rows.declared, task.rows.guarded):
+        if w.events.g_start[i, j] == 0.0:
             return 1
     return 0
 
@@ -138,10 +141,11 @@ def _rests(task, w, j):
 
 
 @numba.njit(**INNER)
-def _began_to_move(switching, e_start, e, j):
+def _began_to_move(w, j):
     """Whether a memory that stood still at the start of the accepted step moves at its end."""
-    for i in range(switching, e.shape[0]):  # noqa: SIM110 (no generators in machine code)
-        if e_start[i, j] == 0.0 and e[i, j] != 0.0:
+    rate_start, rate = w.memories.rate_start, w.memories.rate
+    for i in range(rate.shape[0]):  # noqa: SIM110 (no generators in machine code)
+        if rate_start[i, j] == 0.0 and rate[i, j] != 0.0:
             return True
     return False
 
@@ -149,40 +153,35 @@ def _began_to_move(switching, e_start, e, j):
 @numba.njit(**INNER)
 def _take(task, w, done):
     """Make the ends of the accepted steps the states, and commit the memories."""
-    x, k, switching, last = w.x, w.k, task.switching, w.k.shape[0] - 1
+    x, k, events, rows, last = w.x, w.k, w.events, task.rows, w.k.shape[0] - 1
     for j in range(done.size):
         if not done[j]:
             continue
-        w.expanded[j] = 0
+        w.taylor.expanded[j] = 0
         for i in range(x.shape[0]):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
-        for i in range(task.declared):
-            w.behind[i, j] = w.e_start[i, j] * w.e[i, j] < 0.0
-        for i in range(task.declared, task.guarded):
-            if w.e[i, j] != 0.0 or w.e_start[i, j] != 0.0:
-                w.behind[i, j] = np.sign(w.e_start[i, j]) if w.e[i, j] == 0.0 else 0.0
-        for i in range(task.memory.size):
-            m, become = task.memory[i], w.g[switching + i, j]
-            if w.e_start[switching + i, j] == 0.0 and x[m, j] != become:  # otherwise locked
+        for i in range(rows.declared):
+            events.behind[i, j] = events.g_start[i, j] * events.g[i, j] < 0.0
+        for i in range(rows.declared, rows.guarded):
+            before, now = events.g_start[i, j], events.g[i, j]
+            if now != 0.0 or before != 0.0:
+                events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
+        for i in range(rows.memory.size):
+            m, become = rows.memory[i], w.memories.m[i, j]
+            if w.memories.rate_start[i, j] == 0.0 and x[m, j] != become:  # otherwise locked
                 x[m, j] = become
-                for c in range(task.declared):
-                    w.behind[c, j] = 0.0  # with another memory the way back is an event
-        for i in range(w.e.shape[0]):
-            w.e_start[i, j] = w.e[i, j]
-            w.g_start[i, j], w.slope_start[i, j] = w.g[i, j], w.slope[i, j]
+                for c in range(rows.declared):
+                    events.behind[c, j] = 0.0  # with another memory the way back is an event
+        begins(w, j)
 
 
 @numba.njit(**INNER)
-def _event_functions(rhs, task, lanes, w):
-    """Fill w.e at the ends of the steps just tried."""
-    if task.memory.size:
-        for j in range(lanes.size):
-            w.t_end[j] = lanes[j].t + lanes[j].step
-        memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
-    for i in range(task.switching):
-        for j in range(lanes.size):
-            w.e[i, j] = w.g[i, j]
+def _look_ahead(rhs, task, lanes, w):
+    """Fill the rates of memories at the ends of the steps just tried."""
+    for j in range(lanes.size):
+        w.ahead.begin[j] = lanes[j].t + lanes[j].step
+    memory_rates(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1])
 
 
 @numba.njit(**INNER)
@@ -190,7 +189,7 @@ def _attempt(rhs, point, along, task, lanes, w):
     """Try a step in every lane, by the method of the run."""
     if is_stiff(lanes[0]):
         stiff_attempt(rhs, point, along, task, lanes, w)
-    elif task.highest:
+    elif task.taylor.highest:
         taylor.taylor_attempt(rhs, task, lanes, w)
     else:
         explicit.explicit_attempt(rhs, task, lanes, w)
@@ -213,45 +212,50 @@ def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
-    before the stiff method knows where to get its Jacobian from.
+    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
     """
+    rows = task.rows
     lanes = w.lanes
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
-        if task.highest:
+        if task.taylor.highest:
             taylor.expand(task, lanes, w)
         if not _chosen(task, lanes, w) or is_full(task, lanes, w) or log_is_full(task, lanes, w):
             return
-        if lanes[0].stiff and task.derivatives == UNKNOWN:
+        if lanes[0].stiff and task.stiff.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES
             return
         _attempt(rhs, point, along, task, lanes, w)
-        if task.delays.shape[0]:
+        if task.lines.delays.shape[0]:
             look_within(task, lanes, w)
-        _event_functions(rhs, task, lanes, w)
+        if task.rows.memory.size:
+            _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
-        if w.e.shape[0] and not task.highest:
+        if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
-        if task.memory.size:
+        if rows.memory.size:
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        again = task.memory.size > 0 and any_passed
-        if task.delays.shape[0]:
+        again = rows.memory.size > 0 and any_passed
+        if task.lines.delays.shape[0]:
             again |= keep(task, lanes, w, done, passed)
-        elif not task.memory.size:
+        elif not rows.memory.size:
             passed[:] = False
         again |= _happens(task, lanes, w, passed, sampled)
         if again:
             restart(rhs, task, lanes, w, passed)
-        if task.guarded < task.switching:
+        if rows.guarded < rows.switching:
             for j in range(lanes.size):
                 done[j] |= passed[j]
             fall(rhs, task, lanes, w, done)
-        if task.ways.size:
+        if rows.ways.size:
             _look_at_inputs(task, lanes, w)
+        if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):
+            lanes[0].status = METHOD
+            return
 
 
 @numba.njit(**INNER)
@@ -266,12 +270,12 @@ def _look_at_inputs(task, lanes, w):
 @numba.njit(**INNER)
 def _counts(task, lane, i, end):
     """Whether a change of sign counts; of functions that the run watches one may end it."""
-    k = i - task.watched
+    k = i - task.rows.watched
     if k < 0:
         return True
-    if task.ways[k] != 0 and (task.ways[k] > 0) != (end > 0.0):
+    if task.rows.ways[k] != 0 and (task.rows.ways[k] > 0) != (end > 0.0):
         return False
-    if task.ending[k] and lane.status == RUNNING:
+    if task.rows.ending[k] and lane.status == RUNNING:
         lane.status = ENDED
     return True
 
@@ -282,17 +286,18 @@ def _note_events(task, lanes, w, found, done):
 
     Guards are noted where they fall.  Where none has changed its sign it was a memory.
     """
+    events, rows = w.events, task.rows
     for j in range(lanes.size):
         if not done[j] or found[j] != EVENT:
             continue
-        turns = 1 if task.memory.size else 0
-        for i in range(task.guarded):
-            if w.e_start[i, j] * w.e[i, j] < 0.0 or left_to_other_side(task, w, i, j):
+        turns = 1 if rows.memory.size else 0
+        for i in range(rows.guarded):
+            if events.g_start[i, j] * events.g[i, j] < 0.0 or left_to_other_side(task, w, i, j):
                 turns = 0
-                if _counts(task, lanes[j], i, w.e[i, j]):
-                    note(task, lanes[j], w, i, w.e[i, j] > 0.0, j)
-        for i in range(task.guarded, task.switching):
-            if w.above[i - task.guarded, j] != 0 and w.e[i, j] < 0.0:
+                if _counts(task, lanes[j], i, events.g[i, j]):
+                    note(task, lanes[j], w, i, events.g[i, j] > 0.0, j)
+        for i in range(rows.guarded, rows.switching):
+            if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
         lanes[j].turns += turns
 
@@ -304,14 +309,14 @@ def _happens(task, lanes, w, passed, sampled):
     Return whether anything is.
     """
     again = False
-    if task.jumps.shape[1] and pass_jumps(task, lanes, sampled):
+    if task.timed.jumps.shape[1] and pass_jumps(task, lanes, sampled):
         again = True
         for j in range(lanes.size):
             passed[j] |= sampled[j]
             lanes[j].log_error_before *= 0.0 if sampled[j] else 1.0
             if sampled[j]:
                 note(task, lanes[j], w, OF_TIME, True, j)
-    if task.ticks.size and take_samples(task, lanes, w, sampled):
+    if task.clocks.ticks.size and take_samples(task, lanes, w, sampled):
         again = True
         for j in range(lanes.size):
             passed[j] |= sampled[j]

@@ -48,35 +48,35 @@ def limit_step(task, lane, j):
     """
     if task.fixed > 0.0 or lane.tries > 0 or lane.status != RUNNING:
         return
-    longest, cells = task.longest[j], task.reach.shape[1]
+    longest, cells = task.timed.longest[j], task.timed.reach.shape[1]
     if cells:
         times = task.times
         share = (lane.t - times[0]) / (times[times.size - 1] - times[0])
-        longest = min(longest, task.reach[j, min(int(share * cells), cells - 1)] - lane.t)
-    if task.opaque and lane.rests and lane.segment < task.times.size - 1:
+        longest = min(longest, task.timed.reach[j, min(int(share * cells), cells - 1)] - lane.t)
+    if task.timed.opaque and lane.rests and lane.segment < task.times.size - 1:
         longest = min(longest, task.times[lane.segment + 1] - lane.t)
     if lane.h > longest > 0.0:
         lane.h = longest
 
 
 @numba.njit(**INNER)
-def memory_error(task, x, g, g_other, j):
+def memory_error(task, x, m, m_other, j):
     """Return the largest difference of what a lane's memories would become, over its tolerance.
 
     A memory that is carried along is a state like any other, and follows from the others by an
     equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
-    at which the memory is seen to reverse.  So `g` is of a step's solution and `g_other` of one
+    at which the memory is seen to reverse.  So `m` is of a step's solution and `m_other` of one
     that differs from it by the error.
 
     What only one of them moves does not count: where a relay switches, or a memory begins to move,
     is an event, and is located as one.
     """
     largest, spoilt = 0.0, 0.0
-    for m in range(task.memory.size):
-        i, before = task.switching + m, x[task.memory[m], j]
-        if g[i, j] == before or g_other[i, j] == before:
+    for i in range(m.shape[0]):
+        before = x[task.rows.memory[i], j]
+        if m[i, j] == before or m_other[i, j] == before:
             continue
-        part = abs(g[i, j] - g_other[i, j]) / (task.atol + task.rtol * abs(g[i, j]))
+        part = abs(m[i, j] - m_other[i, j]) / (task.atol + task.rtol * abs(m[i, j]))
         largest = part if part > largest else largest
         spoilt += 0.0 * part  # NaN or infinity: no maximum keeps it
     return largest + spoilt
@@ -91,7 +91,7 @@ def rejected(lane, error, task):
     lane.rejected += 1
     lane.tries = lane.seeks = lane.traces = 0
     lane.cross = 0.0
-    order = rodas5p.ORDER if lane.stiff else task.pair_order
+    order = rodas5p.ORDER if lane.stiff else task.pair.order
     lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
@@ -110,10 +110,14 @@ def shorten(lane, part):
 @numba.njit(**INNER)
 def next_step(lane, error, rate, task):
     """Propose the next step after an accepted one: PI control, and stability."""
-    if task.highest and task.fixed == 0.0:
+    if task.taylor.highest and task.fixed == 0.0:
         lane.h = max(lane.h, lane.step)  # coefficients will say how long it is to be
         return
-    log_error, memories, slower = np.log(max(error, 1e-10)), task.memory.size, 5.0 / task.pair_order
+    log_error, memories, slower = (
+        np.log(max(error, 1e-10)),
+        task.rows.memory.size,
+        5.0 / task.pair.order,
+    )
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44
     now, before = (0.17, 0.04) if lane.stiff else (0.14 * slower, 0.08 * slower)
@@ -126,7 +130,7 @@ def next_step(lane, error, rate, task):
     if task.fixed > 0.0:
         lane.h = task.fixed
     elif not lane.stiff:
-        limit = min(_reach(task), 0.8 * task.stable)
+        limit = min(_reach(task), 0.8 * task.pair.stable)
         lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
         if memories and lane.slow:
             lane.h = limit / rate
@@ -136,7 +140,7 @@ def next_step(lane, error, rate, task):
 def _reach(task):
     """Return h |lambda| of the explicit steps that stability limits."""
     # at the limit of stability the rates of memories are noise
-    return min(2.0, 0.8 * task.stable) if task.memory.size else task.stable
+    return min(2.0, 0.8 * task.pair.stable) if task.rows.memory.size else task.pair.stable
 
 
 @numba.njit(**INNER)
@@ -157,7 +161,7 @@ def choose_method(lane, task):
     lane.stiff += 1
     if lane.stiff % TRIAL == 0:
         limit = _reach(task) / max(lane.rate, 1e-300)
-        pays = lane.t - lane.judged_at > task.cost * limit * (tried - lane.judged_after)
+        pays = lane.t - lane.judged_at > task.stiff.cost * limit * (tried - lane.judged_after)
         lane.judged_at, lane.judged_after = lane.t, tried
         if lane.stiff == TRIAL:
             lane.patience = FIRST_PATIENCE if pays else min(2 * lane.patience, MAX_PATIENCE)

@@ -20,9 +20,10 @@ import numpy as np
 
 from ..machine.address import call_out
 from .control import rejected
+from .delayed import DEGREE, arrival, past_value, piece_at, sent
+from .evaluate import inputs_at
 from .methods import explicit
 from .state import INNER, RUNNING
-from .workspace import DEGREE, arrival, inputs_at, past_value, piece_at, sent
 
 SMOOTH = 6  # level that a method of order 5 takes for smooth
 POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
@@ -37,14 +38,15 @@ PAST_PIECES = 4  # pieces of the past that a step reads at most
 @numba.njit(**INNER)
 def next_break(task, w, lane, j, stop):
     """Return where a step must end for the delays of a lane, at `stop` at the latest."""
+    lines = task.lines
     first = stop
-    for i in range(task.delays.shape[0]):
+    for i in range(lines.delays.shape[0]):
         first = min(first, arrival(task, i, j, lane.t), _read(task, w, lane, i, j))
-        if w.next[i, j] >= 0:
-            first = min(first, arrival(task, i, j, w.past_t[w.next[i, j], j]))
-        for k in range(task.kinks.shape[1] if task.varied[i] else 0):
-            if task.kinks[i, k] > lane.t:
-                first = min(first, task.kinks[i, k])
+        if w.past.next[i, j] >= 0:
+            first = min(first, arrival(task, i, j, w.past.t[w.past.next[i, j], j]))
+        for k in range(lines.kinks.shape[1] if lines.varied[i] else 0):
+            if lines.kinks[i, k] > lane.t:
+                first = min(first, lines.kinks[i, k])
                 break
     return stop if stop - first <= ROUNDING * abs(stop) else first
 
@@ -56,18 +58,19 @@ def _read(task, w, lane, i, j):
     Pieces are short where a signal moves: a longer step would go over a pulse that was kept.  A
     step that was given is taken as it is.
     """
-    now = piece_at(w.past_t, j, w.first[i, j], w.kept[j] - 1, sent(task, i, j, lane.t))
+    past = w.past
+    now = piece_at(past.t, j, past.first[i, j], past.kept[j] - 1, sent(task, i, j, lane.t))
     ahead = now + PAST_PIECES
-    if task.fixed > 0.0 or ahead >= w.kept[j]:
+    if task.fixed > 0.0 or ahead >= past.kept[j]:
         return np.inf
-    return arrival(task, i, j, w.past_t[ahead, j])
+    return arrival(task, i, j, past.t[ahead, j])
 
 
 @numba.njit(**INNER)
 def is_full(task, lanes, w):
     """Whether there is no place for another step in a lane that is running."""
-    for j in range(lanes.size if task.delays.shape[0] else 0):
-        if lanes[j].status == RUNNING and w.kept[j] == w.past_t.shape[0]:
+    for j in range(lanes.size if task.lines.delays.shape[0] else 0):
+        if lanes[j].status == RUNNING and w.past.kept[j] == w.past.t.shape[0]:
             return True
     return False
 
@@ -75,21 +78,22 @@ def is_full(task, lanes, w):
 @numba.njit(**INNER)
 def look_within(task, lanes, w):
     """Look at the signals within the step just tried; and at what polynomials miss of them."""
+    past = w.past
     for s in range(DEGREE + 1):
         for j in range(lanes.size):
             w.t[j] = lanes[j].t + POINTS[s] * lanes[j].step
-            w.since[j], w.missed[j], w.missed_at_end[j] = lanes[j].t, 0.0, 0.0
-            explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.B, j, w.x_stage)
+            past.since[j], past.missed[j], past.missed_at_end[j] = lanes[j].t, 0.0, 0.0
+            explicit.interpolate(POINTS[s], lanes[j].step, w.x, w.k, task.pair.B, j, w.x_stage)
         inputs_at(task, lanes, w)
-        call_out(task.signals[0], w.t, w.x_stage, w.u, task.p, w.seen[s])
+        call_out(task.lines.signals[0], w.t, w.x_stage, w.u, task.p, past.seen[s])
     for j in range(lanes.size):
         w.t[j] = lanes[j].t
     inputs_at(task, lanes, w)
-    call_out(task.signals[0], w.t, w.x, w.u, task.p, w.seen[DEGREE + 1])
+    call_out(task.lines.signals[0], w.t, w.x, w.u, task.p, past.seen[DEGREE + 1])
     for j in range(lanes.size):
         w.t[j] = lanes[j].t + lanes[j].step
     inputs_at(task, lanes, w)
-    call_out(task.signals[0], w.t, w.x_new, w.u, task.p, w.seen[DEGREE + 2])
+    call_out(task.lines.signals[0], w.t, w.x_new, w.u, task.p, past.seen[DEGREE + 2])
     for j in range(lanes.size):
         _fit(task, w, j)
 
@@ -97,25 +101,26 @@ def look_within(task, lanes, w):
 @numba.njit(**INNER)
 def _fit(task, w, j):
     """Make a lane's polynomials, and compare them with what they do not go through."""
+    past = w.past
     own = task.outputs
-    for i in range(task.delays.shape[0]):
+    for i in range(task.lines.delays.shape[0]):
         largest, begin, end, sign = 0.0, 0.0, 0.0, 1.0
         for n in range(DEGREE + 1):
             total = 0.0
             for s in range(DEGREE + 1):
-                total += POWERS[n, s] * w.seen[s, own + i, j]
-            w.tried[i, n, j] = total
+                total += POWERS[n, s] * past.seen[s, own + i, j]
+            past.tried[i, n, j] = total
             begin, end, sign = begin + sign * total, end + total, -sign
-            size = abs(w.seen[n, own + i, j])
+            size = abs(past.seen[n, own + i, j])
             largest = size if size > largest else largest
         tolerance = task.atol + task.rtol * largest
-        last = IN_CHEBYSHEV * abs(w.tried[i, DEGREE, j]) / tolerance
-        missed = max(last, abs(begin - w.seen[DEGREE + 1, own + i, j]) / tolerance)
-        if missed > w.missed[j] or last != last:  # what is NaN stays so
-            w.missed[j] = missed + 0.0 * last
-        missed = abs(end - w.seen[DEGREE + 2, own + i, j]) / tolerance
-        if missed > w.missed_at_end[j] or missed != missed:
-            w.missed_at_end[j] = missed
+        last = IN_CHEBYSHEV * abs(past.tried[i, DEGREE, j]) / tolerance
+        missed = max(last, abs(begin - past.seen[DEGREE + 1, own + i, j]) / tolerance)
+        if missed > past.missed[j] or last != last:  # what is NaN stays so
+            past.missed[j] = missed + 0.0 * last
+        missed = abs(end - past.seen[DEGREE + 2, own + i, j]) / tolerance
+        if missed > past.missed_at_end[j] or missed != missed:
+            past.missed_at_end[j] = missed
 
 
 @numba.njit(**INNER)
@@ -125,17 +130,18 @@ def unresolved(task, lane, w, j, event):
     A jump that no switching function tells of is driven into a very short step, and accepted.
     Right behind an event the signal at the end says nothing of the step.
     """
-    if not event and not w.missed_at_end[j] <= w.missed[j]:
-        w.missed[j] = w.missed_at_end[j]
-    short = lane.step <= JUMP * max(abs(lane.t), task.delays[0, j])
-    if short and w.missed[j] > 1.0:
-        w.missed[j] = -1.0
-        for i in range(task.delays.shape[0]):
-            w.fresh[i, j] = 0
+    past = w.past
+    if not event and not past.missed_at_end[j] <= past.missed[j]:
+        past.missed[j] = past.missed_at_end[j]
+    short = lane.step <= JUMP * max(abs(lane.t), task.lines.delays[0, j])
+    if short and past.missed[j] > 1.0:
+        past.missed[j] = -1.0
+        for i in range(task.lines.delays.shape[0]):
+            past.fresh[i, j] = 0
         return False
-    if rejected(lane, w.missed[j], task):
+    if rejected(lane, past.missed[j], task):
         return True
-    w.error[j] = max(w.error[j], w.missed[j])
+    w.error[j] = max(w.error[j], past.missed[j])
     return False
 
 
@@ -152,32 +158,36 @@ def keep(task, lanes, w, done, passed):
             continue
         _append(task, lanes[j], w, j)
         _show(task, lanes[j], w, j, False)
-        broke = 0 if passed[j] or w.missed[j] < 0.0 else SMOOTH
+        broke = 0 if passed[j] or w.past.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
             broke = min(broke, 1)
-        if lanes[j].tick < task.ticks.shape[1] and task.ticks[j, lanes[j].tick] <= lanes[j].t:
+        if (
+            lanes[j].tick < task.clocks.ticks.shape[1]
+            and task.clocks.ticks[j, lanes[j].tick] <= lanes[j].t
+        ):
             broke = 0
-        for i in range(task.delays.shape[0]):
-            w.fresh[i, j] = broke
+        for i in range(task.lines.delays.shape[0]):
+            w.past.fresh[i, j] = broke
         _bend(task, lanes[j], w, j)
         jumps = _arrive(task, lanes[j], w, j)
         jumped |= jumps
-        passed[j] = jumps or (passed[j] and task.memory.size > 0)
+        passed[j] = jumps or (passed[j] and task.rows.memory.size > 0)
         _show(task, lanes[j], w, j, True)
     return jumped
 
 
 @numba.njit(**INNER)
 def _append(task, lane, w, j):
-    k = w.kept[j]
-    w.past_t[k, j], w.past_h[k, j] = w.since[j], lane.t - w.since[j]
-    for i in range(task.delays.shape[0]):
+    past = w.past
+    k = past.kept[j]
+    past.t[k, j], past.h[k, j] = past.since[j], lane.t - past.since[j]
+    for i in range(task.lines.delays.shape[0]):
         for n in range(DEGREE + 1):
-            w.past[k, i, n, j] = w.tried[i, n, j]
-        w.level[k, i, j] = w.fresh[i, j]
-        if w.fresh[i, j] < SMOOTH and w.next[i, j] < 0:
-            w.next[i, j] = k
-    w.kept[j] = k + 1
+            past.powers[k, i, n, j] = past.tried[i, n, j]
+        past.level[k, i, j] = past.fresh[i, j]
+        if past.fresh[i, j] < SMOOTH and past.next[i, j] < 0:
+            past.next[i, j] = k
+    past.kept[j] = k + 1
 
 
 @numba.njit(**INNER)
@@ -199,32 +209,34 @@ def _has_kink(task, m):
 @numba.njit(**INNER)
 def _bend(task, lane, w, j):
     """Note what leaves a line with a kink because its delay has one now."""
-    for i in range(task.delays.shape[0]):
-        for k in range(task.kinks.shape[1] if task.varied[i] else 0):
-            if task.kinks[i, k] == lane.t:
-                for other in range(task.delays.shape[0]):
-                    behind = 1 if task.direct[other, i] else 2
-                    w.fresh[other, j] = min(w.fresh[other, j], behind)
+    lines = task.lines
+    for i in range(lines.delays.shape[0]):
+        for k in range(lines.kinks.shape[1] if lines.varied[i] else 0):
+            if lines.kinks[i, k] == lane.t:
+                for other in range(lines.delays.shape[0]):
+                    behind = 1 if lines.direct[other, i] else 2
+                    w.past.fresh[other, j] = min(w.past.fresh[other, j], behind)
 
 
 @numba.njit(**INNER)
 def _arrive(task, lane, w, j):
     """Go behind the breaks that arrive now; return whether a signal jumps."""
+    past = w.past
     jumps = False
-    for i in range(task.delays.shape[0]):
-        while w.next[i, j] >= 0:
-            k = w.next[i, j]
-            if arrival(task, i, j, w.past_t[k, j]) > lane.t + ROUNDING * abs(lane.t):
+    for i in range(task.lines.delays.shape[0]):
+        while past.next[i, j] >= 0:
+            k = past.next[i, j]
+            if arrival(task, i, j, past.t[k, j]) > lane.t + ROUNDING * abs(lane.t):
                 break
-            level = w.level[k, i, j]
+            level = past.level[k, i, j]
             jumps |= level == 0
-            for other in range(task.delays.shape[0]):
-                behind = level if task.direct[other, i] else level + 1
-                w.fresh[other, j] = min(w.fresh[other, j], behind)
-            w.first[i, j], w.next[i, j] = k, -1
-            for later in range(k + 1, w.kept[j]):
-                if w.level[later, i, j] < SMOOTH:
-                    w.next[i, j] = later
+            for other in range(task.lines.delays.shape[0]):
+                behind = level if task.lines.direct[other, i] else level + 1
+                past.fresh[other, j] = min(past.fresh[other, j], behind)
+            past.first[i, j], past.next[i, j] = k, -1
+            for later in range(k + 1, past.kept[j]):
+                if past.level[later, i, j] < SMOOTH:
+                    past.next[i, j] = later
                     break
     return jumps
 
@@ -232,9 +244,9 @@ def _arrive(task, lane, w, j):
 @numba.njit(**INNER)
 def _show(task, lane, w, j, ends):
     """Fill what leaves the delays at the output samples that were passed, or at the last one."""
-    m = w.shown_to[j] + 1
+    m = w.past.shown_to[j] + 1
     while m < task.times.size and (task.times[m] < lane.t or (ends and task.times[m] == lane.t)):
-        for i in range(task.delays.shape[0]):
-            w.shown[m, i, j] = past_value(task, w, i, j, task.times[m])
-        w.shown_to[j] = m
+        for i in range(task.lines.delays.shape[0]):
+            w.past.shown[m, i, j] = past_value(task, w, i, j, task.times[m])
+        w.past.shown_to[j] = m
         m += 1

@@ -19,7 +19,7 @@ from ..machine.machine_code import Wanted, machine_code
 
 MATRIX, COLUMNS = numba.float64[:, ::1], numba.float64[:, :, ::1]
 LOOP = numba.int64(
-    numba.intp, numba.intp, MATRIX, COLUMNS, MATRIX, COLUMNS, COLUMNS, MATRIX
+    numba.intp, numba.intp, MATRIX, COLUMNS, MATRIX, COLUMNS, COLUMNS, MATRIX, MATRIX
 )  # fmt: skip
 
 
@@ -55,12 +55,12 @@ def simulate_discrete(
     code, c = prepared_parameters(compiled, p)
     outputs = np.empty((count, system.noutputs or 0, 1))
     states = np.empty((count, system.nstates or 0, 1))
-    g = np.empty((code.lowered.rows["g"], 1))
+    g, m = (np.empty((code.lowered.rows[name], 1)) for name in "gm")
     columns = np.array(inputs.T, dtype=float, order="C")[:, :, None]  # may be written to
     states[:1, :, 0] = x0
     each = np.array(times, dtype=float)[:, None]
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
-        n = _loop()(*code.entries, each, columns, c, states, outputs, g)
+        n = _loop()(*code.entries, each, columns, c, states, outputs, g, m)
     code.check(c)
     return outputs[:n, :, 0].T, states[:n, :, 0].T
 
@@ -91,7 +91,7 @@ def _loop() -> Any:
     return loop
 
 
-def _iterate(rhs, out, times, inputs, c, states, outputs, g):
+def _iterate(rhs, out, times, inputs, c, states, outputs, g, m):
     """Fill states (from the first on) and outputs; return how many samples are finite."""
     last = len(times) - 1
     for k in range(len(times)):
@@ -101,5 +101,5 @@ def _iterate(rhs, out, times, inputs, c, states, outputs, g):
         if not np.isfinite(outputs[k]).all():
             return k
         if k < last:
-            call_rhs(rhs, times[k], states[k], inputs[k], c, states[k + 1], g)
+            call_rhs(rhs, times[k], states[k], inputs[k], c, states[k + 1], g, m)
     return len(times)

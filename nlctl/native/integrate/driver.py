@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -25,29 +24,24 @@ from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
 from ..machine.evaluations import Machine, machine
 from ..machine.integrators import integrators
-from ..taylor.method import taylor_task
+from ..taylor.method import with_taylor
+from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
+from .events.functions import Rows
 from .log import log_room
-from .memory import with_table
+from .memory import replaced, with_table
 from .methods import EXPLICIT_PAIRS
-from .methods.lu import WHOLE, Elimination, cost
-from .methods.tableau import Tableau
+from .methods.lu import WHOLE
+from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
+from .methods.tableau import Tableau, pair_of
+from .methods.taylor import OTHER_METHOD, STAGES
 from .methods.tsit5 import TSIT5
+from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
-from .state import DERIVATIVES, RUNNING, Status
-from .workspace import (
-    AUTO,
-    DIFFERENCES,
-    EXACT,
-    EXPLICIT,
-    IMPLICIT,
-    TASK,
-    TAYLOR,
-    UNKNOWN,
-    Task,
-    new_work,
-)
+from .samples import Clocks, Timed
+from .state import AUTO, DERIVATIVES, EXPLICIT, IMPLICIT, RUNNING, TAYLOR, Status
+from .workspace import Task, new_work
 
 METHODS = {
     "auto": AUTO,
@@ -128,12 +122,14 @@ def trajectory(
         return _sampled(compiled, times, inputs, x0, p)
     varied = variations(compiled, times) if varied is None else varied
     run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
+    run = with_turns(compiled, run, settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
             paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
                 run = differentiated(compiled, watched(run, paces), p)
+                run = turned(compiled, run, p, settings)
                 if progress is not None:
                     progress(float(run.lanes["t"][0]))
         except KeyboardInterrupt:
@@ -177,6 +173,8 @@ class Run:
         Exact derivatives, if the stiff method has asked for them and there are any.
     jumps : mapping
         Of members that chatter, by their lanes: where.
+    series : Task or None
+        With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
     """
 
     machine: Machine
@@ -184,6 +182,7 @@ class Run:
     work: Any
     along: Along | None = None
     jumps: Mapping[int, Jump] = field(default_factory=dict)
+    series: Any = None
 
     @property
     def lanes(self) -> np.ndarray:
@@ -236,13 +235,15 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
     """Return a run with the derivatives that its stiff method has asked for, if it has."""
     if run.lanes["status"][0] != DERIVATIVES:
         return run
-    along, given = derivatives(compiled, p), run.task._asdict()
-    del given["table"]
-    given["derivatives"] = EXACT if along else DIFFERENCES
-    given["c_along"] = along.c if along else given["c_along"]
-    given |= _linear_equations(run.work.x.shape[0], along.elimination if along else WHOLE)
+    along, stiff = derivatives(compiled, p), run.task.stiff
+    stiff = stiff_method(
+        run.work.x.shape[0],
+        EXACT if along else DIFFERENCES,
+        along.c if along else stiff.c,
+        along.elimination if along else WHOLE,
+    )
     run.lanes["status"] = RUNNING
-    return replace(run, task=with_table(Task, like=TASK, **given), along=along)
+    return replace(run, task=replaced(run.task, stiff=stiff), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -264,66 +265,64 @@ def prepared(
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method = _method(compiled, settings)
-    expansion, terms = taylor_task(compiled, p, settings) if method == "taylor" else ({}, ())
+    terms = ()
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
         Task,
-        like=TASK,
         times=times,
         inputs=inputs,
-        p=c,
-        **_rows(program, code, read.watched),
-        **_bounds(settings),
-        method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
-        **_pair(settings.pair) | expansion,
-        alone=int(count == 1),
-        **_instants(compiled, code, due),
-        **_jumping(program, code),
-        **ahead(code.lowered, p, times, settings.max_step),
-        opaque=int(bool(code.lowered.calls)),
-        derivatives=UNKNOWN,
-        c_along=np.zeros((1, 1)),
-        **lines_of(compiled, p, varied),
-        signals=code.signal_entry,
         outputs=compiled.system.noutputs or 0,
-        **_linear_equations(len(x0), WHOLE),
+        p=c,
+        alone=int(count == 1),
+        rtol=float(settings.rtol),
+        atol=float(settings.atol),
+        fixed=float(settings.step),
+        max_steps=int(settings.max_steps),
+        method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
+        pair=pair_of(settings.pair),
+        stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
+        taylor=OTHER_METHOD,
+        rows=_rows(program, code, read.watched),
+        timed=with_table(
+            Timed,
+            **ahead(code.lowered, p, times, settings.max_step),
+            opaque=int(bool(code.lowered.calls)),
+        ),
+        clocks=_clocks(compiled, code, due),
+        resets=_resets(program, code),
+        lines=lines_of(compiled, p, varied, code.signal_entry),
     )
+    if method == "taylor":
+        task, terms = with_taylor(task, compiled, p, settings)
     work = new_work(
-        x0, times, read.ninputs, code.lowered.rows["g"], len(read.outputs),
+        x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
-        2 if terms else settings.pair.stages, terms or (1, 0),
-        log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.jumps.shape[1]),
+        STAGES if terms else settings.pair.stages, terms or (1, 0),
+        log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
     work = with_past(compiled, task, work, p)
     return Run(machine=code, task=task, work=work)
 
 
-def _bounds(settings: Settings) -> dict[str, Any]:
-    """Return what errors and numbers of steps are bounded by."""
-    return {
-        "rtol": float(settings.rtol), "atol": float(settings.atol),
-        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
-    }  # fmt: skip
-
-
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> dict[str, Any]:
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Rows:
     """Return how many rows are whose: declared, located, memories."""
-    located = code.lowered.rows["g"] - len(program.memory)
+    located = code.lowered.rows["g"]
     bending = code.lowered.conditions.bending
-    return {
-        "bending": program.switching,
-        "declared": program.switching + bending,
-        "guarded": located - len(program.guards),
-        "switching": located,
-        "watched": located - len(program.guards) - len(watched),
-        "ways": np.array([each.direction for each in watched], dtype=np.int64),
-        "ending": np.array([each.ends for each in watched], dtype=np.int64),
-        "memory": np.array(program.memory, dtype=np.int64),
-    }
+    return with_table(
+        Rows,
+        bending=program.switching,
+        declared=program.switching + bending,
+        guarded=located - len(program.guards),
+        switching=located,
+        watched=located - len(program.guards) - len(watched),
+        ways=np.array([each.direction for each in watched], dtype=np.int64),
+        ending=np.array([each.ends for each in watched], dtype=np.int64),
+        memory=np.array(program.memory, dtype=np.int64),
+    )
 
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
@@ -338,22 +337,7 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     return "tsit5"
 
 
-@functools.cache
-def _pair(pair: Tableau) -> dict[str, Any]:
-    """Return what the explicit method takes of a pair."""
-    none = {
-        "highest": 0, "series": np.zeros(0, dtype=np.int64), "c_series": np.zeros((1, 1)),
-        "sides": np.zeros((0, 2), dtype=np.int64),
-    }  # fmt: skip
-    return {"pair_order": float(pair.order), "stable": float(pair.stable), **pair.arrays(), **none}
-
-
-def _linear_equations(n: int, order: Elimination) -> dict[str, Any]:
-    """Return how the stiff method solves them, and what its steps cost then."""
-    return {**vars(order), "cost": cost(n, order)}
-
-
-def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[str, np.ndarray]:
+def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:
     """Return when something happens to sampled blocks of each lane, and what."""
     sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
     ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
@@ -367,19 +351,20 @@ def _instants(compiled: Compiled, code: Machine, due: list[Instants]) -> dict[st
         for store in code.lowered.functions[f"sample{k}"].plan.stores:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
-    return {
-        "ticks": ticks, "which": which, "samples": code.sample_entries, "due": written,
-        "sampled": np.array(sampled, dtype=np.int64),
-    }  # fmt: skip
+    return with_table(
+        Clocks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        states=np.array(sampled, dtype=np.int64),
+    )  # fmt: skip
 
 
-def _jumping(program: Program, code: Machine) -> dict[str, np.ndarray]:
+def _resets(program: Program, code: Machine) -> Resets:
     """Return the function of resets, the states that it fills, and whose guards are whose."""
     rows = [row for _, begin, end in program.jumping for row in range(begin, end)]
     owners = [block for block, begin, end in program.jumping for _ in range(begin, end)]
     owned = np.equal.outer(np.array(program.guards, dtype=int), np.array(owners, dtype=int))
-    return {
-        "resets": code.reset_entries,
-        "jumping": np.array(rows, dtype=np.int64),
-        "owned": np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
-    }
+    return with_table(
+        Resets,
+        functions=code.reset_entries,
+        states=np.array(rows, dtype=np.int64),
+        owned=np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
+    )

@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 
+from .memory import Places1, Places2, Reals1, arrays_of
 from .state import INNER
 
 OF_TIME = -1  # instead of a row: a condition of t alone
 _ROOM = 4  # entries of one row in one step at most: its event, and jumps that follow
 
 
+class Log(NamedTuple):
+    """What has happened in a single run."""
+
+    t: Reals1  # when (s)
+    row: Places1  # twice the row of g, and 1 if it rises
+    table: Places2
+
+
+def new_log(room: int) -> Log:
+    """Return a log with room for so many entries."""
+    return arrays_of(Log, t=(room,), row=(room,))
+
+
 def log_room(task: Any, rows: int, expected: int = 0) -> int:
     """Return how many entries there is to be room for, with so many rows of g; 0 for none."""
-    notes = task.alone and (task.switching or task.jumps.shape[1])
+    notes = task.alone and (task.rows.switching or task.timed.jumps.shape[1])
     return 2 * _ROOM * rows + 256 + expected if notes else 0
 
 
@@ -22,16 +36,16 @@ def log_room(task: Any, rows: int, expected: int = 0) -> int:
 def note(task, lane, w, row, rises, j):
     """Count an event of a lane, and write it down in a single run: there is room for it."""
     if task.alone:
-        if lane.noted >= w.log_t.size:  # never, see `log_is_full`
+        if lane.noted >= w.log.t.size:  # never, see `log_is_full`
             return
-        w.log_t[lane.noted] = lane.t
-        w.log_row[lane.noted] = 2 * row + (1 if rises else 0)
+        w.log.t[lane.noted] = lane.t
+        w.log.row[lane.noted] = 2 * row + (1 if rises else 0)
     lane.noted += 1
 
 
 @numba.njit(**INNER)
 def log_is_full(task, lanes, w):
     """Whether what may happen in a step has no room any more."""
-    if not task.alone or (task.switching == 0 and task.jumps.shape[1] == 0):
+    if not task.alone or (task.rows.switching == 0 and task.timed.jumps.shape[1] == 0):
         return False
-    return lanes[0].noted + _ROOM * w.g.shape[0] + 128 > w.log_t.size
+    return lanes[0].noted + _ROOM * w.events.g.shape[0] + 128 > w.log.t.size

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import Any
+from typing import Annotated, Any, get_origin, get_type_hints
 
 import numba
 import numpy as np
@@ -30,6 +30,11 @@ _LINE = 8  # floats in a line of the cache
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
 
+Reals1, Reals2, Reals3, Reals4 = (Annotated[np.ndarray, np.float64, n] for n in range(1, 5))
+Places1, Places2, Places3 = (Annotated[np.ndarray, np.int64, n] for n in range(1, 4))
+Unsigned1 = Annotated[np.ndarray, np.uint64, 1]
+
+
 class Pointed(types.Type):
     """Type of a record: its fields' names and types, the table left out."""
 
@@ -39,30 +44,41 @@ class Pointed(types.Type):
         super().__init__(name=f"Pointed({text})")
 
     @functools.cached_property
-    def formats(self) -> dict[str, tuple[np.dtype, int]]:
-        """Data type and number of dimensions of each field."""
+    def formats(self) -> dict[str, tuple[Any, int]]:
+        """Data type, or the type of a record inside, and number of dimensions of each field."""
         return {
-            name: (as_dtype(getattr(kind, "dtype", kind)), getattr(kind, "ndim", 0))
+            name: (kind, 0)
+            if isinstance(kind, Pointed)
+            else (as_dtype(getattr(kind, "dtype", kind)), getattr(kind, "ndim", 0))
             for name, kind in self.fields.items()
         }
 
 
-def type_of(value: Any) -> Pointed:
-    """Return the type of a record that `with_table` has made, in machine code."""
-    return Pointed({name: numba.typeof(getattr(value, name)) for name in _named(value)})
+@functools.cache
+def type_of(record: Any) -> Pointed:
+    """Return the type of a class of records in machine code, as its fields are annotated."""
+    hints = get_type_hints(record, include_extras=True)
+    return Pointed({name: _kind(hints[name]) for name in _named(record)})
 
 
-def with_table(record: Any, like: Any = None, **values: Any) -> Any:
+def _kind(hint: Any) -> Any:
+    """Return the type of a field: a number, an array by its data type and dimensions, a record."""
+    if get_origin(hint) is Annotated:
+        dtype, ndim = hint.__metadata__
+        return types.Array(numba.from_dtype(np.dtype(dtype)), ndim, "C")
+    return {float: types.float64, int: types.int64}.get(hint) or type_of(hint)
+
+
+def with_table(record: Any, **values: Any) -> Any:
     """Return a named tuple of these values; its table holds as long as it does.
 
-    Its last field is ``table``, the others are C-contiguous arrays, floats and integers.
+    Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
+    that this function has made.
 
     Parameters
     ----------
     record : class
-        Of named tuples.
-    like : Pointed, optional
-        What machine code takes it for.
+        Of named tuples, with arrays annotated as `Reals1`, ..., `Places3`.
     **values
         Its fields.
 
@@ -73,25 +89,61 @@ def with_table(record: Any, like: Any = None, **values: Any) -> Any:
     ValueError
         If an array is not C-contiguous: the table has no strides.
     """
-    for name, wanted in like.formats.items() if like else ():
-        found = np.asarray(values[name])
-        plain = found.dtype == object  # functions in the place of addresses, without JIT
-        if (found.dtype, found.ndim) != wanted and not plain:
+    for name, wanted in type_of(record).formats.items():
+        value = values[name]
+        found = (type_of(type(value)), 0) if hasattr(value, "_fields") else _format(value)
+        plain = (
+            not isinstance(found[0], Pointed) and found[0].hasobject
+        )  # functions instead of addresses, without JIT
+        if found != wanted and not plain:
             raise TypeError(
                 f"'{name}' of {record.__name__} needs {wanted[1]} dimensions of {wanted[0]}, got "
-                f"{found.ndim} of {found.dtype}"
+                f"{found[1]} of {found[0]}"
             )
-    rows = []
-    for name in _named(record):
-        value = values[name]
-        if isinstance(value, np.ndarray):
-            if not value.flags.c_contiguous:
-                raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
-            row = [value.ctypes.data, *value.shape]
-        else:
-            row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
-        rows.append(row + [0] * (_ENTRY - len(row)))
+    rows = [_row(record, name, values[name]) for name in _named(record)]
     return record(**values, table=np.array(rows, dtype=np.int64))
+
+
+def _format(value: Any) -> tuple[Any, int]:
+    """Return data type and number of dimensions of a number or an array."""
+    found = np.asarray(value)
+    return found.dtype, found.ndim
+
+
+def _row(record: Any, name: str, value: Any) -> list[int]:
+    """Return what the table has for a field."""
+    if hasattr(value, "_fields"):
+        row = [value.table.ctypes.data]
+    elif isinstance(value, np.ndarray):
+        if not value.flags.c_contiguous:
+            raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
+        row = [value.ctypes.data, *value.shape]
+    else:
+        row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
+    return row + [0] * (_ENTRY - len(row))
+
+
+def replaced(record: Any, **changes: Any) -> Any:
+    """Return a record with other values of some fields."""
+    given = {name: getattr(record, name) for name in _named(record)}
+    return with_table(type(record), **given | changes)
+
+
+def grown(record: Any, names: tuple[str, ...], room: int) -> Any:
+    """Return a record with so many rows in some of its arrays; what they hold stays."""
+    changes = {}
+    for name in names:
+        before = getattr(record, name)
+        changes[name] = np.zeros((room, *before.shape[1:]), dtype=before.dtype)
+        changes[name][: before.shape[0]] = before
+    return replaced(record, **changes)
+
+
+def arrays_of(record: Any, **shapes: tuple[int, ...]) -> Any:
+    """Return a record of zeros, of the types of its fields and of these shapes."""
+    formats = type_of(record).formats
+    made = {name: np.zeros(shape, dtype=formats[name][0]) for name, shape in shapes.items()}
+    return with_table(record, **made)
 
 
 def zeros(shape: tuple[int, ...]) -> np.ndarray:
@@ -131,6 +183,8 @@ def _field(context, builder, kind, pointer, name):
         found.set_metadata("invariant.load", unchanged)  # not to be read again after each store
         return found
 
+    if isinstance(wanted, Pointed):
+        return builder.inttoptr(number(0), context.get_value_type(wanted))
     if not isinstance(wanted, types.Array):
         return builder.bitcast(number(0), context.get_value_type(wanted))
     array = context.make_array(wanted)(context, builder)

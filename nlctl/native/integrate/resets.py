@@ -7,33 +7,58 @@ without progress of time, ends as ZENO.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 from ..machine.address import call_out
+from .evaluate import evaluate, inputs_at
 from .log import note
+from .memory import Places1, Places2, Reals2, arrays_of
 from .restart import restart
 from .state import DIVERGED, INNER, RUNNING, ZENO
-from .workspace import evaluate, inputs_at
 
 _MOST = 100  # jumps at one instant, or without progress of time
 _STILL = 1e-11  # of a time: less is no progress
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
 
 
+class Resets(NamedTuple):
+    """What states jump to where guards fall."""
+
+    functions: Places1  # the one that fills states behind jumps, if there are guards
+    states: Places1  # indices of these states
+    owned: Places2  # (guards, these states): whether a guard's fall is their jump
+    table: Places2
+
+
+class Guards(NamedTuple):
+    """What is known of guards: (guards, lanes)."""
+
+    above: Places2  # whether it was not negative when last seen
+    rising: Reals2  # the value of one that was negative behind its jump and is to rise, or NaN
+    table: Places2
+
+
+def new_guards(guards: int, lanes: int) -> Guards:
+    """Return the arrays for so many guards."""
+    return arrays_of(Guards, above=(guards, lanes), rising=(guards, lanes))
+
+
 @numba.njit(**INNER)
 def begin_guards(task, lanes, w):
     """See which guards are not negative where a run begins: none of them falls there."""
-    for i in range(task.switching - task.guarded):
+    for i in range(task.rows.switching - task.rows.guarded):
         for j in range(lanes.size):
-            w.above[i, j] = _above(lanes[j], w.e[task.guarded + i, j], i)
-            w.rising[i, j] = np.nan
+            w.guards.above[i, j] = _above(lanes[j], w.events.g[task.rows.guarded + i, j], i)
+            w.guards.rising[i, j] = np.nan
 
 
 @numba.njit(**INNER)
 def fall(rhs, task, lanes, w, seen):
     """Let jump what has fallen in the lanes that are seen; these begin again behind that."""
-    fallen = np.zeros((task.switching - task.guarded, lanes.size), np.bool_)
+    fallen = np.zeros((task.rows.switching - task.rows.guarded, lanes.size), np.bool_)
     jumped, any_risen = np.zeros(fallen.shape, np.bool_), False
     for j in range(lanes.size):
         if seen[j] and lanes[j].status == RUNNING:
@@ -71,9 +96,9 @@ def _fallen(task, lanes, w, seen, fallen):
             fallen[i, j] = False
             if not seen[j] or lanes[j].status != RUNNING:
                 continue
-            before = w.above[i, j]
-            w.above[i, j] = _above(lanes[j], w.e[task.guarded + i, j], i)
-            if before and not w.above[i, j] and lanes[j].status == RUNNING:
+            before = w.guards.above[i, j]
+            w.guards.above[i, j] = _above(lanes[j], w.events.g[task.rows.guarded + i, j], i)
+            if before and not w.guards.above[i, j] and lanes[j].status == RUNNING:
                 fallen[i, j] = chosen[j] = found = True
     return chosen, found
 
@@ -85,7 +110,7 @@ def _jump(task, lanes, w, fallen, chosen):
         w.t[j] = lanes[j].t
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_out(task.resets[0], w.t, w.x, w.u, task.p, w.s)
+    call_out(task.resets.functions[0], w.t, w.x, w.u, task.p, w.s)
     for j in range(lanes.size):
         if not chosen[j]:
             continue
@@ -93,18 +118,18 @@ def _jump(task, lanes, w, fallen, chosen):
         for i in range(fallen.shape[0]):
             if not fallen[i, j]:
                 continue
-            note(task, lane, w, task.guarded + i, False, j)
+            note(task, lane, w, task.rows.guarded + i, False, j)
             lane.culprit = i
-            for m in range(task.jumping.size):
-                if task.owned[i, m]:
-                    w.x[task.jumping[m], j] = w.s[m, j]
+            for m in range(task.resets.states.size):
+                if task.resets.owned[i, m]:
+                    w.x[task.resets.states[m], j] = w.s[m, j]
         _counted(lane)
         lane.jacobian_at = np.nan
         if task.times[lane.segment] == lane.t:
             for i in range(w.x.shape[0]):
                 w.samples[lane.segment, i, j] = w.x[i, j]
-        for i in range(task.declared):
-            w.behind[i, j] = 0.0
+        for i in range(task.rows.declared):
+            w.events.behind[i, j] = 0.0
 
 
 @numba.njit(**INNER)
@@ -128,20 +153,21 @@ def _rises(rhs, task, lanes, w, jumped):
         ahead = max(abs(lanes[j].t) * _AHEAD, _AHEAD)
         w.t[j] = lanes[j].t + ahead
         for i in range(w.x.shape[0]):
-            w.x_ahead[i, j] = w.x[i, j] + ahead * w.k[0, i, j]
-    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+            w.ahead.x[i, j] = w.x[i, j] + ahead * w.k[0, i, j]
+    evaluate(rhs, task, lanes, w, w.ahead.x, w.ahead.dx, w.ahead.g, w.ahead.m)
     for i in range(jumped.shape[0]):
         for j in range(lanes.size):
-            now, later = w.e[task.guarded + i, j], w.g_ahead[task.guarded + i, j]
+            now, later = w.events.g[task.rows.guarded + i, j], w.ahead.g[task.rows.guarded + i, j]
             if jumped[i, j] and lanes[j].fell_at == lanes[j].t and now < 0.0 and later > now:
-                w.rising[i, j] = now
+                w.guards.rising[i, j] = now
 
 
 @numba.njit(**INNER)
 def _check_rising(task, lane, w, j):
     """End a run in which a guard that should have risen has not: jumps come faster than steps."""
-    for i in range(w.rising.shape[0]):
-        if w.rising[i, j] == w.rising[i, j] and lane.t > lane.fell_at:
-            if w.e[task.guarded + i, j] < w.rising[i, j]:
+    guards = w.guards
+    for i in range(guards.rising.shape[0]):
+        if guards.rising[i, j] == guards.rising[i, j] and lane.t > lane.fell_at:
+            if w.events.g[task.rows.guarded + i, j] < guards.rising[i, j]:
                 lane.status, lane.culprit = ZENO, i
-            w.rising[i, j] = np.nan
+            guards.rising[i, j] = np.nan

@@ -90,8 +90,8 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         events=int(lane["noted"]),
         stiff=bool(lane["stiff"]),
         jump=run.jumps.get(j),
-        conditions=int(run.task.switching - run.task.bending),
-        opaque=bool(run.task.opaque),
+        conditions=int(run.task.rows.switching - run.task.rows.bending),
+        opaque=bool(run.task.timed.opaque),
         turns=int(lane["turns"]),
     )
     return Trajectory(
@@ -102,7 +102,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         inputs=_every_input(run, j, done),
         culprit=int(lane["culprit"]),
         since=float(lane["since"]),
-        guard=float(run.work.e[run.task.guarded + lane["culprit"], j])
+        guard=float(run.work.events.g[run.task.rows.guarded + lane["culprit"], j])
         if lane["culprit"] >= 0
         else 0.0,
     )
@@ -111,7 +111,7 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
 def _every_input(run: Any, j: int, done: int) -> np.ndarray:
     """Return all that the program takes as inputs, at the times that lane `j` has reached."""
     given, times = run.task.inputs, run.task.times
-    parts = [given[:, :done], run.work.shown[:done, :, j].T]
+    parts = [given[:, :done], run.work.past.shown[:done, :, j].T]
     if run.work.u.shape[0] > sum(map(len, parts)):  # the rates of the segment that begins
         rates = np.diff(given) / np.diff(times)
         parts.append(rates[:, np.minimum(np.arange(done), times.size - 2)])

@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 from ..machine.address import call_out
 from .delays import next_break
+from .evaluate import inputs_at
+from .memory import Places1, Places2, Reals1, Reals2
 from .state import INNER, RUNNING
-from .workspace import inputs_at
+
+
+class Clocks(NamedTuple):
+    """When what happens to sampled blocks."""
+
+    ticks: Reals2  # (lanes, instants): when something does, then inf
+    which: Places2  # (lanes, instants): which of the functions then
+    functions: Places1
+    due: Places2  # (functions, sampled states): whether it makes the next state
+    states: Places1  # indices of these states
+    table: Places2
+
+
+class Timed(NamedTuple):
+    """What is known before a run of functions of t alone."""
+
+    jumps: Reals2  # (lanes, instants): when they jump or have kinks, then inf
+    longest: Reals1  # (lanes,) step in s that none may be longer than
+    reach: Reals2  # (lanes, cells): until when a step may lead that begins in a cell
+    opaque: int  # whether something is called as it stands: nobody knows when it jumps
+    table: Places2
 
 
 @numba.njit(**INNER)
@@ -22,11 +46,11 @@ def next_stop(task, lane, w, j):
     stop = times[-1]
     if task.inputs.shape[0] and lane.segment < times.size - 1:
         stop = times[lane.segment + 1]
-    if lane.tick < task.ticks.shape[1]:
-        stop = min(stop, task.ticks[j, lane.tick])
-    if lane.jump < task.jumps.shape[1]:
-        stop = min(stop, task.jumps[j, lane.jump])
-    return next_break(task, w, lane, j, stop) if task.delays.shape[0] else stop
+    if lane.tick < task.clocks.ticks.shape[1]:
+        stop = min(stop, task.clocks.ticks[j, lane.tick])
+    if lane.jump < task.timed.jumps.shape[1]:
+        stop = min(stop, task.timed.jumps[j, lane.jump])
+    return next_break(task, w, lane, j, stop) if task.lines.delays.shape[0] else stop
 
 
 @numba.njit(**INNER)
@@ -44,18 +68,18 @@ def take_samples(task, lanes, w, sampled):
             lanes[j].resumes = 1
             for i in range(w.x.shape[0]):
                 w.resume[i, j] = w.x[i, j]
-    for k in range(task.samples.size if found else 0):
+    for k in range(task.clocks.functions.size if found else 0):
         wanted = False
         for j in range(lanes.size):
             w.t[j] = lanes[j].t
-            wanted |= sampled[j] and task.which[j, lanes[j].tick] == k
+            wanted |= sampled[j] and task.clocks.which[j, lanes[j].tick] == k
         if not wanted:
             continue
         if w.u.shape[0]:
             inputs_at(task, lanes, w)
-        call_out(task.samples[k], w.t, w.x, w.u, task.p, w.s)
+        call_out(task.clocks.functions[k], w.t, w.x, w.u, task.p, w.s)
         for j in range(lanes.size):
-            if sampled[j] and task.which[j, lanes[j].tick] == k:
+            if sampled[j] and task.clocks.which[j, lanes[j].tick] == k:
                 _take(task, lanes[j], w, j, k)
     for j in range(lanes.size):
         if sampled[j]:
@@ -69,16 +93,16 @@ def pass_jumps(task, lanes, jumped):
 
     Return whether any lane has come to one.
     """
-    found, count = False, task.jumps.shape[1]
+    found, count = False, task.timed.jumps.shape[1]
     rounding = 1e-14 * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
     for j in range(lanes.size):
         lane = lanes[j]
         jumped[j] = False
-        while lane.jump < count and task.jumps[j, lane.jump] <= lane.t + rounding:
-            lane.right = task.jumps[j, lane.jump]
+        while lane.jump < count and task.timed.jumps[j, lane.jump] <= lane.t + rounding:
+            lane.right = task.timed.jumps[j, lane.jump]
             lane.jump += 1
             jumped[j] = True
-        next_one = task.jumps[j, lane.jump] if lane.jump < count else np.inf
+        next_one = task.timed.jumps[j, lane.jump] if lane.jump < count else np.inf
         lane.left = before(next_one)
         found |= jumped[j]
     return found
@@ -111,19 +135,23 @@ def begin_afresh(task, lanes, w, sampled):
 @numba.njit(**INNER)
 def _is_due(task, lane, j):
     running = lane.status == RUNNING
-    return running and lane.tick < task.ticks.shape[1] and task.ticks[j, lane.tick] <= lane.t
+    return (
+        running
+        and lane.tick < task.clocks.ticks.shape[1]
+        and task.clocks.ticks[j, lane.tick] <= lane.t
+    )
 
 
 @numba.njit(**INNER)
 def _take(task, lane, w, j, k):
     """Make the next states of sampled blocks the states of a lane, also in its output samples."""
     shown = task.times[lane.segment] == lane.t
-    for i in range(task.sampled.size):
-        if task.due[k, i]:
-            row = task.sampled[i]
+    for i in range(task.clocks.states.size):
+        if task.clocks.due[k, i]:
+            row = task.clocks.states[i]
             w.x[row, j] = w.s[i, j]
             if shown:
                 w.samples[lane.segment, row, j] = w.s[i, j]
     lane.jacobian_at = np.nan
-    for i in range(task.declared):
-        w.behind[i, j] = 0.0
+    for i in range(task.rows.declared):
+        w.events.behind[i, j] = 0.0

@@ -25,6 +25,8 @@ class Status(IntEnum):
 OK, DIVERGED, STEP_LIMIT, STEP_TOO_SMALL, STOPPED, CHATTERING, ZENO, ENDED = map(int, Status)
 RUNNING, STIFF = -1, -2  # STIFF: to be finished by a method that only single runs have
 DERIVATIVES = -3  # to go on once it is known where the stiff method has its Jacobian from
+METHOD = -4  # to go on by Taylor's method, or again by the explicit one
+AUTO, EXPLICIT, IMPLICIT, TAYLOR = 0, 1, 2, 3  # methods
 FIRST_PATIENCE = 15
 DIRECTIONS = 8  # in which derivatives are taken together
 # for functions that only machine code calls: without a way in from Python, which would have to be
@@ -78,6 +80,12 @@ _FIELDS = [
     ("quiet", "i8"),  # steps in which memory events are not looked for
     ("slow", "i8"),  # steps in a row whose size stability limits
     ("patience", "i8"),  # such steps that are borne before the stiff method is tried
+    ("pace", "f8"),  # how far this method gets with the work of an explicit step (s), see `turns`
+    ("other_pace", "f8"),  # and the other one did
+    ("from_t", "f8"),  # time from which that is measured
+    ("from_tried", "i8"),  # steps tried until this method's turn
+    ("span", "i8"),  # steps of its turn
+    ("wait", "i8"),  # explicit steps before Taylor's method is tried again, if it does not pay
     ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
     ("ends", "i8"),  # the step being tried ends at a break point of the inputs or at the end
 ]

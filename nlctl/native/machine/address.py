@@ -10,9 +10,9 @@ from numba import types
 from ...upstream.numba_internals import infer_global, make_intrinsic_template
 
 
-def call_rhs(rhs, t, x, u, p, dx, g):
+def call_rhs(rhs, t, x, u, p, dx, g, m):
     """Evaluate a right-hand side: a plain function, in machine code the address of one."""
-    rhs(t, x, u, p, dx, g)
+    rhs(t, x, u, p, dx, g, m)
 
 
 def call_out(out, t, x, u, p, y):
@@ -75,8 +75,8 @@ def _register(function: Any, definition: Any) -> None:
     infer_global(function, types.Function(template))
 
 
-_register(call_rhs, lambda typing_context, f, t, x, u, p, dx, g: _by_address(
-    typing_context, f, t, x, u, p, dx, g))  # fmt: skip
+_register(call_rhs, lambda typing_context, f, t, x, u, p, dx, g, m: _by_address(
+    typing_context, f, t, x, u, p, dx, g, m))  # fmt: skip
 _register(call_out, lambda typing_context, f, t, x, u, p, y: _by_address(
     typing_context, f, t, x, u, p, y))  # fmt: skip
 _register(call_point, lambda typing_context, f, t, x, u, c: _by_address(

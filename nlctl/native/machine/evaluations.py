@@ -33,7 +33,7 @@ class Machine:
     prepare : callable
         ``prepare(p, c)`` fills these from the program's parameter vectors.
     rhs, out : callable
-        ``rhs(t, x, u, c, dx, g)`` and ``out(t, x, u, c, y)``.
+        ``rhs(t, x, u, c, dx, g, m)`` and ``out(t, x, u, c, y)``.
     samples : tuple of callable
         ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
     resets : callable or None
@@ -160,13 +160,13 @@ def fitting(compiled: Compiled, p: np.ndarray, width: int) -> np.ndarray:
 
 
 def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
-    """Return ``rhs(t, x, u, p, dx, g)`` and ``out(t, x, u, p, y)`` of numbers and flat vectors."""
+    """Return ``rhs(t, x, u, p, dx, g, m)`` and ``out(t, x, u, p, y)`` of flat vectors."""
     machine(compiled, compiled.parameter_vector()[:, None])
 
-    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: np.ndarray, g: np.ndarray) -> None:
+    def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: Any, g: Any, m: Any) -> None:
         code, c = prepared_parameters(compiled, p)
         events = np.empty((code.lowered.rows["g"], 1))  # others where integers steer what switches
-        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events)
+        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events, m[:, None])
         g[:] = events[:, 0] if events.shape[0] == g.size else np.nan
 
     def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:

@@ -20,7 +20,7 @@ import llvmlite.binding as llvm
 import numba
 
 from ...upstream.numba_internals import checks_indices, is_jit_disabled
-from ..integrate import advance, start, workspace
+from ..integrate import advance, evaluate, start
 from ..integrate.workspace import TASK, WORK
 from . import address, store
 from .fingerprint import function_key, module_key
@@ -40,7 +40,7 @@ WANTED = [
     for function, *arguments in (
         (start.start, _ADDRESS, TASK, WORK),
         (advance.advance, _ADDRESS, _ADDRESS, _ADDRESS, TASK, WORK, numba.intp),
-        (workspace.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
+        (evaluate.outputs, _ADDRESS, _ADDRESS, TASK, WORK),
     )
 ]
 _ONCE = threading.Lock()  # of several threads that begin at the same time one compiles

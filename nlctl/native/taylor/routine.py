@@ -88,7 +88,7 @@ def _made(compiled: Compiled, p: np.ndarray, width: int) -> Series:
         found = equations(compiled.schedule, compiled.program.layout, p[:, 0])
     lowered, wanted = _lowered(compiled, found, width)
     layout = _layout(lowered)
-    switching = _located(compiled, found)
+    switching = compiled.program.events + found.conditions.rows
     if is_jit_disabled():
         prepare, *functions = plain_series(lowered, wanted, switching, layout)
     else:
@@ -110,12 +110,6 @@ def _made(compiled: Compiled, p: np.ndarray, width: int) -> Series:
     )
 
 
-def _located(compiled: Compiled, found: Any) -> int:
-    """Return how many switching functions are followed: all rows of g but those of memories."""
-    program = compiled.program
-    return program.events + found.conditions.rows - len(program.memory)
-
-
 def _layout(lowered: Lowered) -> SeriesLayout:
     """Give what a step needs its rows behind the parameters in `c`."""
     at, row = {}, lowered.size
@@ -127,7 +121,6 @@ def _layout(lowered: Lowered) -> SeriesLayout:
 def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
     asked = stores_of(found, ("dx", "g"))
-    asked["g"] = [s for s in asked["g"] if s.row < _located(compiled, found)]
     stores, exact, graph = rewritten(found.graph, asked)
     try:
         wanted = recurrences(

@@ -73,11 +73,12 @@ def computed(compiled: nlctl.Compiled, at: Points) -> tuple[np.ndarray, np.ndarr
     system, lanes = compiled.system, at.t.size
     p = np.repeat(compiled.parameter_vector()[:, None], lanes, axis=1)
     code = machine(compiled, p, lanes)
-    sizes = (code.rows, system.nstates, code.lowered.rows["g"], system.noutputs)
-    c, dx, g, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
+    rows = code.lowered.rows
+    sizes = (code.rows, system.nstates, rows["g"], rows["m"], system.noutputs)
+    c, dx, g, m, y = (np.full((n or 0, lanes), np.nan) for n in sizes)
     code.prepare(p, c)
     given = [np.ascontiguousarray(a) for a in (at.t, at.x, at.u)]
-    code.rhs(*given, c, dx, g)
+    code.rhs(*given, c, dx, g, m)
     code.out(*given, c, y)
     return dx, y
 

@@ -123,8 +123,7 @@ class TestToys:
 @pytest.mark.parametrize("pair", [*EXPLICIT_PAIRS.values(), *TOYS], ids=lambda pair: pair.name)
 def test_steps_are_stable_up_to_the_limit(pair):
     """|R(z)| <= 1 for z from -stable to 0, R(z) = 1 + z b (I - z A)^-1 1, and not far beyond."""
-    tableau = pair.arrays()
-    A = tableau["A"][:, : pair.stages]
+    A = pair.pair().A[:, : pair.stages]
     b, ones = A[-1], np.ones(pair.stages)
 
     def growth(z):

@@ -33,7 +33,7 @@ def work(compiled, x0, end, method):
         tried[stiff] += int(run.lanes["accepted"][0] + run.lanes["rejected"][0]) - sum(
             tried.values()
         )
-    return tried[False] + (run.task.cost * tried[True] if tried[True] else 0.0)
+    return tried[False] + (run.task.stiff.cost * tried[True] if tried[True] else 0.0)
 
 
 @pytest.mark.slow

@@ -274,7 +274,7 @@ class TestOrder:
         With |u''| = 1 at the corner that costs at most b_6 |d| h^3, once, beside the order five.
         """
         errors, h = self.errors(loops[Located]), 2 / np.array([8, 16, 32, 64])
-        A, C = TSIT5.arrays()["A"][:, : TSIT5.stages], TSIT5.arrays()["C"]
+        A, C = TSIT5.pair().A[:, : TSIT5.stages], TSIT5.pair().C
         missed = A[6, 5] * abs(A[5] @ C - C[5] ** 2 / 2)
         assert missed < 0.011
         assert np.all(errors < 2e-4 * h**5 + missed * h**3)

@@ -11,7 +11,7 @@ from nlctl.native.integrate.methods.tsit5 import TSIT5
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 
-ROWS = TSIT5.arrays()["inside"]
+ROWS = TSIT5.pair().inside
 
 
 @numba.njit(error_model="numpy")

@@ -22,7 +22,7 @@ def called(compiled, t=0.0, x=(), u=(), *, native=False):
     x, u, p = np.array(x, dtype=float), np.array(u, dtype=float), compiled.parameter_vector()
     dx, y = np.zeros(x.size), np.zeros(compiled.system.noutputs)
     with np.errstate(all="ignore"):
-        rhs(t, x, u, p, dx, np.zeros(compiled.program.events))
+        rhs(t, x, u, p, dx, *(np.zeros(compiled.lowered.rows[name]) for name in "gm"))
         out(t, x, u, p, y)
     return dx, y
 

@@ -32,13 +32,13 @@ def evaluated(system, lanes, t, x, u, params=None, *, native=False, given=None):
     p = np.array([compiled.parameter_vector(own) for own in params or [given] * lanes]).T.copy()
     prepare, rhs, out = lowered_code(lowered) if native else plain_functions(lowered)
     c = np.full((lowered.size, lanes), np.nan)
-    found = [np.full((n or 0, lanes), np.nan) for n in
-             (system.nstates, lowered.rows["g"], system.noutputs)]  # fmt: skip
+    rows = {**lowered.rows, "y": system.noutputs or 0}
+    dx, g, m, y = (np.full((rows[name], lanes), np.nan) for name in ("dx", "g", "m", "y"))
     with np.errstate(all="ignore"):
         prepare(p, c)
-        rhs(t, x, u, c, found[0], found[1])
-        out(t, x, u, c, found[2])
-    return lowered, found
+        rhs(t, x, u, c, dx, g, m)
+        out(t, x, u, c, y)
+    return lowered, [dx, np.vstack([g, m]), y]
 
 
 def points(system, lanes, seed=0):

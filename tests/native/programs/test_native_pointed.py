@@ -13,17 +13,28 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numba.core import config
 
-from nlctl.native.integrate.memory import type_of, with_table
+from nlctl.native.integrate.memory import (
+    Places1,
+    Places2,
+    Reals1,
+    Reals2,
+    Reals3,
+    arrays_of,
+    grown,
+    replaced,
+    type_of,
+    with_table,
+)
 
 
 class Record(NamedTuple):
-    line: np.ndarray
-    grid: np.ndarray
-    cube: np.ndarray
-    places: np.ndarray
+    line: Reals1
+    grid: Reals2
+    cube: Reals3
+    places: Places1
     number: float
     count: int
-    table: np.ndarray
+    table: Places2
 
 
 FLOATS = st.floats(width=64)  # NaN, infinities, -0.0 and subnormal numbers as well
@@ -46,13 +57,13 @@ RECORDS = st.builds(
 
 
 class Found(NamedTuple):
-    line: np.ndarray
-    grid: np.ndarray
-    cube: np.ndarray
-    places: np.ndarray
-    number: np.ndarray
-    whole: np.ndarray
-    table: np.ndarray
+    line: Reals1
+    grid: Reals2
+    cube: Reals3
+    places: Places1
+    number: Reals1
+    whole: Places1
+    table: Places2
 
 
 def run(function, *given):
@@ -61,7 +72,7 @@ def run(function, *given):
         function(*given)
         return
     is_record = [isinstance(g, tuple) for g in given]
-    kinds = [type_of(g) if r else numba.intp for g, r in zip(given, is_record, strict=True)]
+    kinds = [type_of(type(g)) if r else numba.intp for g, r in zip(given, is_record, strict=True)]
     if function not in COMPILED:  # once, not once an example
         COMPILED[function] = numba.cfunc(numba.void(*kinds))(function)
     call = ctypes.CFUNCTYPE(
@@ -164,20 +175,58 @@ def test_a_record_is_passed_on_between_functions():
 )
 def test_a_field_of_another_type_is_refused(field, value, message):
     """What is compiled for one type is not run on another."""
-    kept = sample()._asdict() | {field: value}
-    kept.pop("table")
     with pytest.raises(TypeError, match=f"'{field}' of Record needs {message}"):
-        with_table(Record, like=type_of(sample()), **kept)
+        replaced(sample(), **{field: value})
 
 
 @pytest.mark.parametrize("array", [np.ones(4)[::2], np.ones((2, 3)).T])
 def test_an_array_with_gaps_or_in_another_order_is_refused(array):
     name = "line" if array.ndim == 1 else "grid"
     with pytest.raises(ValueError, match=f"'{name}' of Record needs a C-contiguous array"):
-        changed(**{name: array})
+        replaced(sample(), **{name: array})
 
 
-def changed(**values):
-    kept = sample()._asdict() | values
-    kept.pop("table")
-    return with_table(Record, **kept)
+class Outer(NamedTuple):
+    number: float
+    inner: Record
+    last: Reals1
+    table: Places2
+
+
+def scaled_inside(outer):
+    inside = outer.inner
+    for i in range(inside.line.size):
+        inside.line[i] *= outer.number * inside.number
+    outer.last[0] = outer.inner.line[inside.line.size - 1]
+
+
+def test_a_record_in_a_record_is_the_same_memory():
+    """Machine code reads and writes what is inside as Python does."""
+    outer = with_table(Outer, number=3.0, inner=sample(), last=np.zeros(1))
+    run(scaled_inside, outer)
+    assert outer.inner.line.tolist() == [1.5, 1.5]
+    assert outer.last.tolist() == [1.5]
+    assert type_of(Outer).fields["inner"] == type_of(Record)
+
+
+def test_another_record_inside_is_refused():
+    other = with_table(Outer, number=3.0, inner=sample(), last=np.zeros(1))
+    with pytest.raises(TypeError, match="'inner' of Outer needs"):
+        replaced(other, inner=other)
+
+
+def test_a_record_with_more_room_holds_what_it_held():
+    """`grown` adds rows that are 0; the other fields are the same arrays."""
+    before = sample()
+    after = grown(before, ("grid", "cube"), 5)
+    assert after.grid.tolist() == [*before.grid.tolist(), *[[0.0] * 3] * 3]
+    assert after.cube.shape == (5, 3, 2)
+    assert after.line is before.line
+
+
+def test_zeros_have_the_types_that_fields_are_annotated_with():
+    made = arrays_of(
+        Found, line=(2,), grid=(1, 2), cube=(1, 1, 1), places=(3,), number=(1,), whole=(1,)
+    )
+    assert [a.dtype.kind for a in made[:-1]] == ["f", "f", "f", "i", "f", "i"]
+    assert not any(a.any() for a in made[:-1])

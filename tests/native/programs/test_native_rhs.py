@@ -295,7 +295,8 @@ def test_nan_reaches_every_output_that_depends_on_it():
     x = nlctl.initial_state(loop)
     x[0] = np.nan
     assert np.isnan(evaluated(out, 11, 0.0, x, np.zeros(0), p)[:6:2]).all()
-    assert np.isnan(evaluated(rhs, 31, 0.0, x, np.zeros(0), p, np.empty(2))[1])
+    g, m = (np.empty(compiled.lowered.rows[name]) for name in "gm")
+    assert np.isnan(evaluated(rhs, 31, 0.0, x, np.zeros(0), p, g, m)[1])
 
 
 def test_a_parameter_that_changes_shape_is_refused():

@@ -58,7 +58,7 @@ def _has_seen_a_jump(task, lane, w, j):
     On the near side the error of a shorter step is smaller at least by the cube of its part.
     """
     most = 1.0
-    if lane.traces > 0 and not task.highest:
+    if lane.traces > 0 and not task.taylor.highest:
         most = min(1.0, 10.0 * (lane.step / lane.whole) ** 3 + _ROUNDING / task.rtol)
     return not w.error[j] <= most
 
@@ -86,8 +86,10 @@ def _shortened(lane, beyond):
 @numba.njit(**INNER)
 def _is_behind(task, lane, w, j):
     """Whether the step just tried ends behind a condition."""
-    for i in range(task.declared, task.switching):
-        if _crossed(task, w, i, w.e[i, j], j) or (_leaves(task, lane, w, i, j) and w.e[i, j] != 0):
+    for i in range(task.rows.declared, task.rows.switching):
+        if _crossed(task, w, i, w.events.g[i, j], j) or (
+            _leaves(task, lane, w, i, j) and w.events.g[i, j] != 0
+        ):
             return True
     return False
 
@@ -99,7 +101,7 @@ def _leaves(task, lane, w, i, j):
     What the right-hand side is at 0 need not be what it is on the side to which the step leads.
     That counts once in a row: what comes back to 0 and leaves it with every step is rounding.
     """
-    return i < task.guarded and w.e_start[i, j] == 0.0 and not lane.left_zero
+    return i < task.rows.guarded and w.events.g_start[i, j] == 0.0 and not lane.left_zero
 
 
 @numba.njit(**INNER)
@@ -109,15 +111,15 @@ def _beyond(task, lane, w, j):
     In parts of what the switching function is at the start; what follows a shorter step begins
     nearer, and has better stages.
     """
-    known = task.inside[1 if is_stiff(lane) else 0, 0] != 0.0
+    known = task.pair.inside[1 if is_stiff(lane) else 0, 0] != 0.0
     if not known or task.fixed > 0.0:
         return 0.0
     farthest = 0.0
-    for i in range(task.declared, task.guarded):
-        start = w.e_start[i, j]
+    for i in range(task.rows.declared, task.rows.guarded):
+        start = w.events.g_start[i, j]
         for n in range(3):
-            if start * w.g_inside[n, i, j] < 0.0:
-                farthest = max(farthest, -w.g_inside[n, i, j] / start)
+            if start * w.events.g_inside[n, i, j] < 0.0:
+                farthest = max(farthest, -w.events.g_inside[n, i, j] / start)
     return farthest
 
 
@@ -132,8 +134,8 @@ def _across(task, lane, w, j):
     if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
         shorten(lane, 1.0)
         return REFUSED
-    for i in range(task.declared, task.switching):
-        if _crossed(task, w, i, w.e[i, j], j) or left_to_other_side(task, w, i, j):
+    for i in range(task.rows.declared, task.rows.switching):
+        if _crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
             return EVENT
     return CLEAR
 
@@ -156,16 +158,20 @@ def _costs_too_much(task, lane, w, j):
 @numba.njit(**INNER)
 def left_to_other_side(task, w, i, j):
     """Whether a step leads from where a condition is exactly 0 to where it has not come from."""
-    is_condition = task.declared <= i < task.guarded
-    return is_condition and w.e_start[i, j] == 0.0 and w.behind[i, j] * w.e[i, j] < 0.0
+    is_condition = task.rows.declared <= i < task.rows.guarded
+    return (
+        is_condition
+        and w.events.g_start[i, j] == 0.0
+        and w.events.behind[i, j] * w.events.g[i, j] < 0.0
+    )
 
 
 @numba.njit(**INNER)
 def _crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
-    if i >= task.guarded:
-        return w.above[i - task.guarded, j] != 0 and end < 0.0
-    return w.e_start[i, j] * end < 0.0
+    if i >= task.rows.guarded:
+        return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
+    return w.events.g_start[i, j] * end < 0.0
 
 
 @numba.njit(**INNER)
@@ -175,6 +181,7 @@ def _bracket(task, lane, w, bad, j):
     Of the near side the last two are kept, by which is foreseen where the condition lies: what a
     step that is wrong says of its end is made of both sides.
     """
+    events = w.events
     first = lane.traces == 0
     if first:
         lane.traces, lane.low, lane.low_before, lane.whole = 1, 0.0, 0.0, lane.step
@@ -186,14 +193,17 @@ def _bracket(task, lane, w, bad, j):
         lane.low_before, lane.low = lane.low, lane.step
         lane.same_side = min(lane.same_side, 0) - 1
     weight = 0.5 if lane.right_high and abs(lane.same_side) > 1 else 1.0  # Illinois
-    for i in range(task.declared, task.switching):
+    for i in range(task.rows.declared, task.rows.switching):
         if first:
-            w.e_low[i, j] = w.e_before[i, j] = w.e_start[i, j]
+            events.g_low[i, j] = events.g_before[i, j] = events.g_start[i, j]
         if bad or first:
-            w.e_high[i, j], w.e_low[i, j] = w.e[i, j], w.e_low[i, j] * weight
+            events.g_high[i, j], events.g_low[i, j] = (
+                events.g[i, j],
+                events.g_low[i, j] * weight,
+            )
         else:
-            w.e_before[i, j], w.e_low[i, j] = w.e_low[i, j], w.e[i, j]
-            w.e_high[i, j] *= weight
+            events.g_before[i, j], events.g_low[i, j] = events.g_low[i, j], events.g[i, j]
+            events.g_high[i, j] *= weight
 
 
 @numba.njit(**INNER)
@@ -232,10 +242,10 @@ def _foreseen(task, lane, w, bad, j):
     Between both ends where the farther one is right; otherwise by what is known of the near side.
     """
     first = -1.0
-    for i in range(task.declared, task.switching):
+    for i in range(task.rows.declared, task.rows.switching):
         root = -1.0
-        if _crossed(task, w, i, w.e_high[i, j], j) and (lane.right_high or lane.low == 0.0):
-            now, end = w.e_low[i, j], w.e_high[i, j]
+        if _crossed(task, w, i, w.events.g_high[i, j], j) and (lane.right_high or lane.low == 0.0):
+            now, end = w.events.g_low[i, j], w.events.g_high[i, j]
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)
@@ -253,13 +263,13 @@ def _extrapolated(lane, w, i, j):
     By a secant, and where there are three values by the parabola through them, one step of Newton's
     method from there.
     """
-    before, now, length = w.e_before[i, j], w.e_low[i, j], lane.low - lane.low_before
+    before, now, length = w.events.g_before[i, j], w.events.g_low[i, j], lane.low - lane.low_before
     if before * now <= 0.0 or abs(now) >= abs(before):
         return -1.0
     slope = (now - before) / length
     root = lane.low - now / slope
     if lane.low_before > 0.0:
-        bend = (slope - (before - w.e_start[i, j]) / lane.low_before) / lane.low
+        bend = (slope - (before - w.events.g_start[i, j]) / lane.low_before) / lane.low
         steeper = slope + bend * (2.0 * root - lane.low - lane.low_before)
         if steeper * slope > 0.0:
             nearer = root - bend * (root - lane.low) * (root - lane.low_before) / steeper

@@ -29,7 +29,7 @@ _SHORTER = 0.3  # part of a step to be tried where its event functions cannot be
 _FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
 _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
-_DENSE = 2  # the row of task.inside that is no method's stages
+_DENSE = 2  # the row of task.pair.inside that is no method's stages
 _NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
 _TOUCHING = 0.01  # the same at a start on the break point, where a memory has turned
 _TRIES = 24  # looks at one function in one step
@@ -40,12 +40,12 @@ _DOUBLE = 2.0  # growth of a step up to which the noise of stages does not count
 def look_between(rhs, task, lanes, w, found):
     """Have shorter steps tried where an accepted one has passed over something.
 
-    ``found`` becomes AGAIN there, and w.resolved the longest step to be tried next.
+    ``found`` becomes AGAIN there, and w.inside.resolved the longest step to be tried next.
     """
-    wanted, any_wanted = w.wanted, False
+    inside, wanted, any_wanted = w.inside, w.inside.wanted, False
     shortest = 1e-7 * (task.times[-1] - task.times[0])
     for j in range(lanes.size):
-        w.resolved[j] = np.inf
+        inside.resolved[j] = np.inf
         wanted[j] = (
             found[j] > AGAIN
             and not lanes[j].across
@@ -57,124 +57,138 @@ def look_between(rhs, task, lanes, w, found):
         return
     for n in range(3):
         for j in range(lanes.size):
-            w.part[j] = task.inside[_DENSE, n] if wanted[j] else 0.0
-        events_at_parts(rhs, task, lanes, w, w.g_ahead)
-        for i in range(w.g.shape[0]):
-            for j in range(lanes.size):
-                w.g_inside[n, i, j] = w.g_ahead[i, j]
+            inside.part[j] = task.pair.inside[_DENSE, n] if wanted[j] else 0.0
+        events_at_parts(rhs, task, lanes, w, w.events.g_inside[n], w.memories.m_inside[n])
     seeking = False
     for j in range(lanes.size):
-        w.sought[j] = -1
+        inside.sought[j] = -1
         if wanted[j]:
-            _go_on(task, lanes[j], w, found, j, 0)
-        seeking |= w.sought[j] >= 0
+            _go_on(task, lanes[j], w, found, False, 0, j)
+        seeking |= inside.sought[j] >= 0
     while seeking:
         _evaluated(rhs, task, lanes, w)
         seeking = False
         for j in range(lanes.size):
-            if w.sought[j] >= 0:
+            if inside.sought[j] >= 0:
                 _narrow(task, lanes[j], w, found, j)
-            seeking |= w.sought[j] >= 0
+            seeking |= inside.sought[j] >= 0
 
 
 @numba.njit(**INNER)
 def _suspected(task, lane, w, j):
     """Whether the values at a method's stages leave anything to be looked at."""
     row = 1 if is_stiff(lane) else 0
-    if task.inside[row, 0] == 0.0:
+    if task.pair.inside[row, 0] == 0.0:
         return True  # no such stages
     suspected = False
-    for i in range(w.e.shape[0]):
-        if i < task.switching and _is_far(w, i, j):
-            continue
-        suspected |= _known(task, lane, w, i, j, row)[0] != _CLEAR
+    for i in range(w.events.g.shape[0]):
+        if not _is_far(w, i, j):
+            suspected |= _known(task, lane, w, i, j, row)[0] != _CLEAR
+    for i in range(w.memories.m.shape[0]):
+        suspected |= _known_memory(task, lane, w, i, j, row)[0] != _CLEAR
     return suspected
 
 
 @numba.njit(**INNER)
 def _known(task, lane, w, i, j, row):
-    """Return what is known of an event function, and where it may be least.
+    """Return what is known of a switching function, and where it may be least.
 
-    Of `f`, which is above 0 at both ends of the step: sign times the event function plus offset.
+    Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
     """
-    if i >= task.switching and w.e_start[i, j] == 0.0:
-        return _standing(task, w, i, j, row)
-    carried = i >= task.switching
-    if carried and row != _DENSE:
-        return _may_turn(lane, w, i, j), 0.0
-    at, values, newton = task.inside[row], w.values, w.newton
-    offset = _follow(task, lane, w, i, j, at)
-    least = min(values[0], values[1], values[2], values[3], values[4])
-    most = max(values[0], values[1], values[2], values[3], values[4])
-    extent, wrong = most if carried else most - least, w.wrong[j]
+    inside, at = w.inside, task.pair.inside[row]
+    values = inside.values
+    sign, offset = _side(w, i, j)
+    values[0] = sign * w.events.g_start[i, j] + offset
+    values[4] = sign * w.events.g[i, j] + offset
+    for n in range(3):
+        values[n + 1] = sign * w.events.g_inside[n, i, j] + offset
+    quartic(values, at, inside.newton)
+    inside.wrong[j] = doubt(inside.newton, at)
+    extent = max(values[0], values[1], values[2], values[3], values[4]) - _least(values)
     if extent <= _still(task, w, j):
         return _CLEAR, 0.0
-    w.narrow[j] = _TOUCHING if values[0] == 0.0 else _NARROW
-    w.floor[j] = max(w.narrow[j] ** 2 * extent, task.atol if values[0] == 0.0 else 0.0)
-    if not carried:
-        longer = (0.1 * extent / max(wrong, 1e-300)) ** (1 / 3)
-        if task.memory.size and row != _DENSE:
-            longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
-        w.resolved[j] = min(w.resolved[j], longer * lane.step)
+    longer = (0.1 * extent / max(inside.wrong[j], 1e-300)) ** (1 / 3)
+    if task.rows.memory.size and row != _DENSE:
+        longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
+    inside.resolved[j] = min(inside.resolved[j], longer * lane.step)
+    return _judged(task, w, at, extent, 0.0, False, j)
+
+
+@numba.njit(**INNER)
+def _known_memory(task, lane, w, i, j, row):
+    """Return what is known of a memory, and where its rate, as `f` of `_known`, may be least."""
+    memories, inside, at = w.memories, w.inside, task.pair.inside[row]
+    if memories.rate_start[i, j] == 0.0:
+        return _standing(task, w, i, j, row)
+    if row != _DENSE:
+        return _may_turn(lane, w, i, j), 0.0
+    values, newton = inside.values, inside.newton
+    sign, offset = _side_of_memory(lane, w, i, j)
+    values[0], values[4] = sign * memories.m_start[i, j], sign * memories.m[i, j]
+    for n in range(3):
+        values[n + 1] = sign * memories.m_inside[n, i, j]
+    quartic(values, at, newton)
+    first = sign * lane.step * memories.slope_start[i, j]
+    last = sign * lane.step * memories.slope[i, j]
+    begin, finish = slope_at(newton, at, 0.0), slope_at(newton, at, 1.0)
+    inside.wrong[j] = max(abs(begin - first), abs(finish - last))
+    values[0], values[4] = first + offset, last + offset
+    for n in range(3):
+        values[n + 1] = slope_at(newton, at, at[n]) + offset
+    extent = max(values[0], values[1], values[2], values[3], values[4])
+    if extent <= _still(task, w, j):
+        return _CLEAR, 0.0
+    return _judged(task, w, at, extent, offset, True, j)
+
+
+@numba.njit(**INNER)
+def _judged(task, w, at, extent, offset, carried, j):
+    """Return what five values of `f` say of a step in which it has that extent."""
+    inside, touches = w.inside, w.inside.values[0] == 0.0
+    inside.narrow[j] = _TOUCHING if touches else _NARROW
+    inside.floor[j] = max(inside.narrow[j] ** 2 * extent, task.atol if touches else 0.0)
+    wrong = inside.wrong[j]
     if wrong > _FOLLOWED * extent:
         return _UNRESOLVED, 0.0
-    if least > extent:
+    if _least(inside.values) > extent:
         return _CLEAR, 0.0
-    lower, x = least_value(newton, at, carried)
-    if lower + (offset if carried else 0.0) > 2.0 * wrong or _leads_away(w, at, x, carried, j):
+    lower, x = least_value(inside.newton, at, carried)
+    if lower + offset > 2.0 * wrong or _leads_away(w, at, x, carried, j):
         return _CLEAR, 0.0
     return _SUSPECT, min(max(x, 0.02), 0.98)
 
 
 @numba.njit(**INNER)
-def _follow(task, lane, w, i, j, at):
-    """Fill w.values and w.newton with an event function in a step; return its offset.
-
-    Of a memory they are its rate and the polynomial that it is the derivative of.
-    """
-    values, newton, carried = w.values, w.newton, i >= task.switching
-    sign, offset = _side(task, lane, w, i, j)
-    start, end = (w.g_start[i, j], w.g[i, j]) if carried else (w.e_start[i, j], w.e[i, j])
-    shift = 0.0 if carried else offset
-    values[0], values[4] = sign * start + shift, sign * end + shift
-    for n in range(3):
-        values[n + 1] = sign * w.g_inside[n, i, j] + shift
-    quartic(values, at, newton)
-    w.wrong[j] = doubt(newton, at)
-    if carried:
-        first, last = sign * lane.step * w.slope_start[i, j], sign * lane.step * w.slope[i, j]
-        begin, finish = slope_at(newton, at, 0.0), slope_at(newton, at, 1.0)
-        w.wrong[j] = max(abs(begin - first), abs(finish - last))
-        values[0], values[4] = first + offset, last + offset
-        for n in range(3):
-            values[n + 1] = slope_at(newton, at, at[n]) + offset
-    return offset
+def _least(values):
+    """Return the least of five values."""
+    return min(values[0], values[1], values[2], values[3], values[4])
 
 
 @numba.njit(**INNER)
 def _still(task, w, j):
     """Return what a function changes by that stands still: rounding, of memories for instance."""
     largest = 0.0
-    for i in range(task.switching, w.g.shape[0]):
-        largest = max(largest, abs(w.g[i, j]))
+    for i in range(w.memories.m.shape[0]):
+        largest = max(largest, abs(w.memories.m[i, j]))
     return 0.01 * task.atol + 1e-14 * largest
 
 
 @numba.njit(**INNER)
 def _leads_away(w, at, x, carried, j):
     """Whether a function that is least at an end of the step has no minimum near there."""
-    steep = _FLAT * w.wrong[j]
+    values, newton, steep = w.inside.values, w.inside.newton, _FLAT * w.inside.wrong[j]
     if x == 0.0:
-        return w.values[1] > w.values[0] and _slope(w.newton, at, 0.0, carried) > steep
-    return x == 1.0 and _slope(w.newton, at, 1.0, carried) < -steep
+        return values[1] > values[0] and _slope(newton, at, 0.0, carried) > steep
+    return x == 1.0 and _slope(newton, at, 1.0, carried) < -steep
 
 
 @numba.njit(**INNER)
 def _is_far(w, i, j):
     """Whether 0 is far from all values of a switching function, or one is NaN."""
+    events = w.events
     a, b, c, d, e = (
-        *(w.e_start[i, j], w.g_inside[0, i, j], w.g_inside[1, i, j]),
-        *(w.g_inside[2, i, j], w.e[i, j]),
+        *(events.g_start[i, j], events.g_inside[0, i, j], events.g_inside[1, i, j]),
+        *(events.g_inside[2, i, j], events.g[i, j]),
     )
     least, most = min(a, b, c, d, e), max(a, b, c, d, e)
     near = _FAR * (most - least)
@@ -187,10 +201,11 @@ def _may_turn(lane, w, i, j):
 
     At the stages it may be far less accurate than at the ends, where other states follow from it.
     """
-    change = w.g[i, j] - w.g_start[i, j]
-    first, last = lane.step * w.slope_start[i, j], lane.step * w.slope[i, j]
+    memories = w.memories
+    change = memories.m[i, j] - memories.m_start[i, j]
+    first, last = lane.step * memories.slope_start[i, j], lane.step * memories.slope[i, j]
     wrong = abs(change - 0.5 * (first + last))
-    noise = 1e-12 * abs(w.g[i, j])
+    noise = 1e-12 * abs(memories.m[i, j])
     if wrong > _FOLLOWED * (abs(change) + abs(first) + abs(last)) + noise:
         return _SUSPECT
     side = 1.0 if first > 0.0 else -1.0
@@ -209,109 +224,143 @@ def _slope(newton, at, x, carried):
 
 
 @numba.njit(**INNER)
-def _side(task, lane, w, i, j):
-    """Return sign and offset that make an event function positive at both ends of a step.
+def _side(w, i, j):
+    """Return sign and offset that make a switching function positive at both ends of a step.
 
     Where a step ends right behind its event, twice of that rest is the level; where it begins
     right behind one and ends in front of it, twice of that rest.
     """
-    start, end = w.e_start[i, j], w.e[i, j]
-    side = 1.0 if start > 0.0 or (start == 0.0 and w.g_inside[0, i, j] > 0.0) else -1.0
-    if i >= task.switching:
-        end = lane.step * w.slope[i, j]
+    start, end = w.events.g_start[i, j], w.events.g[i, j]
+    side = 1.0 if start > 0.0 or (start == 0.0 and w.events.g_inside[0, i, j] > 0.0) else -1.0
     if side * end >= 0.0:
         return side, 0.0
-    if i < task.switching and w.behind[i, j] != 0.0 and abs(start) <= STARTS_BEHIND * abs(end):
+    if w.events.behind[i, j] != 0.0 and abs(start) <= STARTS_BEHIND * abs(end):
         return -side, 2.0 * abs(start)
     return side, -2.0 * side * end
 
 
 @numba.njit(**INNER)
+def _side_of_memory(lane, w, i, j):
+    """Return the same for the rate of a memory that is carried along."""
+    side = 1.0 if w.memories.rate_start[i, j] > 0.0 else -1.0
+    end = lane.step * w.memories.slope[i, j]
+    return side, (0.0 if side * end >= 0.0 else -2.0 * side * end)
+
+
+@numba.njit(**INNER)
 def _standing(task, w, i, j, row):
     """Whether a memory that stands still at both ends of a step has moved in between, and where."""
-    before = w.x[task.memory[i - task.switching], j]
-    if w.e[i, j] == 0.0 and w.g[i, j] == before:
+    memories, before = w.memories, w.x[task.rows.memory[i], j]
+    if memories.rate[i, j] == 0.0 and memories.m[i, j] == before:
         for n in range(3):
-            if abs(w.g_inside[n, i, j] - before) > task.atol + task.rtol * abs(before):
-                return _SUSPECT, task.inside[row, n]
+            if abs(memories.m_inside[n, i, j] - before) > task.atol + task.rtol * abs(before):
+                return _SUSPECT, task.pair.inside[row, n]
     return _CLEAR, 0.0
 
 
 @numba.njit(**INNER)
-def _go_on(task, lane, w, found, j, first):
-    """Go on to the next event function that is to be looked at, from `first` on."""
-    w.sought[j] = -1
-    free = task.fixed == 0.0 and lane.tries == 0
-    for i in range(first, w.e.shape[0]):
-        if (lane.quiet > 0) if i >= task.switching else _is_far(w, i, j):
-            continue
-        known, x = _known(task, lane, w, i, j, _DENSE)
-        growing = i < task.switching or lane.step > _DOUBLE * lane.last  # a memory's rate has noise
-        if known == _UNRESOLVED and free and growing:
-            shorten(lane, _SHORTER)
-            found[j] = AGAIN
-            return
-        if known == _SUSPECT and i >= task.switching and w.e_start[i, j] == 0.0:
+def _go_on(task, lane, w, found, carried, first, j):
+    """Go on to the next event function that is to be looked at, from `first` on.
+
+    Memories, if it is one that is carried, otherwise switching functions and then memories.
+    """
+    w.inside.sought[j] = -1
+    for i in range(w.events.g.shape[0] if carried else first, w.events.g.shape[0]):
+        if not _is_far(w, i, j):
+            known, x = _known(task, lane, w, i, j, _DENSE)
+            if _has_to_look(task, lane, w, found, known, x, True, j):
+                w.inside.sought[j], w.inside.carried[j] = i, 0
+                return
+            if found[j] == AGAIN:
+                return
+    for i in range(first if carried else 0, 0 if lane.quiet > 0 else w.memories.m.shape[0]):
+        known, x = _known_memory(task, lane, w, i, j, _DENSE)
+        if known == _SUSPECT and w.memories.rate_start[i, j] == 0.0:
             shorten(lane, x)
             found[j] = AGAIN
             return
-        if known == _SUSPECT:
-            _bracket(w, x, j)
-            w.sought[j], w.attempts[j] = i, 0
+        growing = lane.step > _DOUBLE * lane.last  # otherwise the noise of a memory's rate counts
+        if _has_to_look(task, lane, w, found, known, x, growing, j):
+            w.inside.sought[j], w.inside.carried[j] = i, 1
             return
+        if found[j] == AGAIN:
+            return
+
+
+@numba.njit(**INNER)
+def _has_to_look(task, lane, w, found, known, x, growing, j):
+    """Whether the minimum of a function is to be sought; `found` becomes AGAIN if unresolved."""
+    if known == _UNRESOLVED and task.fixed == 0.0 and lane.tries == 0 and growing:
+        shorten(lane, _SHORTER)
+        found[j] = AGAIN
+    if known == _SUSPECT:
+        _bracket(w, x, j)
+        w.inside.attempts[j] = 0
+    return known == _SUSPECT
 
 
 @numba.njit(**INNER)
 def _bracket(w, x, j):
     """Begin to look at x, between the nearest known values: one of them below its neighbours."""
+    inside = w.inside
     k = min(int(4.0 * x), 3)
-    inner = k + 1 if w.values[k + 1] < w.values[k] else k
+    inner = k + 1 if inside.values[k + 1] < inside.values[k] else k
     low, high = (k, k + 1) if inner == 0 or inner == 4 else (inner - 1, inner + 1)
-    w.bracket[0, j], w.bracket[1, j], w.bracket[2, j] = 0.25 * low, 0.25 * inner, 0.25 * high
-    w.height[0, j], w.height[1, j], w.height[2, j] = w.values[low], w.values[inner], w.values[high]
+    inside.bracket[0, j], inside.bracket[1, j], inside.bracket[2, j] = (
+        0.25 * low,
+        0.25 * inner,
+        0.25 * high,
+    )
+    inside.height[0, j], inside.height[1, j], inside.height[2, j] = (
+        inside.values[low],
+        inside.values[inner],
+        inside.values[high],
+    )
     if inner == 0 or inner == 4:
-        w.bracket[1, j] = -1.0
-    w.part[j], w.foreseen[j] = x, np.inf
+        inside.bracket[1, j] = -1.0
+    inside.part[j], inside.foreseen[j] = x, np.inf
 
 
 @numba.njit(**INNER)
 def _narrow(task, lane, w, found, j):
     """Take a value of the function that is sought into its bracket; say where to look next."""
-    x, y, i = w.part[j], w.looked[j], w.sought[j]
-    w.attempts[j] += 1
-    if y < -w.floor[j]:
+    inside = w.inside
+    x, y, i = inside.part[j], inside.looked[j], inside.sought[j]
+    inside.attempts[j] += 1
+    if y < -inside.floor[j]:
         shorten(lane, x)
-        found[j], w.sought[j] = AGAIN, -1
+        found[j], inside.sought[j] = AGAIN, -1
         return
-    low, middle, high = w.bracket[0, j], w.bracket[1, j], w.bracket[2, j]
-    seen = abs(y - w.foreseen[j]) < 0.3 * y
-    if not y > -np.inf or w.attempts[j] > _TRIES or high - low < w.narrow[j]:
-        _go_on(task, lane, w, found, j, i + 1)
+    low, middle, high = inside.bracket[0, j], inside.bracket[1, j], inside.bracket[2, j]
+    seen = abs(y - inside.foreseen[j]) < 0.3 * y
+    if not y > -np.inf or inside.attempts[j] > _TRIES or high - low < inside.narrow[j]:
+        _go_on(task, lane, w, found, inside.carried[j] != 0, i + 1, j)
         return
-    if middle < 0.0 or y < w.height[1, j]:
+    if middle < 0.0 or y < inside.height[1, j]:
         end = 2 if middle > x else 0
         if middle >= 0.0:
-            w.bracket[end, j], w.height[end, j] = middle, w.height[1, j]
-        w.bracket[1, j], w.height[1, j] = x, y
+            inside.bracket[end, j], inside.height[end, j] = middle, inside.height[1, j]
+        inside.bracket[1, j], inside.height[1, j] = x, y
     else:
         end = 2 if x > middle else 0
-        w.bracket[end, j], w.height[end, j] = x, y
+        inside.bracket[end, j], inside.height[end, j] = x, y
     _aim(w, j)
-    if seen and 0.5 * w.height[1, j] < w.foreseen[j] < np.inf:
-        _go_on(task, lane, w, found, j, i + 1)
+    if seen and 0.5 * inside.height[1, j] < inside.foreseen[j] < np.inf:
+        _go_on(task, lane, w, found, inside.carried[j] != 0, i + 1, j)
 
 
 @numba.njit(**INNER)
 def _aim(w, j):
     """Set where to look next: at the vertex of the parabola, or towards an end that is lower."""
-    low, middle, high = w.bracket[0, j], w.bracket[1, j], w.bracket[2, j]
-    below, least, above = w.height[0, j], w.height[1, j], w.height[2, j]
-    w.foreseen[j] = np.inf
+    inside = w.inside
+    low, middle, high = inside.bracket[0, j], inside.bracket[1, j], inside.bracket[2, j]
+    below, least, above = inside.height[0, j], inside.height[1, j], inside.height[2, j]
+    inside.foreseen[j] = np.inf
     if least > below or least > above:
         end = 0 if below < above else 2
-        w.part[j] = w.bracket[end, j] + 0.3 * (middle - w.bracket[end, j])
-        w.bracket[2 - end, j], w.height[2 - end, j] = middle, least
-        w.bracket[1, j] = -1.0
+        inside.part[j] = inside.bracket[end, j] + 0.3 * (middle - inside.bracket[end, j])
+        inside.bracket[2 - end, j], inside.height[2 - end, j] = middle, least
+        inside.bracket[1, j] = -1.0
         return
     slope, bend = parabola(low, middle, high, below, least, above)
     move = -0.5 * slope / bend if bend > 0.0 else 0.0
@@ -319,32 +368,33 @@ def _aim(w, j):
     if abs(move) < rest:
         move = rest if high - middle > middle - low else -rest
     x = min(max(middle + move, low + rest), high - rest)
-    w.part[j] = x
-    w.foreseen[j] = least + (x - middle) * (slope + bend * (x - middle))
+    inside.part[j] = x
+    inside.foreseen[j] = least + (x - middle) * (slope + bend * (x - middle))
 
 
 @numba.njit(**INNER)
 def _evaluated(rhs, task, lanes, w):
-    """Fill w.looked with the functions that are sought, each at its w.part of the step."""
-    carried = False
+    """Fill ``looked`` with the functions that are sought, each at its ``part`` of the step."""
+    inside, any_carried = w.inside, False
     for j in range(lanes.size):
-        if w.sought[j] < 0:
-            w.part[j] = 0.0
-        carried |= w.sought[j] >= task.switching
-    scratch = w.g_inside[3]
-    events_at_parts(rhs, task, lanes, w, scratch)
-    if carried:
+        if inside.sought[j] < 0:
+            inside.part[j] = 0.0
+        any_carried |= inside.sought[j] >= 0 and inside.carried[j] != 0
+    g, m = w.events.g_inside[3], w.memories.m_inside[3]
+    events_at_parts(rhs, task, lanes, w, g, m)
+    if any_carried:
         for j in range(lanes.size):
-            w.part[j] += AHEAD
-        events_at_parts(rhs, task, lanes, w, w.g_ahead)
+            inside.part[j] += AHEAD
+        events_at_parts(rhs, task, lanes, w, w.ahead.g, w.ahead.m)
         for j in range(lanes.size):
-            w.part[j] -= AHEAD
+            inside.part[j] -= AHEAD
     for j in range(lanes.size):
-        i = w.sought[j]
+        i = inside.sought[j]
         if i < 0:
             continue
-        sign, offset = _side(task, lanes[j], w, i, j)
-        event = scratch[i, j]
-        if i >= task.switching:
-            event = (w.g_ahead[i, j] - event) / AHEAD
-        w.looked[j] = sign * event + offset
+        if inside.carried[j]:
+            sign, offset = _side_of_memory(lanes[j], w, i, j)
+            inside.looked[j] = sign * ((w.ahead.m[i, j] - m[i, j]) / AHEAD) + offset
+        else:
+            sign, offset = _side(w, i, j)
+            inside.looked[j] = sign * g[i, j] + offset

@@ -27,14 +27,12 @@ PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory
 
 
 @numba.njit(**INNER)
-def triggered(start, end, is_memory, behind):
-    """Whether an event function's values at the ends of a step show an event in between.
+def triggered(start, end, behind):
+    """Whether a switching function's values at the ends of a step show an event in between.
 
     With `behind` its own event was the end of the step before: on a surface that attracts from
     both sides, going back through it at once is no event.
     """
-    if is_memory:
-        return start != 0.0 and not start * end > 0.0
     return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
 
 
@@ -45,42 +43,55 @@ def behind_event(rtol):
 
 
 @numba.njit(**INNER)
-def first_root(lane, task, every, e_start, e_low, e_high, behind, j):
+def first_root(lane, task, every, w, low, high, j):
     """Return where the first event between the lengths low and high lies, -1 if there is none.
 
-    And whether it is a memory's.  Conditions at which something may jump, and guards, are for
-    `crossing`, unless `every` event is asked for.
+    `low` and `high` are values of the switching functions there.  Conditions at which something may
+    jump, and guards, are for `crossing`, unless `every` event is asked for.
     """
-    first, is_memory = -1.0, False
-    bending, switching, small = task.bending, task.switching, SMALL_KINK * task.atol
-    declared = switching if every else task.declared
-    for i in range(e_start.shape[0]):
-        if declared <= i < switching:
-            continue
-        if bending <= i < task.declared and abs(e_start[i, j]) + abs(e_high[i, j]) <= small:
+    first, rows, small = -1.0, task.rows, SMALL_KINK * task.atol
+    start, behind = w.events.g_start, w.events.behind
+    for i in range(rows.switching if every else rows.declared):
+        if rows.bending <= i < rows.declared and abs(start[i, j]) + abs(high[i, j]) <= small:
             continue  # rounding of what is 0: a kink that small is seen by nobody
-        if triggered(e_start[i, j], e_high[i, j], i >= switching, behind[i, j] != 0.0):
-            low, high = e_low[i, j], e_high[i, j]
-            if not low * high < 0.0:
-                high = -low  # a memory that would stand still says no more than that: halve
-            part = 0.5 if low == high else low / (low - high)
-            root = lane.low + part * (lane.high - lane.low)
+        if triggered(start[i, j], high[i, j], behind[i, j] != 0.0):
+            root = _root(lane, low[i, j], high[i, j])
             if first < 0.0 or root < first:
-                first, is_memory = root, i >= switching
-    return first, is_memory
+                first = root
+    return first
 
 
 @numba.njit(**INNER)
-def locate(lane, task, e_start, e_low, e_high, e, behind, j):
+def first_turn(lane, w, low, high, j):
+    """Return where the first memory between the lengths low and high turns, -1 if none does.
+
+    `low` and `high` are the rates there.
+    """
+    first, start = -1.0, w.memories.rate_start
+    for i in range(start.shape[0]):
+        if start[i, j] != 0.0 and not start[i, j] * high[i, j] > 0.0:
+            root = _root(lane, low[i, j], high[i, j])
+            if first < 0.0 or root < first:
+                first = root
+    return first
+
+
+@numba.njit(**INNER)
+def _root(lane, low, high):
+    """Return where a function is 0 between two lengths, by its values there."""
+    if not low * high < 0.0:
+        high = -low  # a memory that would stand still says no more than that: halve
+    part = 0.5 if low == high else low / (low - high)
+    return lane.low + part * (lane.high - lane.low)
+
+
+@numba.njit(**INNER)
+def locate(lane, task, w, j):
     """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
 
     With AGAIN, ``lane.step`` is the next length to try.
     """
-    if lane.tries == 0:
-        lane.low, lane.high = 0.0, lane.step
-        for i in range(e.shape[0]):
-            e_low[i, j], e_high[i, j] = e_start[i, j], e[i, j]
-    root, memory = _narrowed(lane, task, e_start, e_low, e_high, e, behind, j)
+    root, memory = _narrowed(lane, task, w, j)
     if root < 0.0:
         return CLEAR
     lane.tries += 1
@@ -103,26 +114,49 @@ def locate(lane, task, e_start, e_low, e_high, e, behind, j):
 
 
 @numba.njit(**INNER)
-def _narrowed(lane, task, e_start, e_low, e_high, e, behind, j):
-    """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
-    before = lane.high
-    if lane.tries > 0:
+def _narrowed(lane, task, w, j):
+    """Take the attempt into the bracket; return the first root in it, -1 if there is none.
+
+    And whether it is a memory's.
+    """
+    events, memories, before, weight, inside = w.events, w.memories, lane.high, 1.0, True
+    if lane.tries == 0:
+        lane.low, lane.high, lane.same_side = 0.0, lane.step, 0
+        _bracketed(events.g_low, events.g_high, events.g_start, events.g, j)
+        _bracketed(memories.rate_low, memories.rate_high, memories.rate_start, memories.rate, j)
+    else:
         lane.high = lane.step
-        inside = first_root(lane, task, False, e_start, e_low, e, behind, j)[0] >= 0.0
+        inside = first_root(lane, task, False, w, events.g_low, events.g, j) >= 0.0
+        inside |= first_turn(lane, w, memories.rate_low, memories.rate, j) >= 0.0
         if not inside:
             lane.low, lane.high = lane.step, before
             lane.same_side = min(lane.same_side, 0) - 1
         else:
             lane.same_side = max(lane.same_side, 0) + 1
         weight = 0.5 if abs(lane.same_side) > 1 else 1.0  # Illinois: an end that stays loses some
-        for i in range(e.shape[0]):
-            if inside:
-                e_low[i, j], e_high[i, j] = e_low[i, j] * weight, e[i, j]
-            else:
-                e_low[i, j], e_high[i, j] = e[i, j], e_high[i, j] * weight
-    else:
-        lane.same_side = 0
-    return first_root(lane, task, False, e_start, e_low, e_high, behind, j)
+        _nearer(inside, weight, events.g_low, events.g_high, events.g, j)
+        _nearer(inside, weight, memories.rate_low, memories.rate_high, memories.rate, j)
+    root = first_root(lane, task, False, w, events.g_low, events.g_high, j)
+    turn = first_turn(lane, w, memories.rate_low, memories.rate_high, j)
+    is_memory = turn >= 0.0 and not 0.0 <= root <= turn
+    return (turn if is_memory else root), is_memory
+
+
+@numba.njit(**INNER)
+def _bracketed(low, high, start, end, j):
+    """Make the values at the ends of a step those at the ends of the bracket."""
+    for i in range(end.shape[0]):
+        low[i, j], high[i, j] = start[i, j], end[i, j]
+
+
+@numba.njit(**INNER)
+def _nearer(inside, weight, low, high, end, j):
+    """Take values into the bracket: at its far end, or at the near one."""
+    for i in range(end.shape[0]):
+        if inside:
+            low[i, j], high[i, j] = low[i, j] * weight, end[i, j]
+        else:
+            low[i, j], high[i, j] = end[i, j], high[i, j] * weight
 
 
 @numba.njit(**INNER)
@@ -132,17 +166,22 @@ def jumped(task, lane, w, j):
     And no event of the step says why.  Where such a jump is being located, one at a stage counts:
     it is the first that is sought.
     """
-    for i in range(task.memory.size):
-        row, before = task.switching + i, w.x_new[task.memory[i], j]
-        if w.e_start[row, j] != 0.0 or w.slope[row, j] != 0.0:
+    memories, events = w.memories, w.events
+    for i in range(memories.m.shape[0]):
+        before = w.x_new[task.rows.memory[i], j]
+        if memories.rate_start[i, j] != 0.0 or memories.slope[i, j] != 0.0:
             continue  # it is carried along, also while memories are committed step by step
-        changed = _apart(task, before, w.g[row, j])
-        if lane.seeks > 0 and task.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
+        changed = _apart(task, before, memories.m[i, j])
+        if lane.seeks > 0 and task.pair.inside[1 if is_stiff(lane) else 0, 0] != 0.0:
             for n in range(3):
-                changed |= _apart(task, before, w.g_inside[n, row, j])
+                changed |= _apart(task, before, memories.m_inside[n, i, j])
         if changed:
-            own = first_root(lane, task, True, w.e_start, w.e_start, w.e, w.behind, j)[0]
-            return lane.seeks > 0 or own < 0.0
+            if lane.seeks > 0:
+                return True
+            return (
+                first_root(lane, task, True, w, events.g_start, events.g, j) < 0.0
+                and first_turn(lane, w, memories.rate_start, memories.rate, j) < 0.0
+            )
     return False
 
 

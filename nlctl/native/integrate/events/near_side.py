@@ -18,72 +18,77 @@ _HALVINGS = 24  # of the way to a break point that is farther back
 
 @numba.njit(**INNER)
 def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.g what they are just before the break point at which a step ends.
+    """Make memories in w.memories.m what they are just before a break point that ends a step.
 
     Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     """
-    wanted, any_wanted, nearer = w.wanted, False, w.g_inside[3]
+    inside, ahead, memories = w.inside, w.ahead, w.memories
+    wanted, any_wanted, nearer = inside.wanted, False, w.events.g_inside[3]
     back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
     for j in range(lanes.size):
-        wanted[j] = found[j] == EVENT and _crosses(task, w, w.e, j)
+        wanted[j] = found[j] == EVENT and _crosses(task, w, w.events.g, j)
         any_wanted |= wanted[j]
     if not any_wanted:
         return
     for j in range(lanes.size):
-        w.part[j] = 1.0 - back
-    events_at_parts(rhs, task, lanes, w, nearer)
+        inside.part[j] = 1.0 - back
+    events_at_parts(rhs, task, lanes, w, nearer, memories.m_inside[3])
     any_far = False
     for j in range(lanes.size):
-        w.part[j] = 1.0 - 2.0 * back
-        w.sought[j] = 1 if wanted[j] and _crosses(task, w, nearer, j) else -1
-        any_far |= w.sought[j] > 0
+        inside.part[j] = 1.0 - 2.0 * back
+        inside.sought[j] = 1 if wanted[j] and _crosses(task, w, nearer, j) else -1
+        any_far |= inside.sought[j] > 0
     if any_far:
         _halve(rhs, task, lanes, w, back)
-    events_at_parts(rhs, task, lanes, w, w.g_ahead)
+    events_at_parts(rhs, task, lanes, w, ahead.g, ahead.m)
     for j in range(lanes.size):
-        far = w.sought[j] > 0
-        ahead = 0.0 if far else 1.0 + _until_break_point(task, w, nearer, j)
-        for i in range(task.switching, w.g.shape[0]):
-            if wanted[j] and w.e_start[i, j] != 0.0:
-                change = 0.0 if far else nearer[i, j] - w.g_ahead[i, j]
-                w.g[i, j] = w.g_ahead[i, j] + ahead * change
+        far = inside.sought[j] > 0
+        on = 0.0 if far else 1.0 + _until_break_point(task, w, nearer, j)
+        for i in range(memories.m.shape[0]):
+            if wanted[j] and memories.rate_start[i, j] != 0.0:
+                change = 0.0 if far else memories.m_inside[3, i, j] - ahead.m[i, j]
+                memories.m[i, j] = ahead.m[i, j] + on * change
 
 
 @numba.njit(**INNER)
 def _halve(rhs, task, lanes, w, back):
-    """Set w.part right before the first break point of the lanes that are sought.
+    """Set w.inside.part right before the first break point of the lanes that are sought.
 
     Where a memory turns at the break point at which its input jumps, a step ends farther behind.
     """
+    inside = w.inside
     for j in range(lanes.size):
-        if w.sought[j] > 0:
-            w.bracket[0, j], w.bracket[2, j] = lanes[j].low / lanes[j].step, 1.0 - back
-            w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
+        if inside.sought[j] > 0:
+            inside.bracket[0, j], inside.bracket[2, j] = (
+                lanes[j].low / lanes[j].step,
+                1.0 - back,
+            )
+            inside.part[j] = 0.5 * (inside.bracket[0, j] + inside.bracket[2, j])
     for _ in range(_HALVINGS):
-        events_at_parts(rhs, task, lanes, w, w.g_ahead)
+        events_at_parts(rhs, task, lanes, w, w.ahead.g, w.ahead.m)
         for j in range(lanes.size):
-            if w.sought[j] > 0:
-                w.bracket[2 if _crosses(task, w, w.g_ahead, j) else 0, j] = w.part[j]
-                w.part[j] = 0.5 * (w.bracket[0, j] + w.bracket[2, j])
+            if inside.sought[j] > 0:
+                inside.bracket[2 if _crosses(task, w, w.ahead.g, j) else 0, j] = inside.part[j]
+                inside.part[j] = 0.5 * (inside.bracket[0, j] + inside.bracket[2, j])
     for j in range(lanes.size):
-        if w.sought[j] > 0:
-            w.part[j] = w.bracket[0, j]
+        if inside.sought[j] > 0:
+            inside.part[j] = inside.bracket[0, j]
 
 
 @numba.njit(**INNER)
 def _until_break_point(task, w, nearer, j):
     """Return how far it is to the first break point, in distances between the last two looks."""
     first = np.inf
-    for i in range(task.switching):
-        if w.e_start[i, j] * w.e[i, j] < 0.0:
-            first = min(first, nearer[i, j] / (w.g_ahead[i, j] - nearer[i, j]))
+    for i in range(task.rows.switching):
+        if w.events.g_start[i, j] * w.events.g[i, j] < 0.0:
+            first = min(first, nearer[i, j] / (w.ahead.g[i, j] - nearer[i, j]))
     return min(max(first, 0.0), 1.0)
 
 
 @numba.njit(**INNER)
-def _crosses(task, w, e, j):
+def _crosses(task, w, g, j):
     """Whether a switching function has another sign than at the start of a step."""
-    for i in range(task.switching):  # noqa: SIM110 (no generators in machine code)
-        if w.e_start[i, j] * e[i, j] < 0.0:
+    for i in range(task.rows.switching):  # noqa: SIM110 (no generators in machine code)
+        if w.events.g_start[i, j] * g[i, j] < 0.0:
             return True
     return False

@@ -11,14 +11,15 @@ import numba
 import numpy as np
 
 from ...machine.address import call_rhs
+from ..evaluate import inputs_at, on_this_side
 from ..state import INNER
-from ..workspace import inputs_at, on_this_side
 
 
 @numba.njit(**INNER)
 def explicit_attempt(rhs, task, lanes, w):
     """Try a step in all lanes: fill w.x_new, the stages, the error and the rate."""
-    x, hh, k, count, last = w.x_flat, w.hh, w.k_flat, lanes.size, task.C.size - 1
+    pair = task.pair
+    x, hh, k, count, last = w.x_flat, w.hh, w.k_flat, lanes.size, pair.C.size - 1
     for j in range(count):
         w.h[j] = lanes[j].step
     for i in range(w.x.shape[0]):
@@ -26,24 +27,25 @@ def explicit_attempt(rhs, task, lanes, w):
             hh[i * count + j] = w.h[j]
     for s in range(1, last + 1):
         for j in range(count):
-            w.t[j] = lanes[j].t + task.C[s] * w.h[j]
-        if task.jumps.shape[1]:
+            w.t[j] = lanes[j].t + pair.C[s] * w.h[j]
+        if task.timed.jumps.shape[1]:
             on_this_side(lanes, w)
         if w.u.shape[0]:
             inputs_at(task, lanes, w)
         if s < last:
-            combined(x, hh, task.A, k, s, w.x_stage_flat)
-            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], w.g_inside[task.kept[s]])
+            combined(x, hh, pair.A, k, s, w.x_stage_flat)
+            g, m = w.events.g_inside[pair.kept[s]], w.memories.m_inside[pair.kept[s]]
+            call_rhs(rhs, w.t, w.x_stage, w.u, task.p, w.k[s], g, m)
         else:
-            combined(x, hh, task.A, k, s, w.x_new_flat)
-            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.g)
-        for i in task.memory:
+            combined(x, hh, pair.A, k, s, w.x_new_flat)
+            call_rhs(rhs, w.t, w.x_new, w.u, task.p, w.k[s], w.events.g, w.memories.m)
+        for i in task.rows.memory:
             for j in range(count):
                 w.k[s, i, j] = 0.0
-    change, parts = w.dx_ahead_flat, w.x_ahead_flat
-    difference(hh, task.E, k, change)
+    change, parts = w.ahead.dx_flat, w.ahead.x_flat
+    difference(hh, pair.E, k, change)
     weighed(x, w.x_new_flat, change, task.rtol, task.atol, parts)
-    errors(w.x_ahead, w.x_new, w.x_stage, w.k, w.error, w.rate)
+    errors(w.ahead.x, w.x_new, w.x_stage, w.k, w.error, w.rate)
 
 
 @numba.njit(**INNER)

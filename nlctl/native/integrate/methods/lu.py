@@ -146,37 +146,42 @@ place = numba.njit(**INNER)(jacobian_place)
 
 
 @numba.njit(**INNER)
-def factorise(task, diagonal, w):
+def factorise(method, diagonal, work):
     """Factorise diagonal * I - J; return whether only where there are entries."""
-    if task.order.size and _factorise_entries(task, diagonal, w.jacobian_flat, w.factors):
+    if method.order.size and _factorise_entries(method, diagonal, work.jacobian_flat, work.factors):
         return True
-    n, columns = w.columns.shape[0], w.columns
+    n, columns = work.columns.shape[0], work.columns
     for j in range(n):
         for i in range(n):
-            columns[j, i] = -w.jacobian_flat[place(i, j, n)]
+            columns[j, i] = -work.jacobian_flat[place(i, j, n)]
         columns[j, j] += diagonal
-    _factorise_all(columns, w.pivots)
+    _factorise_all(columns, work.pivots)
     return False
 
 
 @numba.njit(**INNER)
-def solve(task, only_entries, w, b):
+def solve(method, only_entries, work, b):
     """Solve with the factors of `factorise`; `b` becomes the solution."""
     if only_entries:
-        _solve_entries(task, w.factors, b)
+        _solve_entries(method, work.factors, b)
     else:
-        _solve_all(w.columns, w.pivots, b)
+        _solve_all(work.columns, work.pivots, b)
 
 
 @numba.njit(**INNER)
-def _factorise_entries(task, diagonal, jacobian, factors):
+def _factorise_entries(method, diagonal, jacobian, factors):
     """Factorise with the pivots of an `Elimination`; return whether all are large enough.
 
     Row by row: what is subtracted is on the right of pivots that are done.  Of these their
     inverses are kept.
     """
-    start, pivot, column, rank = task.start, task.pivot, task.column, task.rank
-    source, target, done = task.source, task.target, INDEX(0)
+    start, pivot, column, rank = (
+        method.start,
+        method.pivot,
+        method.column,
+        method.rank,
+    )
+    source, target, done = method.source, method.target, INDEX(0)
     for e in range(source.size):
         factors[e] = -jacobian[source[e]]
     for k in range(pivot.size):
@@ -197,9 +202,14 @@ def _factorise_entries(task, diagonal, jacobian, factors):
 
 
 @numba.njit(**INNER)
-def _solve_entries(task, factors, b):
+def _solve_entries(method, factors, b):
     """Solve with the factors of `_factorise_entries`, both times by sums over rows."""
-    order, start, pivot, column = task.order, task.start, task.pivot, task.column
+    order, start, pivot, column = (
+        method.order,
+        method.start,
+        method.pivot,
+        method.column,
+    )
     for k in range(order.size):
         total = b[order[k]]
         for e in range(start[k], pivot[k]):
@@ -213,16 +223,18 @@ def _solve_entries(task, factors, b):
 
 
 @numba.njit(**INNER)
-def multiply(task, jacobian, v, product):
+def multiply(method, jacobian, v, product):
     """Fill `product` with J v."""
-    n, source, column = v.size, task.source, task.column
+    n, source, column = v.size, method.source, method.column
     for i in range(n):
         product[i] = 0.0
-        for j in range(0 if task.order.size else n):
+        for j in range(0 if method.order.size else n):
             product[i] += jacobian[place(i, j, n)] * v[j]
-    for k in range(task.order.size):
-        for e in range(task.start[k], task.start[k + 1]):  # also where only factors have entries
-            product[task.order[k]] += jacobian[source[e]] * v[column[e]]
+    for k in range(method.order.size):
+        for e in range(
+            method.start[k], method.start[k + 1]
+        ):  # also where only factors have entries
+            product[method.order[k]] += jacobian[source[e]] * v[column[e]]
 
 
 @numba.njit(**INNER)

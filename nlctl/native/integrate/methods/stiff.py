@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 from ...machine.address import call_along, call_point
 from ..control import TRIAL, memory_error
-from ..state import INNER
-from ..workspace import DIFFERENCES, evaluate, inputs_at
+from ..evaluate import evaluate, inputs_at
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3, Unsigned1, with_table
+from ..state import DIRECTIONS, INNER
 from . import lu, rodas5p
-from .lu import place
+from .lu import Elimination, cost, place
 
 RELATIVE = 1.5e-8  # square root of the machine precision
 FLOOR = 1e-4  # a state smaller than this is varied as if it were so large
@@ -18,15 +21,87 @@ AHEAD = 1e-4  # part of a step by which time is varied
 SHARE = 0.3  # of the defect at the end of a step: what of it may be an error of the solution
 
 
+UNKNOWN, DIFFERENCES, EXACT = 0, 1, 2  # where the Jacobian is from
+
+
+class StiffMethod(NamedTuple):
+    """How the stiff method has its Jacobian, and solves its linear equations."""
+
+    derivatives: int  # UNKNOWN until it asks for them
+    c: Reals2  # what exact ones read besides their arguments
+    cost: float  # of a step, in explicit ones
+    order: Unsigned1  # of pivots, and where their entries are: see `lu.Elimination`
+    rank: Unsigned1
+    start: Unsigned1
+    pivot: Unsigned1
+    column: Unsigned1
+    source: Unsigned1
+    target: Unsigned1
+    table: Places2
+
+
+class StiffArrays(NamedTuple):
+    """What the stiff method works on; empty with several lanes."""
+
+    jacobian: Reals3  # see `jacobian_place`
+    jacobian_flat: Reals1
+    columns: Reals2  # of 1 / (h gamma) - J, and of its factors
+    factors: Reals1
+    f_t: Reals1
+    pivots: Places1
+    U: Reals2
+    t_along: Reals1  # what exact derivatives are evaluated with, a direction in each column
+    x_along: Reals2
+    u_along: Reals2
+    v: Reals3  # the directions
+    finite: Reals1
+    table: Places2
+
+
+def stiff_method(n: int, derivatives: int, c: np.ndarray, order: Elimination) -> StiffMethod:
+    """Return the stiff method for n states."""
+    return with_table(
+        StiffMethod, derivatives=derivatives, c=c, cost=cost(n, order), **vars(order)
+    )  # fmt: skip
+
+
+def new_stiff(n: int, inputs: int) -> StiffArrays:
+    """Return the arrays for n states."""
+    jacobian = np.zeros((n // DIRECTIONS + 1, n, DIRECTIONS))
+    return with_table(
+        StiffArrays,
+        jacobian=jacobian,
+        jacobian_flat=jacobian.reshape(-1),
+        columns=np.zeros((n, n)),
+        factors=np.zeros(n * n),
+        f_t=np.zeros(n),
+        pivots=np.zeros(n, dtype=np.int64),
+        U=np.zeros((rodas5p.STAGES, n)),
+        t_along=np.zeros(DIRECTIONS),
+        x_along=np.zeros((n, DIRECTIONS)),
+        u_along=np.zeros((inputs, DIRECTIONS)),
+        v=directions(n, inputs),
+        finite=np.zeros(DIRECTIONS),
+    )
+
+
+def directions(n: int, inputs: int) -> np.ndarray:
+    """Return unit vectors of n states and, behind the inputs, of time, `DIRECTIONS` together."""
+    v = np.zeros((n // DIRECTIONS + 1, n + inputs + 1, DIRECTIONS))
+    for c in range(n + 1):
+        v[c // DIRECTIONS, c if c < n else n + inputs, c % DIRECTIONS] = 1.0
+    return v
+
+
 @numba.njit(**INNER)
 def _jacobian(rhs, point, along, task, lanes, w):
-    """Fill w.jacobian and w.f_t at the start of a step.
+    """Fill w.stiff.jacobian and w.stiff.f_t at the start of a step.
 
     Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
     """
     lane = lanes[0]
     w.t[0] = lane.t
-    if task.derivatives == DIFFERENCES or not _exact(point, along, task, lanes, w):
+    if task.stiff.derivatives == DIFFERENCES or not _exact(point, along, task, lanes, w):
         _differences(rhs, task, lanes, w)
     lane.jacobian_at = lane.t
 
@@ -34,55 +109,65 @@ def _jacobian(rhs, point, along, task, lanes, w):
 @numba.njit(**INNER)
 def _exact(point, along, task, lanes, w):
     """Fill them with the derivatives of the equations; return whether all are finite."""
+    stiff = w.stiff
     n, m, lane = w.x.shape[0], w.u.shape[0], lanes[0]
-    wide, last = w.finite.size, n // w.finite.size
+    wide, last = stiff.finite.size, n // stiff.finite.size
     if m:
         inputs_at(task, lanes, w)
     for j in range(wide):
-        w.t_along[j], w.finite[j] = w.t[0], 0.0
+        stiff.t_along[j], stiff.finite[j] = w.t[0], 0.0
         for i in range(n):
-            w.x_along[i, j] = w.x[i, 0]
+            stiff.x_along[i, j] = w.x[i, 0]
         for i in range(m):
-            w.u_along[i, j] = w.u[i, 0]
+            stiff.u_along[i, j] = w.u[i, 0]
     k = min(lane.segment, task.times.size - 2)
     for i in range(task.inputs.shape[0]):  # inputs change as time goes on
         rise = task.inputs[i, k + 1] - task.inputs[i, k]
-        w.v[last, n + i, n - last * wide] = rise / (task.times[k + 1] - task.times[k])
-    call_point(point, w.t_along, w.x_along, w.u_along, task.c_along)
+        stiff.v[last, n + i, n - last * wide] = rise / (task.times[k + 1] - task.times[k])
+    call_point(point, stiff.t_along, stiff.x_along, stiff.u_along, task.stiff.c)
     total = 0.0
     for part in range(last + 1):
-        found = w.jacobian[part]
-        call_along(along, w.t_along, w.x_along, w.u_along, task.c_along, w.v[part], found)
-        for i in task.memory:
+        found = stiff.jacobian[part]
+        call_along(
+            along,
+            stiff.t_along,
+            stiff.x_along,
+            stiff.u_along,
+            task.stiff.c,
+            stiff.v[part],
+            found,
+        )
+        for i in task.rows.memory:
             for j in range(wide):
                 found[i, j] = 0.0
         for i in range(n):
             for j in range(wide):
-                w.finite[j] += 0.0 * found[i, j]  # NaN of NaN and infinity
+                stiff.finite[j] += 0.0 * found[i, j]  # NaN of NaN and infinity
     for j in range(wide):
-        total += w.finite[j]
+        total += stiff.finite[j]
     for i in range(n):
-        w.f_t[i] = w.jacobian_flat[place(i, n, n)]
+        stiff.f_t[i] = stiff.jacobian_flat[place(i, n, n)]
     return total == 0.0
 
 
 @numba.njit(**INNER)
 def _differences(rhs, task, lanes, w):
-    """Fill w.jacobian and w.f_t by forward differences, of what has no exact derivatives."""
+    """Fill both by forward differences, of what has no exact derivatives."""
+    ahead = w.ahead
     n, lane = w.x.shape[0], lanes[0]
     for i in range(n):
-        w.x_ahead[i, 0] = w.x[i, 0]
+        ahead.x[i, 0] = w.x[i, 0]
     for c in range(n):
-        w.x_ahead[c, 0] += RELATIVE * max(abs(w.x[c, 0]), FLOOR)
-        delta = w.x_ahead[c, 0] - w.x[c, 0]
-        evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
+        ahead.x[c, 0] += RELATIVE * max(abs(w.x[c, 0]), FLOOR)
+        delta = ahead.x[c, 0] - w.x[c, 0]
+        evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
         for i in range(n):
-            w.jacobian_flat[place(i, c, n)] = (w.dx_ahead[i, 0] - w.k[0, i, 0]) / delta
-        w.x_ahead[c, 0] = w.x[c, 0]
+            w.stiff.jacobian_flat[place(i, c, n)] = (ahead.dx[i, 0] - w.k[0, i, 0]) / delta
+        ahead.x[c, 0] = w.x[c, 0]
     w.t[0] = lane.t + max(AHEAD * lane.step, 1e-12 * abs(lane.t))
-    evaluate(rhs, task, lanes, w, w.x, w.dx_ahead, w.g_ahead)
+    evaluate(rhs, task, lanes, w, w.x, ahead.dx, ahead.g, ahead.m)
     for i in range(n):
-        w.f_t[i] = (w.dx_ahead[i, 0] - w.k[0, i, 0]) / (w.t[0] - lane.t)
+        w.stiff.f_t[i] = (ahead.dx[i, 0] - w.k[0, i, 0]) / (w.t[0] - lane.t)
 
 
 @numba.njit(**INNER)
@@ -94,7 +179,7 @@ def _spectral_radius(task, w):
         v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
     for _ in range(8):
         before, after = 0.0, 0.0
-        lu.multiply(task, w.jacobian_flat, v, product)
+        lu.multiply(task.stiff, w.stiff.jacobian_flat, v, product)
         for i in range(n):
             before += v[i] * v[i]
             after += product[i] * product[i]
@@ -114,43 +199,45 @@ def _memory_error(rhs, task, lanes, w, only_entries):
     1 / (h gamma) - J.  Most of that is the polynomial's, which is of order 3 in what fast
     components amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
     """
+    ahead = w.ahead
     error = w.x_stage_flat  # not needed any more
-    rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.U, error)
+    rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.stiff.U, error)
     for i in range(error.size):
         error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
-    lu.solve(task, only_entries, w, error)
+    lu.solve(task.stiff, only_entries, w.stiff, error)
     for i in range(error.size):
-        w.x_ahead[i, 0] = w.x_new[i, 0] + error[i]
-    evaluate(rhs, task, lanes, w, w.x_ahead, w.dx_ahead, w.g_ahead)
-    return SHARE * memory_error(task, w.x, w.g, w.g_ahead, 0)
+        ahead.x[i, 0] = w.x_new[i, 0] + error[i]
+    evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
+    return SHARE * memory_error(task, w.x, w.memories.m, ahead.m, 0)
 
 
 @numba.njit(**INNER)
 def stiff_attempt(rhs, point, along, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
+    stiff = w.stiff
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step
     if lane.jacobian_at != lane.t:
         _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared
             w.rate[0] = _spectral_radius(task, w)
-    only_entries = lu.factorise(task, 1.0 / (h * rodas5p.GAMMA), w)
+    only_entries = lu.factorise(task.stiff, 1.0 / (h * rodas5p.GAMMA), stiff)
     for s in range(rodas5p.STAGES):
         w.t[0] = lane.t + rodas5p.NODES[s] * h
         if s == 0:
             for i in range(n):
-                w.dx_ahead[i, 0] = w.k[0, i, 0]
+                w.ahead.dx[i, 0] = w.k[0, i, 0]
         else:
-            rodas5p.stage(s, w.x_flat, w.U, w.x_stage_flat)
-            kept = w.g_inside[rodas5p.KEPT[s]]
-            evaluate(rhs, task, lanes, w, w.x_stage, w.dx_ahead, kept)
-        rodas5p.right_side(s, h, w.dx_ahead_flat, w.f_t, w.U)
-        lu.solve(task, only_entries, w, w.U[s])
+            rodas5p.stage(s, w.x_flat, stiff.U, w.x_stage_flat)
+            g, m = w.events.g_inside[rodas5p.KEPT[s]], w.memories.m_inside[rodas5p.KEPT[s]]
+            evaluate(rhs, task, lanes, w, w.x_stage, w.ahead.dx, g, m)
+        rodas5p.right_side(s, h, w.ahead.dx_flat, stiff.f_t, stiff.U)
+        lu.solve(task.stiff, only_entries, stiff, stiff.U[s])
     for i in range(n):
-        w.x_new[i, 0] = w.x_stage[i, 0] + w.U[7, i]
+        w.x_new[i, 0] = w.x_stage[i, 0] + stiff.U[7, i]
     w.t[0] = lane.t + h
-    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.g)
-    w.error[0] = rodas5p.error_norm(w.x, w.x_new, w.U, task.rtol, task.atol)
-    if task.memory.size:
+    evaluate(rhs, task, lanes, w, w.x_new, w.k[w.k.shape[0] - 1], w.events.g, w.memories.m)
+    w.error[0] = rodas5p.error_norm(w.x, w.x_new, stiff.U, task.rtol, task.atol)
+    if task.rows.memory.size:
         error = _memory_error(rhs, task, lanes, w, only_entries)
         if not error <= w.error[0]:
             w.error[0] = error

@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ....errors import ParameterError
+from ..memory import Places1, Places2, Reals1, Reals2, with_table
 from . import rodas5p
 from .quartic import following_nodes
 
 _Rows = tuple[tuple[float, ...], ...]
+
+
+class Pair(NamedTuple):
+    """An explicit pair as `explicit` and `excursions` take it."""
+
+    order: float
+    stable: float  # h |lambda| up to which its steps are
+    A: Reals2  # (stages, stages), or wider: its written-out sums read six numbers of a row
+    B: Reals2  # (stages, powers): the dense output
+    C: Reals1
+    E: Reals1
+    inside: Reals2  # three parts of a step at which event functions are kept, and what follows
+    # from them: of this pair, 0 if it has no such stages, of the stiff method, and of neither
+    kept: Places1  # which of these parts a stage belongs to, 3 for none
+    table: Places2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,23 +109,25 @@ class Tableau:
         """Number of stages, the one at the end of the step included."""
         return len(self.c)
 
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Return A, C, E, B, inside and kept as `explicit` and `excursions` take them.
-
-        A is of shape (stages, stages), or wider: its written-out sums read six numbers of a row.
-        Of each stage, `kept` is which of the three parts of a step in the first row of `inside` it
-        belongs to, 3 for none.  A pair without stages at three different parts has 0 there.
-        """
+    def pair(self) -> Pair:
+        """Return the arrays that steps are made with."""
         A = np.zeros((self.stages, max(self.stages, 6)))
         for s, row in enumerate(self.a, start=1):
             A[s, :s] = row
-        B = np.array(self.dense) if self.dense else self._cubic()
         parts = self._parts()
         kept = np.array([parts.index(c) if c in parts else 3 for c in self.c], dtype=np.int64)
         rows = (parts or (0.0, 0.0, 0.0), rodas5p.INSIDE, (0.25, 0.5, 0.75))
-        inside = np.array([following_nodes(row) for row in rows])
-        coefficients = {"A": A, "C": np.array(self.c), "E": np.array(self.error), "B": B}
-        return {**coefficients, "inside": inside, "kept": kept}
+        return with_table(
+            Pair,
+            order=float(self.order),
+            stable=float(self.stable),
+            A=A,
+            B=np.array(self.dense) if self.dense else self._cubic(),
+            C=np.array(self.c),
+            E=np.array(self.error),
+            inside=np.array([following_nodes(row) for row in rows]),
+            kept=kept,
+        )
 
     def _parts(self) -> tuple[float, ...]:
         """Return three parts of a step at which there are stages, as far apart as there are."""
@@ -124,3 +144,9 @@ class Tableau:
         B[0] += [1.0, -2.0, 1.0]
         B[-1] += [0.0, -1.0, 1.0]
         return B
+
+
+@functools.cache
+def pair_of(tableau: Tableau) -> Pair:
+    """Return the arrays that steps are made with, laid out once."""
+    return tableau.pair()

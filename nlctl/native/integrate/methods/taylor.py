@@ -8,6 +8,8 @@ that was passed over.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -19,11 +21,15 @@ from ...machine.address import (
     call_step,
     call_values,
 )
+from ..evaluate import input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
+from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, RUNNING
-from ..workspace import input_rates, inputs_at
 
+TRIAL = 20  # steps after which it is judged whether this method pays
+STAGES = 2  # slopes at both ends of a step
+MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
@@ -31,7 +37,44 @@ _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
 _SHORTEST = 1e-12  # of the times: a step in which nothing is compared
-_EXPANSION, _GROWTH, _STEP, _JUDGE, _VALUES = 0, 1, 2, 3, 4  # functions of task.series
+_EXPANSION, _GROWTH, _STEP, _JUDGE, _VALUES = 0, 1, 2, 3, 4  # functions of task.taylor.functions
+
+
+class TaylorMethod(NamedTuple):
+    """A diagram's Taylor coefficients, of runs by this method."""
+
+    highest: int  # order, 0 for other methods
+    functions: Places1
+    sides: Places2  # rows of comparisons, see `taylor.recurrences.Recurrences`
+    c: Reals2  # what the functions read besides their arguments
+    span: int  # steps of its turn where it pays, 0 if it is not compared with the explicit method
+    cost: float  # of a step, in explicit ones
+    table: Places2
+
+
+class TaylorArrays(NamedTuple):
+    """The coefficients of the steps being tried."""
+
+    terms: Reals3  # (orders, rows, lanes), see `taylor.routine.Series`
+    expanded: Places1  # 1 where they are those of the step being tried
+    u_rate: Reals2  # (inputs, lanes)
+    largest: Reals2  # of coefficients, or of what a step lacks, over the tolerance
+    table: Places2
+
+
+OTHER_METHOD = with_table(
+    TaylorMethod, highest=0, functions=np.zeros(0, dtype=np.int64),
+    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), span=0, cost=0.0,
+)  # fmt: skip
+
+
+def new_terms(orders: int, rows: int, inputs: int, lanes: int) -> TaylorArrays:
+    """Return the arrays for so many orders and rows of coefficients."""
+    counted = np.zeros(lanes, dtype=np.int64)
+    return with_table(
+        TaylorArrays, terms=zeros((orders, rows, lanes)), expanded=counted,
+        u_rate=np.zeros((inputs, lanes)), largest=np.zeros((4, lanes)),
+    )  # fmt: skip
 
 
 @numba.njit(**INNER)
@@ -40,26 +83,53 @@ def expand(task, lanes, w):
 
     A step that is tried again with another length has its coefficients already.
     """
-    stale, series = False, task.series
+    taylor = w.taylor
+    stale, series = False, task.taylor.functions
     for j in range(lanes.size):
         w.t[j] = max(lanes[j].t, lanes[j].right)
-        stale |= lanes[j].status == RUNNING and w.expanded[j] == 0
+        stale |= lanes[j].status == RUNNING and taylor.expanded[j] == 0
     if not stale:
         return
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
         for j in range(lanes.size):
-            input_rates(task, lanes[j].segment, 0, w.u_rate, j)
-    call_expansion(series[_EXPANSION], w.t, w.x, w.u, w.u_rate, task.c_series, w.terms)
-    call_growth(series[_GROWTH], w.x, task.c_series, w.terms, w.largest)
+            input_rates(task, lanes[j].segment, 0, taylor.u_rate, j)
+    call_expansion(series[_EXPANSION], w.t, w.x, w.u, taylor.u_rate, task.taylor.c, taylor.terms)
+    call_growth(series[_GROWTH], w.x, task.taylor.c, taylor.terms, taylor.largest)
     for j in range(lanes.size):
-        if w.expanded[j] == 0 and task.fixed == 0.0:
-            h = _length(task.highest, w.largest, j)
+        if taylor.expanded[j] == 0 and task.fixed == 0.0:
+            h = _length(task.taylor.highest, taylor.largest, j)
             if h > 0.0:
                 lanes[j].h = h
-            if _begins_at_jump(task, lanes[j], w.terms, j):
+            if _begins_at_jump(task, lanes[j], taylor.terms, j):
                 lanes[j].h = _shortest(task)
-        w.expanded[j] = 1
+        taylor.expanded[j] = 1
+
+
+@numba.njit(**INNER)
+def is_to_change(task, lane):
+    """Whether a run of the method "auto" is to go on by Taylor's method, or not any more.
+
+    Both are measured in turn, see `nlctl.native.taylor.turns`.
+    """
+    if task.taylor.span == 0:
+        return False
+    if lane.stiff:
+        lane.from_t, lane.from_tried = lane.t, lane.accepted + lane.rejected
+        return False
+    tried = lane.accepted + lane.rejected - lane.from_tried
+    if task.taylor.highest == 0 and lane.span - tried >= MEASURED:
+        lane.from_t = lane.t
+    if lane.tries > 0 or lane.cross > 0.0 or tried < lane.span:
+        return False
+    work = task.taylor.cost * tried if task.taylor.highest else min(tried, MEASURED)
+    lane.pace = (lane.t - lane.from_t) / work
+    if task.taylor.highest == 0:
+        return lane.slow == 0
+    if lane.span > TRIAL or lane.pace < lane.other_pace:
+        return True
+    lane.span = task.taylor.span
+    return False
 
 
 @numba.njit(**INNER)
@@ -71,9 +141,9 @@ def _begins_at_jump(task, lane, terms, j):
     """
     if lane.accepted and lane.last <= _shortest(task):
         return False
-    for i in range(task.sides.shape[0]):
-        side = task.sides[i, 1]
-        if terms[0, side, j] == 0.0 and terms[task.highest - 1, side, j] != 0.0:
+    for i in range(task.taylor.sides.shape[0]):
+        side = task.taylor.sides[i, 1]
+        if terms[0, side, j] == 0.0 and terms[task.taylor.highest - 1, side, j] != 0.0:
             return True
     return False
 
@@ -98,20 +168,30 @@ def _length(highest, largest, j):
 @numba.njit(**INNER)
 def taylor_attempt(rhs, task, lanes, w):
     """Try a step in all lanes: fill w.x_new, the slope there, the event functions, the error."""
-    series, dx = task.series, w.k[w.k.shape[0] - 1]
-    if task.switching:
+    series, dx = task.taylor.functions, w.k[w.k.shape[0] - 1]
+    if task.rows.switching:
         _aim(task, lanes, w)
     for j in range(lanes.size):
         w.h[j], w.hh[j] = lanes[j].step, lanes[j].step
         w.t[j] = min(lanes[j].t + w.h[j], lanes[j].left)
-    call_step(series[_STEP], w.h, task.c_series, w.terms, w.x_new, w.dx_ahead)
+    call_step(series[_STEP], w.h, task.taylor.c, w.taylor.terms, w.x_new, w.ahead.dx)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.g)
-    call_judge(series[_JUDGE], w.h, w.x, w.x_new, w.dx_ahead, dx, task.c_series, w.terms, w.largest)
+    call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g, w.memories.m)
+    call_judge(
+        series[_JUDGE],
+        w.h,
+        w.x,
+        w.x_new,
+        w.ahead.dx,
+        dx,
+        task.taylor.c,
+        w.taylor.terms,
+        w.taylor.largest,
+    )
     _look_inside(rhs, task, lanes, w)
     for j in range(lanes.size):
-        w.error[j], w.rate[j], w.resolved[j] = _error(task, w, j), 0.0, np.inf
+        w.error[j], w.rate[j], w.inside.resolved[j] = _error(task, w, j), 0.0, np.inf
 
 
 @numba.njit(**INNER)
@@ -121,21 +201,22 @@ def _look_inside(rhs, task, lanes, w):
     There it is right before the event, and at places ever closer to it: the end lies behind, and
     at an event a defect may vanish that is large before, of friction near rest for instance.
     """
+    inside = w.inside
     wanted = False
     for j in range(lanes.size):
         _compare(task, lanes[j], w, j)
-        w.wanted[j] = w.looked[j] == 0.0 and _ends_at_event(task, lanes[j], w, j)
-        if w.wanted[j]:
-            w.looked[j], w.foreseen[j] = 1.0 - _BEFORE * behind_event(task.rtol), 0.5
-        wanted |= w.looked[j] > 0.0
+        inside.wanted[j] = inside.looked[j] == 0.0 and _ends_at_event(task, lanes[j], w, j)
+        if inside.wanted[j]:
+            inside.looked[j], inside.foreseen[j] = 1.0 - _BEFORE * behind_event(task.rtol), 0.5
+        wanted |= inside.looked[j] > 0.0
     away = 1.0
     for _ in range(_PLACES + 1):
         if wanted:
             _look_across(rhs, task, lanes, w)
         wanted, away = False, 0.1 * away
         for j in range(lanes.size):
-            if away > 0.1 ** (_PLACES + 1) and w.wanted[j] and w.looked[j] == 0.0:
-                w.looked[j], wanted = 1.0 - away, True
+            if away > 0.1 ** (_PLACES + 1) and inside.wanted[j] and inside.looked[j] == 0.0:
+                inside.looked[j], wanted = 1.0 - away, True
 
 
 @numba.njit(**INNER)
@@ -145,14 +226,14 @@ def _aim(task, lanes, w):
     That is where `locate` would end after some attempts.
     """
     for j in range(lanes.size):
-        w.part[j] = 1.0
-    events_at(task, lanes, w, w.g_ahead)
+        w.inside.part[j] = 1.0
+    events_at(task, lanes, w, w.ahead.g)
     for j in range(lanes.size):
         lane, first = lanes[j], 1.0
-        for i in range(task.switching if lane.tries == 0 and lane.across == 0 else 0):
-            if _meets(task, w, i, w.g_ahead[i, j], j):
+        for i in range(task.rows.switching if lane.tries == 0 and lane.across == 0 else 0):
+            if _meets(task, w, i, w.ahead.g[i, j], j):
                 part = _behind(task, lane, i, _root(task, w, i, lane.step, j))
-                if part > _BRIEF or i >= task.declared:
+                if part > _BRIEF or i >= task.rows.declared:
                     first = min(first, part)
         if 0.0 < first < 1.0:
             lane.step *= first
@@ -162,19 +243,19 @@ def _aim(task, lanes, w):
 @numba.njit(**INNER)
 def _meets(task, w, i, end, j):
     """Whether an event function has changed its sign in a step, or a guard has fallen."""
-    if i >= task.guarded:
-        return w.above[i - task.guarded, j] != 0 and end < 0.0
-    small = abs(w.e_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
-    if task.bending <= i < task.declared and small:
+    if i >= task.rows.guarded:
+        return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
+    small = abs(w.events.g_start[i, j]) + abs(end) <= SMALL_KINK * task.atol
+    if task.rows.bending <= i < task.rows.declared and small:
         return False  # see `first_root`
-    return triggered(w.e_start[i, j], end, False, w.behind[i, j] != 0.0)
+    return triggered(w.events.g_start[i, j], end, w.events.behind[i, j] != 0.0)
 
 
 @numba.njit(**INNER)
 def _behind(task, lane, i, root):
     """Return the part of a step that ends right behind an event, by what can be told from none."""
     part = root * (1.0 + _rest(task, i))
-    if i < task.declared:
+    if i < task.rows.declared:
         return part
     return max(part, root + 4e-16 * abs(lane.t + root * lane.step) / lane.step)
 
@@ -182,7 +263,7 @@ def _behind(task, lane, i, root):
 @numba.njit(**INNER)
 def _rest(task, i):
     """Return by which part of a step one may end behind an event: half of what is allowed."""
-    if i < task.declared:
+    if i < task.rows.declared:
         return 0.5 * behind_event(task.rtol)
     return max(0.5 * BEFORE_CONDITION * task.rtol, 1e-15)
 
@@ -190,12 +271,12 @@ def _rest(task, i):
 @numba.njit(**INNER)
 def _root(task, w, i, h, j):
     """Return the part of a step h at which the polynomial of an event function is 0."""
-    low, high, row, p = 0.0, 1.0, w.x.shape[0] + i, task.highest - 1
-    f_low, f_high = w.e_start[i, j], w.g_ahead[i, j]
+    low, high, row, p = 0.0, 1.0, w.x.shape[0] + i, task.taylor.highest - 1
+    f_low, f_high = w.events.g_start[i, j], w.ahead.g[i, j]
     for n in range(60):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
-        f = _value_and_slope(p, middle * h, w.terms, row, j)[0]
+        f = _value_and_slope(p, middle * h, w.taylor.terms, row, j)[0]
         if f * f_low > 0.0:
             low, f_low = middle, f
         else:
@@ -207,10 +288,10 @@ def _root(task, w, i, h, j):
 
 @numba.njit(**INNER)
 def events_at(task, lanes, w, g):
-    """Fill `g` with the polynomials of the switching functions at w.part of the steps."""
+    """Fill `g` with the polynomials of the switching functions at w.inside.part of the steps."""
     for j in range(lanes.size):
-        w.t[j] = w.part[j] * lanes[j].step
-    call_values(task.series[_VALUES], w.t, task.c_series, w.terms, g)
+        w.t[j] = w.inside.part[j] * lanes[j].step
+    call_values(task.taylor.functions[_VALUES], w.t, task.taylor.c, w.taylor.terms, g)
 
 
 @numba.njit(**INNER)
@@ -221,13 +302,15 @@ def _error(task, w, j):
     not foresee a defect of that size, the solution is not smooth, and the defect counts in full.
     In a step with an event the right-hand side has changed before the end: the last term counts.
     """
-    defect, term = w.largest[0, j], w.largest[1, j]
-    if w.looked[j] != 0.0:  # on another side inside of the step: a shorter one is to be tried
-        return (0.9 / min(w.foreseen[j], 0.8)) ** task.pair_order + 0.0 * (defect + term)
-    for i in range(task.switching):
-        if _meets(task, w, i, w.g[i, j], j):
+    defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
+    if (
+        w.inside.looked[j] != 0.0
+    ):  # on another side inside of the step: a shorter one is to be tried
+        return (0.9 / min(w.inside.foreseen[j], 0.8)) ** task.pair.order + 0.0 * (defect + term)
+    for i in range(task.rows.switching):
+        if _meets(task, w, i, w.events.g[i, j], j):
             return term + 0.0 * defect
-    share = defect / (task.highest + 1.0)
+    share = defect / (task.taylor.highest + 1.0)
     return share if share <= term else defect + 0.0 * term
 
 
@@ -235,9 +318,9 @@ def _error(task, w, j):
 def _compare(task, lane, w, j):
     """Look whether something compared is on another side inside of a lane's step.
 
-    w.foreseen becomes the first part of the step at which it is, and w.looked where it is farthest
-    there, 0 if nothing is; below 0 if that is more than one comparison.  Before an event, if there
-    is one: it is located by itself.
+    ``foreseen`` becomes the first part of the step at which it is, and ``looked`` where it is
+    farthest there, 0 if nothing is; below 0 if that is more than one comparison.  Before an event,
+    if there is one: it is located by itself.
 
     What changes so fast that its polynomial says little asks for a shorter step as well.
 
@@ -245,46 +328,47 @@ def _compare(task, lane, w, j):
     together are less than the first.  A shorter step is not asked for without end: what begins so
     near to a kink that rounding cannot tell may go through it.
     """
-    w.looked[j], w.foreseen[j] = 0.0, 1.0
-    if not w.largest[2, j] > 0.0:
+    events, inside, taylor = w.events, w.inside, w.taylor
+    inside.looked[j], inside.foreseen[j] = 0.0, 1.0
+    if not taylor.largest[2, j] > 0.0:
         return
     if w.h[j] <= _shortest(task):
         return
-    until, p, n = 1.0, task.highest - 1, w.x.shape[0]
-    for i in range(task.switching):
-        before, now = w.e_start[i, j], w.g[i, j]
+    until, p, n = 1.0, task.taylor.highest - 1, w.x.shape[0]
+    for i in range(task.rows.switching):
+        before, now = events.g_start[i, j], events.g[i, j]
         if _meets(task, w, i, now, j):
             part = min(max(before / (before - now), 0.0), 1.0)
             until = min(until, lane.low / lane.step if lane.tries else part)
-    for i in range(task.switching):
-        if not _is_followed(p, w.h[j], w.terms, n + i, j):
-            w.looked[j], w.foreseen[j] = -1.0, 0.5
-        elif not w.e_start[i, j] * w.g[i, j] < 0.0:
-            side = w.e_start[i, j]
-            if i >= task.guarded and w.above[i - task.guarded, j] != 0:
+    for i in range(task.rows.switching):
+        if not _is_followed(p, w.h[j], taylor.terms, n + i, j):
+            inside.looked[j], inside.foreseen[j] = -1.0, 0.5
+        elif not events.g_start[i, j] * events.g[i, j] < 0.0:
+            side = events.g_start[i, j]
+            if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
                 side = 1.0
-            first, farthest = _crossing(p, w.h[j], w.terms, n + i, side, until, j)
+            first, farthest = _crossing(p, w.h[j], taylor.terms, n + i, side, until, j)
             if first < until:  # a step that ends there has an event
-                w.looked[j], w.foreseen[j] = -1.0, min(w.foreseen[j], farthest)
-    for i in range(task.sides.shape[0]):
-        first, farthest, row = 0.5, -1.0, task.sides[i, 0]
-        if _is_followed(p, w.h[j], w.terms, row, j):
-            side = w.terms[p, task.sides[i, 1], j]
-            first, farthest = _crossing(p, w.h[j], w.terms, row, side, until, j)
+                inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
+    for i in range(task.taylor.sides.shape[0]):
+        first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
+        if _is_followed(p, w.h[j], taylor.terms, row, j):
+            side = taylor.terms[p, task.taylor.sides[i, 1], j]
+            first, farthest = _crossing(p, w.h[j], taylor.terms, row, side, until, j)
         if first < until:
-            w.looked[j] = -1.0 if w.looked[j] != 0.0 else farthest
-            w.foreseen[j] = min(w.foreseen[j], first)
+            inside.looked[j] = -1.0 if inside.looked[j] != 0.0 else farthest
+            inside.foreseen[j] = min(inside.foreseen[j], first)
 
 
 @numba.njit(**INNER)
 def _ends_at_event(task, lane, w, j):
     """Whether a step may end right behind an event, so that it is accepted."""
-    for i in range(task.declared):
-        before, now = w.e_start[i, j], w.g[i, j]
-        if triggered(before, now, False, w.behind[i, j] != 0.0):
+    for i in range(task.rows.declared):
+        before, now = w.events.g_start[i, j], w.events.g[i, j]
+        if triggered(before, now, w.events.behind[i, j] != 0.0):
             low = 0.0
             if lane.tries:
-                low, before = lane.low / lane.step, w.e_low[i, j]
+                low, before = lane.low / lane.step, w.events.g_low[i, j]
             root = low + (1.0 - low) * before / (before - now)
             if not 1.0 - root > 0.8 * _BEFORE * behind_event(task.rtol):
                 return True
@@ -350,32 +434,35 @@ def _look_across(rhs, task, lanes, w):
     That is the case of a comparison whose result does not matter there, or not yet.  Where a step
     ends behind an event, look at the defect right before the event instead.
     """
-    dx, p = w.x_stage, task.highest
+    inside = w.inside
+    dx, p = w.x_stage, task.taylor.highest
     for j in range(lanes.size):
-        if w.looked[j] > 0.0:
-            w.t[j] = min(lanes[j].t + w.looked[j] * w.h[j], lanes[j].left)
-            interpolate(w.looked[j], w.h[j], p, w.terms, j, w.x_ahead)
+        if inside.looked[j] > 0.0:
+            w.t[j] = min(lanes[j].t + inside.looked[j] * w.h[j], lanes[j].left)
+            interpolate(inside.looked[j], w.h[j], p, w.taylor.terms, j, w.ahead.x)
         else:  # anything finite
             w.t[j] = lanes[j].t
             for i in range(w.x.shape[0]):
-                w.x_ahead[i, j] = w.x[i, j]
+                w.ahead.x[i, j] = w.x[i, j]
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_rhs(rhs, w.t, w.x_ahead, w.u, task.p, dx, w.g_ahead)
+    call_rhs(rhs, w.t, w.ahead.x, w.u, task.p, dx, w.ahead.g, w.ahead.m)
     for j in range(lanes.size):
-        limit = p + 1.0 if w.wanted[j] else 1.0
-        if w.looked[j] > 0.0 and _defect(task, w, dx, j) <= limit:
-            w.looked[j] = 0.0
+        limit = p + 1.0 if inside.wanted[j] else 1.0
+        if inside.looked[j] > 0.0 and _defect(task, w, dx, j) <= limit:
+            inside.looked[j] = 0.0
 
 
 @numba.njit(**INNER)
 def _defect(task, w, dx, j):
-    """Return a lane's defect times the step over the tolerance, with dx at the part w.looked."""
+    """Return a lane's defect times the step over the tolerance, with dx at what is looked at."""
     largest = 0.0
     for i in range(w.x.shape[0]):
-        slope = _value_and_slope(task.highest, w.looked[j] * w.h[j], w.terms, i, j)[1]
+        slope = _value_and_slope(
+            task.taylor.highest, w.inside.looked[j] * w.h[j], w.taylor.terms, i, j
+        )[1]
         defect = abs(w.h[j] * (dx[i, j] - slope))
-        part = defect / (task.atol + task.rtol * abs(w.x_ahead[i, j]))
+        part = defect / (task.atol + task.rtol * abs(w.ahead.x[i, j]))
         largest = part if part > largest or part != part else largest
     return largest
 

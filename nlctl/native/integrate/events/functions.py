@@ -1,0 +1,111 @@
+"""Event functions: whose rows are whose, and their values at the ends of a step and in between."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3, arrays_of
+from ..state import INNER
+
+
+class Rows(NamedTuple):
+    """Whose rows of g are whose, from the first."""
+
+    bending: int  # number of switching functions that blocks declare
+    declared: int  # and with those of conditions at which nothing jumps, which follow
+    guarded: int  # and with those of other conditions
+    switching: int  # and with the guards
+    watched: int  # the first of those that the run watches, behind the other conditions
+    ways: Places1  # which of their changes count: 1 rising, -1 falling, 0 both
+    ending: Places1  # and whether the run ends there
+    memory: Places1  # indices of memory states
+    table: Places2
+
+
+class Events(NamedTuple):
+    """Values of switching functions: (rows, lanes), or (parts, rows, lanes)."""
+
+    g: Reals2  # at the end of the step being tried
+    g_start: Reals2
+    g_inside: Reals3  # see `excursions`; the last is scratch
+    g_before: Reals2  # at the end of a step that ended before a condition, see `crossing`
+    g_low: Reals2  # at the ends of the bracket in which an event is located
+    g_high: Reals2
+    behind: Reals2  # 1 where the step before ended with this event; of a condition that is
+    # exactly 0 the side that it has come from
+    table: Places2
+
+
+class Memories(NamedTuple):
+    """What memories would become, and how fast that changes: the rates are event functions."""
+
+    m: Reals2  # (memories, lanes), at the end of the step being tried
+    m_start: Reals2
+    m_inside: Reals3  # (parts, memories, lanes), as of switching functions
+    slope: Reals2  # rates of m (1/s)
+    slope_start: Reals2
+    rate: Reals2  # the same over a small part of a step, exactly 0 where a memory stands still
+    rate_start: Reals2
+    rate_low: Reals2  # at the ends of the bracket in which an event is located
+    rate_high: Reals2
+    table: Places2
+
+
+class Inside(NamedTuple):
+    """What is looked at inside of the step being tried, one number for each lane or more."""
+
+    values: Reals1  # of one event function over a step
+    newton: Reals1
+    wanted: Places1  # whether a step is to be looked into
+    resolved: Reals1  # the longest step over which event functions can be followed
+    sought: Places1  # the event function whose minimum is sought, -1 if none is
+    carried: Places1  # whether that is a memory's
+    attempts: Places1
+    part: Reals1  # of the step: where it is evaluated
+    looked: Reals1  # what it is there
+    foreseen: Reals1  # and was foreseen to be
+    wrong: Reals1  # what the polynomial may be wrong by
+    narrow: Reals1  # part of the step below which it is not sought closer
+    floor: Reals1  # below 0: what is not told from it
+    bracket: Reals2  # parts below, at and above the least value that is known
+    height: Reals2  # and the values there
+    table: Places2
+
+
+def new_events(rows: int, lanes: int) -> Events:
+    """Return the arrays for so many rows of g."""
+    every = dict.fromkeys(Events._fields[:-1], (rows, lanes))
+    return arrays_of(Events, **every | {"g_inside": (4, rows, lanes)})
+
+
+def new_memories(count: int, lanes: int) -> Memories:
+    """Return the arrays for so many memories."""
+    every = dict.fromkeys(Memories._fields[:-1], (count, lanes))
+    return arrays_of(Memories, **every | {"m_inside": (4, count, lanes)})
+
+
+def new_inside(lanes: int) -> Inside:
+    """Return the arrays for looks at the inside of steps."""
+    every = dict.fromkeys(Inside._fields[:-1], (lanes,))
+    several = dict.fromkeys(("bracket", "height"), (3, lanes))
+    return arrays_of(Inside, **every | dict.fromkeys(("values", "newton"), (5,)) | several)
+
+
+@numba.njit(**INNER)
+def has_events(w):
+    """Whether there are event functions: switching functions, or rates of memories."""
+    return w.events.g.shape[0] > 0 or w.memories.m.shape[0] > 0
+
+
+@numba.njit(**INNER)
+def begins(w, j):
+    """Make what event functions are at the end of a lane's step those of the next one's start."""
+    events, memories = w.events, w.memories
+    for i in range(events.g.shape[0]):
+        events.g_start[i, j] = events.g[i, j]
+    for i in range(memories.m.shape[0]):
+        memories.m_start[i, j] = memories.m[i, j]
+        memories.slope_start[i, j] = memories.slope[i, j]
+        memories.rate_start[i, j] = memories.rate[i, j]
