@@ -110,7 +110,7 @@ from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, TriggeredHold, discretise, sampled
-from .sensitivities import NoDerivative, SensitivityResponse, sensitivity_response
+from .sensitivities import Fit, NoDerivative, SensitivityResponse, fit, sensitivity_response
 from .sliding import IdealRelay
 
 __all__ = [
@@ -154,6 +154,7 @@ __all__ = [
     "FilteredError",
     "FilteredLaw",
     "FilteredStep",
+    "Fit",
     "FixedGainLaw",
     "ForcedDuffing",
     "FunctionReference",
@@ -223,6 +224,7 @@ __all__ = [
     "ensemble_response",
     "equation",
     "faults",
+    "fit",
     "functions",
     "grid_centres",
     "initial_state",

@@ -3,10 +3,11 @@
 `names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
 its equations in parts, `branches`, `kinks` and `sides` are about jumps, `saltation` about what
 becomes of derivatives there, `program` puts all of that together, `run` integrates it, and
-`missing` says where there is no derivative.
+`missing` says where there is no derivative.  `fit` finds parameters from data with them.
 """
 
+from .fitting import Fit, fit
 from .record import NoDerivative, SensitivityResponse
 from .response import sensitivity_response
 
-__all__ = ["NoDerivative", "SensitivityResponse", "sensitivity_response"]
+__all__ = ["Fit", "NoDerivative", "SensitivityResponse", "fit", "sensitivity_response"]
