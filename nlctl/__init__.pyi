@@ -110,7 +110,15 @@ from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, TriggeredHold, discretise, sampled
-from .sensitivities import Fit, NoDerivative, SensitivityResponse, fit, sensitivity_response
+from .sensitivities import (
+    Fit,
+    MetricGradient,
+    NoDerivative,
+    SensitivityResponse,
+    fit,
+    metric_gradient,
+    sensitivity_response,
+)
 from .sliding import IdealRelay
 
 __all__ = [
@@ -171,6 +179,7 @@ __all__ = [
     "LeakyNussbaumLaw",
     "LinearRegressor",
     "LuGre",
+    "MetricGradient",
     "ModelError",
     "ModelReferenceLaw",
     "MonotoneNussbaumLaw",
@@ -233,6 +242,7 @@ __all__ = [
     "l1_adaptive",
     "latin_hypercube_centres",
     "linearize",
+    "metric_gradient",
     "mrac",
     "native",
     "paper",
