@@ -20,7 +20,7 @@ from .record import NoDerivative
 __all__ = ["missing"]
 
 _TOGETHER = "two things happen at one instant, and each alone at another if it is moved"
-_GRAZING = "it is met at a rate of 0 (grazing), and may not be met if it is moved"
+_GRAZING = "a condition is met at a rate of 0 (grazing), and may not be met if it is moved"
 _RETURNS = "a jump at a time that moves comes back through a delay"
 _ENDLESS = "switches follow each other without end"
 _START = "the run starts on a condition, and on either side of it if it is moved"
@@ -127,7 +127,7 @@ class _Run:
         conditions, happened = self.compiled.equations.conditions, self.found.happened
         labels = row_labels(self.compiled, conditions)
         first = self.compiled.program.switching + conditions.rows
-        own = 1 if self.made.sides.source.carried else 0
+        own = len(self.made.saltation.turning) + bool(self.made.sides.source.carried)
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + own:

@@ -198,6 +198,9 @@ class _Maker:
             jumping += [(owner + 1, m, m + 1) for m in turning]
             jumping.append((owner + 1, first, first + len(before.memory)))
             guards.insert(0, owner + 1)  # what else jumps then says more
+        if self.saltation.turning:
+            jumping.append((owner + 2, places.grazing, places.grazing + 1))
+            guards[:0] = [owner + 2] * len(self.saltation.turning)
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
         made = replace(
             before,
@@ -269,7 +272,8 @@ class _Maker:
         first = source.program.switching + source.found.conditions.rows
         found = [(row, array) for row, array in source.found.results["g"] if row < first]
         found = [(row, array) for row, array in found if array.size]
-        rows = [self.sides.carried] if source.carried else []
+        rows = [apart for apart, _ in self.saltation.turning]
+        rows += [self.sides.carried] if source.carried else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
         return [*found, *self._rows(first, [(e, 1) for e in rows])]
@@ -289,6 +293,8 @@ class _Maker:
         if turned:
             pieces += [(e, 1) for e in turned.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
+        if self.saltation.turning:
+            pieces.append((self.saltation.at_touch(), 1))
         return self._rows(0, pieces)
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:

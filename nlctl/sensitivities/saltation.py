@@ -15,11 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ..expressions.graph import Expr, Graph
+from ..native.sliding.pieces import replaced_parts
 from .directions import Direction, SomeRows, Taken, rows_replaced, taken
 from .places import StatePlaces
-from .sides import KeptSides
+from .sides import KeptSide, KeptSides
 from .source import EquationParts
 
 __all__ = ["Saltation"]
@@ -27,6 +29,7 @@ __all__ = ["Saltation"]
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _FAR = 1e300
+_STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +145,46 @@ class Saltation:
         found.append((graph.leaf("t", 0, None), 1))
         found.append((self._first(places.at_reset, together), 1))
         return found
+
+    @cached_property
+    def turning(self) -> list[tuple[Expr, Expr]]:
+        """What falls through 0 where a level turns away from 0, and whether it has touched it.
+
+        That is where d(level^2) / dt rises through 0: at conditions that are met, and where one is
+        nearly met.  With memories that switch, what is at rest has levels that are noise, and
+        nothing is looked for.
+        """
+        graph, found = self.source.graph, []
+        for side in () if self.source.switched else self.sides.sides:
+            for k in range(0 if side.timed else side.rows):
+                level, extent = (graph.item(e, k) for e in (side.here.level, side.here.extent))
+                yes = self._jumps_at(side)
+                rate, cause = self._met(yes, level, extent, self.source.flow)
+                if rate is None:
+                    continue
+                noise = self._noise(extent)
+                still = graph.op("mul", graph.const(_STILL), graph.op("mul", noise, noise))
+                apart = graph.op("sub", still, graph.op("mul", level, rate))
+                near = graph.op("le", graph.op("absolute", level), noise)
+                touched = graph.op("and", near, cause.grazes)
+                found.append((apart, graph.op("and", touched, cause.met)))
+        return found
+
+    def _jumps_at(self, side: KeptSide) -> Expr:
+        """Return whether the flow would be another on the other side of a comparison."""
+        graph, node = self.source.graph, side.node
+        if node is None or node.kind != "b":
+            return graph.const(True)
+        flow = self.source.flow
+        exprs = replaced_parts(graph, [e for e, _ in flow], {node: graph.op("not", node)})
+        return self._differ([(e, piece) for e, piece in zip(exprs, flow, strict=True)])
+
+    def at_touch(self) -> Expr:
+        """Return when a condition was first touched, where a level has turned."""
+        graph, touched = self.source.graph, self.source.graph.const(False)
+        for _, each in self.turning:
+            touched = graph.op("or", touched, each)
+        return self._first(self.places.grazing, touched)
 
     def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
         """Return the derivative of an expression in a direction.
@@ -321,8 +364,7 @@ class Saltation:
         if rate is None:
             return None, Cause(met=met, moves=[], grazes=graph.const(False))
         (bend,) = self.source.slopes([rate], source.time(flow, known=False))
-        size = [graph.leaf("p", source.extended.slot(n).offset, None) for n in ("rtol", "atol")]
-        noise = graph.op("add", graph.op("mul", size[0], extent), size[1])
+        noise = self._noise(extent)
         bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
         least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
         grazes = graph.op("le", graph.op("mul", rate, rate), least)
@@ -332,6 +374,12 @@ class Saltation:
             zero = graph.const(0.0)
             moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
         return rate, Cause(met=met, moves=moves, grazes=grazes)
+
+    def _noise(self, extent: Expr) -> Expr:
+        """Return how well a number of some size is known."""
+        graph, slot = self.source.graph, self.source.extended.slot
+        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
+        return graph.op("add", graph.op("mul", rtol, extent), atol)
 
     def _of_causes(self, causes: Sequence[Cause]) -> When:
         """Return how the time moves, by the first condition that was met at a rate.

@@ -18,6 +18,9 @@ from ..native.parameters import Slot, length
 __all__ = ["Extended", "extended", "stand_in"]
 
 
+_OWNERS = 3  # blocks of the derivatives' own: see `Extended.owner`
+
+
 class ScheduleWithRates(Schedule):
     """A schedule whose runs give the rates of all inputs, too."""
 
@@ -37,7 +40,8 @@ class Extended:
     layout : mapping
         StatePlaces of all parameters, behind those of the diagram.
     owner : int
-        The block that conditions belong to; memories that turn belong to the next.
+        The block that conditions belong to; memories that turn belong to the next, and what
+        turns before a condition to the one behind.
     lines : int
         Number of delayed signals.
     """
@@ -91,7 +95,7 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
         inputs=(), direct=np.zeros((0, 0), dtype=bool),
     )  # fmt: skip
-    nodes = (*read.nodes, *delays, nothing, nothing)
+    nodes = (*read.nodes, *delays, *(nothing,) * _OWNERS)
     given = {f.name: getattr(read, f.name) for f in fields(Schedule)}
     given |= {
         "system": stand_in(read.system, read.system.nstates or 0, len(outputs)),
@@ -104,7 +108,7 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     }
     return Extended(
         schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
-        owner=len(nodes) - 2, lines=len(read.lines),
+        owner=len(nodes) - _OWNERS, lines=len(read.lines),
     )  # fmt: skip
 
 
@@ -135,9 +139,9 @@ def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slo
         "atol": Slot(name="atol", offset=at + by + 1, shape=(), kind="f"),
         "late": Slot(name="late", offset=at + by + 2, shape=(), kind="f"),
     }
-    found[own + delays + 1] = {}
+    found |= {own + delays + k: {} for k in range(1, _OWNERS)}
     for k in range(len(compiled.schedule.samplings)):
-        found[own + delays + 2 + k] = dict(before[own + k])
+        found[own + delays + _OWNERS + k] = dict(before[own + k])
     return found
 
 

@@ -29,12 +29,15 @@ class KeptSide:
         By what everything was on the sides that are kept.
     timed : bool
         Whether it is of t alone.
+    node : Expr or None
+        The operation in the equations.
     """
 
     kept: Expr
     here: Branch
     before: Branch
     timed: bool
+    node: Expr | None = None
 
     @property
     def rows(self) -> int:
@@ -149,8 +152,10 @@ def sides_of(source: EquationParts, first: int) -> KeptSides:
         leaves = source.leaves(args, memories)
         earlier = replaced_parts(graph, list(args), {**leaves, **before})
         there = branch_of(graph, op, earlier, kept)
-        found.append(KeptSide(kept=kept, here=branch_of(graph, op, args, kept), before=there,
-                          timed=all(a in timed or not a.varies for a in args)))  # fmt: skip
+        found.append(KeptSide(
+            kept=kept, here=branch_of(graph, op, args, kept), before=there, node=node,
+            timed=all(a in timed or not a.varies for a in args),
+        ))  # fmt: skip
         if node is not None:
             before[node] = there.value
     return KeptSides(source=source, sides=tuple(found), memories=memories, before=before)

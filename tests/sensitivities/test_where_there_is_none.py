@@ -59,6 +59,36 @@ def test_grazing():
     assert nothing_from(made, lack.time)
 
 
+@pytest.mark.parametrize("beyond", [0.0, 1e-12, -1e-12, 1e-9])
+def test_touching(beyond):
+    """sin t touches 1 at pi / 2, and z' = (x > p) is 0 or more behind, by the least change of p."""
+    plant = block(
+        lambda t, x, u, p: [x[1], -x[0], np.where(x[0] > p["p"], 1.0, 0.0)], {"p": 1 + beyond},
+        ("x", "y", "z"),
+    )  # fmt: skip
+    made = nlctl.sensitivity_response(
+        plant, [0, 1, 2], 0, [0.0, 1.0, 0.0], of=["z"], with_respect_to=["plant.p"]
+    )
+    (lack,) = made.missing
+    assert abs(lack.time - np.pi / 2) < 1e-4
+    assert "grazing" in lack.why
+    assert nothing_from(made, lack.time)
+
+
+def test_nearly_touching():
+    """1e-3 away it does not, and a kink that is touched has a derivative."""
+    for law in (
+        lambda t, x, u, p: [x[1], -x[0], np.where(x[0] > 1.001 + p["p"], 1.0, 0.0)],
+        lambda t, x, u, p: [x[1], -x[0], np.where(x[0] > 1 + p["p"], x[0] - 1 - p["p"], 0.0)],
+    ):
+        made = nlctl.sensitivity_response(
+            block(law, {"p": 0.0}, ("x", "y", "z")), [0, 1, 2], 0, [0.0, 1.0, 0.0], of=["z"],
+            with_respect_to=["plant.p"],
+        )  # fmt: skip
+        assert made.success
+        assert np.allclose(made["z", "plant.p"], 0, atol=1e-6)
+
+
 def test_start_on_a_condition():
     """At p = x(0) the run is on one side or the other."""
     made = nlctl.sensitivity_response(
