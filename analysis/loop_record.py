@@ -1,6 +1,6 @@
 """What a diagram computes, as data that can be kept and compared: another loop has another record.
 
-Each block is told by a key of its functions and of all that these reach (`nlctl.native.codegen.
+Each block is told by a key of its functions and of all that these reach (`nlctl.native.machine.
 fingerprint`), connections and values stand beside.  Independently of any code that is read,
 python-control's own rates and outputs are evaluated at a few points: they tell a loop from another
 one where a key cannot, such as a function of another language.

@@ -3,12 +3,12 @@
 ::
 
     made = loop_report(loop, title="Pendulum", response=response, author="N. N.", revision="B")
-    page = write_report(made, "reports/pendulum")             # of analysis.report
+    page = write_report(made, "reports/pendulum")             # of nlctl.analysis.report
     write_pdf(page, "reports/pendulum.pdf")
 
 What is of another loop is refused: a response whose samples are not the loop's outputs or whose
-states do not follow from its equations (`analysis.response_of_loop` says how closely), a study, a
-ledger or a certificate whose record is of other equations, parameters or wires.
+states do not follow from its equations (`nlctl.analysis.response_of_loop` says how closely), a
+study, a ledger or a certificate whose record is of other equations, parameters or wires.
 """
 
 from __future__ import annotations
@@ -97,13 +97,13 @@ def loop_report(
     params : mapping, optional
         The parameters that the run was made with; by default what the response says.
     ledger : Ledger, optional
-        Of `analysis.lyapunov.ledger`.
+        Of `nlctl.analysis.lyapunov.ledger`.
     certificate : Certificate, ModelReferenceCertificate or SlidingModeCertificate, optional
-        Of `analysis.lyapunov.certify`.
+        Of `nlctl.analysis.lyapunov.certify`.
     study : Result, optional
-        Of `analysis.studies.run` or `analysis.studies.load_result`.
+        Of `nlctl.analysis.studies.run` or `nlctl.analysis.studies.load_result`.
     sections : sequence of Section, optional
-        One's own, of `analysis.report`; they stand behind the run.
+        One's own, of `nlctl.analysis.report`; they stand behind the run.
     claims : sequence of Claim, optional
         One's own; those of the study follow.
     question, verdict : str, optional
@@ -118,7 +118,7 @@ def loop_report(
     Returns
     -------
     Report
-        For `analysis.report.write_report`, and `analysis.report.framed` in a notebook.
+        For `nlctl.analysis.report.write_report`, and `nlctl.analysis.report.framed` in a notebook.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def loop_report(
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.loop_report import loop_report
+    >>> from nlctl.analysis.loop_report import loop_report
     >>> loop = nlctl.actuators.cascade({"zone": nlctl.DeadZone(), "lag": nlctl.Lag()})
     >>> run = nlctl.input_output_response(loop, np.linspace(0, 1, 101), 1.0)
     >>> report = loop_report(loop, title="A lag behind a dead zone", response=run)

@@ -18,8 +18,8 @@ from rich.table import Table
 from tables import machine
 
 import nlctl
-from analysis.paper.controllers import part_of
 from nlctl import paper
+from nlctl.analysis.paper.controllers import part_of
 
 DT, END, ROUNDS = 1e-3, 20.0, 25
 

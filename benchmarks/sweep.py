@@ -25,8 +25,8 @@ import numpy as np
 from rich.console import Console
 
 import nlctl
-from analysis.cli.sweep_progress import sweep_bar
-from analysis.robustness import (
+from nlctl.analysis.cli.sweep_progress import sweep_bar
+from nlctl.analysis.robustness import (
     Design,
     Experiment,
     Prepared,
@@ -42,7 +42,7 @@ from analysis.robustness import (
     rows,
     tracking_metrics,
 )
-from analysis.robustness.runs.sweep import sweep
+from nlctl.analysis.robustness.runs.sweep import sweep
 
 BOX = {
     "actuator.b_r": (0.3, 0.7),

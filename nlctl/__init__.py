@@ -7,5 +7,8 @@ instant.  ``__init__.pyi`` lists them for readers, editors and type checkers ali
 import lazy_loader
 
 from ._version import __version__ as __version__
+from .host.checkout import find_analysis as _find_analysis
+
+_find_analysis()
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -26,11 +26,11 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import DivergedError, ParameterError, UsageError
+from .host.checkout import SOURCES
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _MANY = (collections.abc.Sequence, collections.abc.Collection, collections.abc.Iterable,
          collections.abc.Set, list, set, frozenset)  # fmt: skip
-_ROOM = Path(__file__).parents[1]  # where this project's packages are
 _SHOWN = 60  # characters of a value
 _LARGEST = 2**63  # of integers that libraries take
 
@@ -112,7 +112,7 @@ def _says_it(error: Exception) -> bool:
     if getattr(error, "filename", None):
         return True
     last = traceback.extract_tb(error.__traceback__)[-1]
-    ours = any(last.filename.startswith(str(_ROOM / name)) for name in ("nlctl", "analysis"))
+    ours = any(Path(last.filename).is_relative_to(folder) for folder in SOURCES)
     return ours and (last.line or "").startswith("raise ")
 
 

@@ -20,7 +20,7 @@ from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
-from .responses.watched import check_moves, watched_functions
+from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
 
@@ -117,9 +117,9 @@ def input_output_response(
     method : str or Tableau, optional
         Method of `scipy.integrate.solve_ivp` in python-control, "LSODA" by default.  Machine code
         has "tsit5", an explicit Runge-Kutta pair of orders 5(4), "rodas5p", a stiff method of
-        orders 5(4), "auto", the default, which takes whichever is faster at each time, "taylor",
-        Taylor's method for equations without memories that can be written as expressions, and
-        takes an explicit pair of your own as a `nlctl.native.Tableau`.
+        orders 5(4), "taylor", Taylor's method for equations without memories that can be written
+        as expressions, "auto", the default, which takes whichever of these gets further with the
+        same work, and an explicit pair of your own as a `nlctl.native.Tableau`.
     rtol, atol : float, optional
         Tolerances of the integrator.
     evaluation_times : array_like of shape (k,), optional
@@ -270,11 +270,11 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 
-def _known(system: Any, params: Any, times: Any) -> Known:
+def _known(system: Any, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
     """Return what is known of the conditions of a diagram that python-control is to run."""
     from .native.known import known_conditions  # late: needs numba
 
-    return known_conditions(system, params, times)
+    return known_conditions(system, params, times, watched)
 
 
 def _is_sampled(system: Any) -> bool:
@@ -304,9 +304,9 @@ def _asks_for_scipy(run: RunArguments) -> bool:
 def _native(run: RunArguments) -> ct.TimeResponseData:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
+    from .native.diagram.checks import sized
     from .native.response import respond
     from .native.settings import solver_settings
-    from .native.thirdparty.checks import sized
 
     settings = solver_settings(**run.solver)
     compiled = run.system

@@ -17,7 +17,7 @@ from nlctl.names import find_name
 from nlctl.response import input_output_response
 
 if TYPE_CHECKING:
-    from analysis.lyapunov.ledger import Ledger, Line
+    from ..lyapunov.ledger import Ledger, Line
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
 _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
@@ -87,7 +87,7 @@ def interpreted_runs(
     ParameterError, UnknownNameError
         If a value or a name is refused.
     """
-    from analysis.lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of  # takes a second
+    from ..lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of  # takes a second
 
     return [
         input_output_response(

@@ -10,11 +10,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from analysis.catalogue import block_summaries, named_block
 from nlctl.errors import ParameterError
 
+from ..catalogue import block_summaries, named_block
+
 if TYPE_CHECKING:
-    from analysis.studies.kind import Kind
+    from ..studies.kind import Kind
 
 __all__ = ["show", "show_all"]
 
@@ -50,13 +51,13 @@ def show(name: str) -> None:
         If there is no such thing, or it is neither a block record nor a kind.
     """
     if ":" in name:
-        from analysis.studies.file.resolve import named
+        from ..studies.file.resolve import named
 
         return _show(name, named(name, Path.cwd()))
     blocks = [block for group in block_summaries().values() for block in group]
     if name in blocks:
         return _show_block(name, named_block(name))
-    from analysis.studies.kinds import KINDS as STUDIED  # takes a second
+    from ..studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}
     if name == _KINDS:
@@ -71,7 +72,7 @@ def show(name: str) -> None:
 
 def _show(name: str, thing: Any) -> None:
     """Print one block or one kind."""
-    from analysis.studies.kind import Kind
+    from ..studies.kind import Kind
 
     if isinstance(thing, Kind):
         _show_kind(name, thing)

@@ -103,7 +103,7 @@ def simulate(
         _write_csv(csv, times, signals)
         print(csv)
     if plot is not None:
-        from analysis.paper.figures import overview
+        from ..paper.figures import overview
 
         write_figure(plot, overview(times, signals))
         print(plot)
@@ -151,11 +151,11 @@ def check(
     """
     from rich.console import Console
 
-    from analysis.lyapunov.ledger import ledger
     from nlctl.arguments import one_of
     from nlctl.errors import ParameterError
     from nlctl.response import ENGINES
 
+    from ..lyapunov.ledger import ledger
     from .check import (
         interpreted_runs,
         ledger_summary,

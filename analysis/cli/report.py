@@ -104,9 +104,8 @@ def _paper(
     with _other_process() as beside:
         beside.submit(_import_ahead)  # first of all: imports there and here take seconds
         check_report_options(out, pdf=pdf, force=force)
-        from analysis.paper.report import clear, compose
-        from analysis.report.render import write_report
-
+        from ..paper.report import clear, compose
+        from ..report.render import write_report
         from .study_report import tell
         from .terminal import progress_bar
 
@@ -123,7 +122,7 @@ def _paper(
 
 
 def _import_ahead() -> None:
-    import_module("analysis.paper.report")
+    import_module("nlctl.analysis.paper.report")
 
 
 @contextmanager
@@ -208,15 +207,14 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
         If `out` cannot be written to or holds files that no report has made, or a PDF is wanted
         and no browser is installed.
     """
-    from analysis.report.page import check_report_folder
-
+    from ..report.page import check_report_folder
     from .terminal import check_writable
 
     check_writable(out)
     if not force:
         check_report_folder(out)
     if pdf:
-        from analysis.report.browser import find_browser
+        from ..report.browser import find_browser
 
         find_browser()
 
@@ -229,8 +227,8 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     UsageError
         If the PDF cannot be made; the page exists all the same.
     """
-    from analysis.report.browser import open_page, write_pdf
-    from analysis.studies.whole.page import recorded_print
+    from ..report.browser import open_page, write_pdf
+    from ..studies.whole.page import recorded_print
 
     say(page)
     if pdf:
@@ -251,9 +249,9 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
     UsageError, OSError
         If a file is not a report, or cannot be read.
     """
-    from analysis.report.compare import compare_contents
-    from analysis.studies import origin_differences, run_differences
-    from analysis.studies.differences import long_table_differences
+    from ..report.compare import compare_contents
+    from ..studies import origin_differences, run_differences
+    from ..studies.differences import long_table_differences
 
     paths = (first, second)
     for path in paths:
@@ -291,8 +289,8 @@ def _check_run(path: Path) -> None:
     UsageError
         With what is wrong; nothing is raised for a report that is in no run's folder.
     """
-    from analysis.studies import load_result
-    from analysis.studies.whole.page import check_page, is_run
+    from ..studies import load_result
+    from ..studies.whole.page import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()
@@ -326,10 +324,9 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     UsageError
         If there is no report, or the folder cannot be written to, or its page is not a gallery.
     """
-    from analysis.report.browser import open_page
-    from analysis.report.gallery import write_gallery
-    from analysis.studies.whole.page import check_page
-
+    from ..report.browser import open_page
+    from ..report.gallery import write_gallery
+    from ..studies.whole.page import check_page
     from .terminal import check_writable
 
     check_writable(folder)

@@ -1,4 +1,5 @@
-"""The commands about study files.  Like `analysis.cli.main` it only reads arguments and prints.
+"""The commands about study files.  Like `nlctl.analysis.cli.main` it only reads arguments and
+prints.
 
 Exit codes: 0 all claims are shown, 1 a claim is refuted, 2 usage or an invalid study, 3 an
 internal error or one of the user's own functions, 4 incomplete and resumable, 5 no claim is
@@ -90,9 +91,8 @@ def run_command(
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
         check_memory(TO_BEGIN)
-        from analysis.studies import read_study
-        from analysis.studies import run as run_study
-
+        from ..studies import read_study
+        from ..studies import run as run_study
         from .sweep_progress import sweep_bar
 
         check_memory()
@@ -128,7 +128,7 @@ def validate(
     """
     with exit_codes(json):
         check_memory(TO_BEGIN)
-        from analysis.studies import plan, read_study
+        from ..studies import plan, read_study
 
         check_memory()
         check_study_path(study)
@@ -163,9 +163,8 @@ def replay_command(
     """
     with exit_codes(json):
         check_memory(TO_BEGIN)
-        from analysis.studies import replay as replay_row
-        from analysis.studies import replay_figure
-
+        from ..studies import replay as replay_row
+        from ..studies import replay_figure
         from .terminal import check_figure, write_figure
 
         if plot is not None:
@@ -193,7 +192,7 @@ def verify_command(
     much, 2 it is not the folder of a run that has come to an end.
     """
     with exit_codes(json):
-        from analysis.studies import verify
+        from ..studies import verify
 
         check_run_path(folder)
         found = verify(folder)
@@ -217,7 +216,7 @@ def asking(action: Callable[[bool], T], trust: bool) -> T:
     StudyError
         If nobody is there, or the answer is no.
     """
-    from analysis.studies import StudyError
+    from ..studies import StudyError
 
     try:
         return action(trust)
@@ -233,7 +232,7 @@ def asking(action: Callable[[bool], T], trust: bool) -> T:
 
 def schema() -> None:
     """Print the JSON schema of study files, for editors."""
-    from analysis.studies.file.own_kinds import model_of
+    from ..studies.file.own_kinds import model_of
 
     print(in_json(model_of({}).model_json_schema()))
 
@@ -246,8 +245,9 @@ def check_study_path(study: Path) -> None:
     UsageError
         With what the folder is good for.
     """
-    from analysis.studies.whole.page import is_run
     from nlctl.errors import UsageError
+
+    from ..studies.whole.page import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))

@@ -13,8 +13,8 @@ from .printing import error_line
 from .studies import run_folder
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Result
-    from analysis.studies.run import Watch
+    from ..studies.result import Result
+    from ..studies.run import Watch
 
 __all__ = ["report_study", "tell"]
 
@@ -39,13 +39,13 @@ def report_study(
         Folder of the report; by default that of the run.
     threads : int, optional
     watch : callable, optional
-        Shows how far the rows are, see `analysis.studies.run.Watch`.
+        Shows how far the rows are, see `nlctl.analysis.studies.run.Watch`.
     interactive : bool, optional
-        As in `analysis.report.render_html`.
+        As in `nlctl.analysis.report.render_html`.
     force : bool, optional
-        Whether files of others are replaced, see `analysis.report.write_report`.
+        Whether files of others are replaced, see `nlctl.analysis.report.write_report`.
     trust : bool, optional
-        As in `analysis.studies.read_study`.
+        As in `nlctl.analysis.studies.read_study`.
 
     Returns
     -------
@@ -57,13 +57,13 @@ def report_study(
     UsageError
         If the study has mistakes, or the folder holds no run, or another one.
     """
-    from analysis.paper.page.text import PUBLISHED
-    from analysis.report.render import write_report
-    from analysis.studies import load_result
-    from analysis.studies.page.loop import loop_of
-    from analysis.studies.page.redrawn import loop_again, rows_again
-    from analysis.studies.page.report import study_report
-    from analysis.studies.whole.page import recorded_page
+    from ..paper.page.text import PUBLISHED
+    from ..report.render import write_report
+    from ..studies import load_result
+    from ..studies.page.loop import loop_of
+    from ..studies.page.redrawn import loop_again, rows_again
+    from ..studies.page.report import study_report
+    from ..studies.whole.page import recorded_page
 
     result = (
         _run(path, threads, watch, force, trust)
@@ -89,7 +89,7 @@ def _is_in_run(page: Path, result: Result) -> bool:
 
 
 def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:
-    from analysis.studies import read_study, run
+    from ..studies import read_study, run
 
     how: dict[str, Any] = {} if watch is None else {"watch": watch}
     folder = run_folder(path)

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from nlctl.wording import counted
 
 if TYPE_CHECKING:
-    from analysis.robustness.runs.progress import Progress as SweepProgress
+    from ..robustness.runs.progress import Progress as SweepProgress
 
 PERIOD = 0.25  # s between updates: drawing a bar takes as long as a run
 
@@ -30,7 +30,7 @@ def sweep_bar(
     Yields
     ------
     callable
-        What `analysis.robustness.runs.sweep` takes as ``progress``.
+        What `nlctl.analysis.robustness.runs.sweep` takes as ``progress``.
     """
     console = console or Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))

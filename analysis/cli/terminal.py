@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 
 from nlctl.errors import ParameterError
+from nlctl.host.checkout import SOURCES
 from nlctl.host.files import replace_file
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def write_figure(path: Path, figure: Any) -> None:
 
 def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
     """Print peak, last half's peak and RMS, and final value of every signal."""
-    from analysis.metrics import final, over, peak, rms
+    from ..metrics import final, over, peak, rms
 
     half = times[-1] / 2
     table = Table("signal", "max |.|", f"max |.|, t ≥ {half:g} s", f"RMS, t ≥ {half:g} s", "at end")
@@ -126,8 +127,7 @@ def _is_users(path: Path) -> bool:
     """Whether a file is neither nlctl's, nor of an installed package or Python's own."""
     if not path.is_file() or {"site-packages", "dist-packages"} & set(path.parts):
         return False
-    analysis = Path(__file__).resolve().parents[1]
     installed = {Path(part) for key, part in sysconfig.get_paths().items() if "lib" in key}
-    roots = [analysis, analysis.parent / "nlctl", *installed]
+    roots = [*SOURCES, *installed]
     places = {path, path.resolve()}
     return not any(place.is_relative_to(root) for place in places for root in roots)

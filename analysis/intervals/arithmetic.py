@@ -59,7 +59,7 @@ class Ball(NumPyFunctions):
     An equation takes it in the place of a number, and its derivative comes along:
 
     >>> from flint import arb
-    >>> from analysis.intervals.arithmetic import Ball
+    >>> from nlctl.analysis.intervals.arithmetic import Ball
     >>> x = Ball(arb(3.0), (arb(1.0),))
     >>> y = x * x + 1
     >>> float(y.value), float(y.gradient[0])
@@ -290,7 +290,7 @@ class Ball(NumPyFunctions):
         Parameters
         ----------
         name : str
-            A function of `analysis.intervals.pairs`.
+            A function of `nlctl.analysis.intervals.pairs`.
         other : Ball or float
             The second argument.
 
@@ -392,7 +392,7 @@ def power(x: arb, n: int) -> arb:
     Examples
     --------
     >>> from flint import arb
-    >>> from analysis.intervals.arithmetic import power
+    >>> from nlctl.analysis.intervals.arithmetic import power
     >>> square = power(arb(0, 2), 2)  # of [-2, 2]
     >>> abs(float(square.lower())) < 1e-6 and 4.0 <= float(square.upper()) < 4.0001
     True
@@ -409,7 +409,7 @@ def as_ball(x: Any) -> Any:
 
     Examples
     --------
-    >>> from analysis.intervals.arithmetic import as_ball
+    >>> from nlctl.analysis.intervals.arithmetic import as_ball
     >>> float(as_ball(0.5).value), as_ball("x")
     (0.5, NotImplemented)
     """

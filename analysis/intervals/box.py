@@ -37,7 +37,7 @@ class Box:
 
     Examples
     --------
-    >>> from analysis.lyapunov import Box
+    >>> from nlctl.analysis.lyapunov import Box
     >>> box = Box(names=("x1", "v"), low=(-1.0, 0.0), high=(1.0, 2.0))
     >>> box.cell
     ((-1.0, 1.0), (0.0, 2.0))
@@ -164,7 +164,7 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
     --------
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import visited_box
+    >>> from nlctl.analysis.lyapunov import visited_box
     >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 1, 101))
     >>> box = visited_box(response, margin=0.0)
     >>> print(box.provenance, float(box.low[box.names.index("x1")]))  # x1 starts at 0.5 and rises

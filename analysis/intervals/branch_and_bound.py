@@ -158,7 +158,7 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     --------
     x (1 - x) on [0, 1] has the range [0, 1/4]:
 
-    >>> from analysis.lyapunov import Box, enclose
+    >>> from nlctl.analysis.lyapunov import Box, enclose
     >>> found = enclose(lambda x: x[0] * (1 - x[0]), Box(names=("x",), low=(0.0,), high=(1.0,)))
     >>> -1e-3 < found.low <= 0.0 and 0.25 <= found.high < 0.251
     True
@@ -222,7 +222,7 @@ def prove(
 
     Examples
     --------
-    >>> from analysis.lyapunov import Box, prove
+    >>> from nlctl.analysis.lyapunov import Box, prove
     >>> box = Box(names=("x",), low=(0.0,), high=(1.0,))
     >>> prove(lambda x: x[0] * (1 - x[0]), box, high=0.26).holds
     True
@@ -307,7 +307,7 @@ def upper(ball: Any) -> float:
     Examples
     --------
     >>> from flint import arb
-    >>> from analysis.intervals.branch_and_bound import upper
+    >>> from nlctl.analysis.intervals.branch_and_bound import upper
     >>> 1.0 <= upper(arb(1.0)) < 1.0 + 1e-12, upper(arb("nan"))
     (True, inf)
     """

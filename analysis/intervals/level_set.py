@@ -80,7 +80,7 @@ def prove_decrease(
     --------
     V = x1^2 + x2^2 of a focus has V' = -2 V:
 
-    >>> from analysis.lyapunov import Box, prove_decrease
+    >>> from nlctl.analysis.lyapunov import Box, prove_decrease
     >>> proof = prove_decrease(
     ...     lambda x: x[0] ** 2 + x[1] ** 2,
     ...     rhs=lambda x: (-x[0] + x[1], -x[0] - x[1]),

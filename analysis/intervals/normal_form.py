@@ -103,7 +103,7 @@ class Sum(NumPyFunctions):
     A difference that is 0 whatever x is:
 
     >>> import numpy as np
-    >>> from analysis.intervals.normal_form import indeterminate
+    >>> from nlctl.analysis.intervals.normal_form import indeterminate
     >>> x = indeterminate("x")
     >>> difference = np.sin(2 * x) * (x + 1) - np.sin(x + x) - x * np.sin(2 * x)
     >>> len(difference.terms)
@@ -270,7 +270,7 @@ def exact(number: Any) -> Fraction:
 
     Examples
     --------
-    >>> from analysis.intervals.normal_form import exact
+    >>> from nlctl.analysis.intervals.normal_form import exact
     >>> print(exact(0.5))
     1/2
     """
@@ -294,7 +294,7 @@ def indeterminate(name: str) -> Sum:
 
     Examples
     --------
-    >>> from analysis.intervals.normal_form import indeterminate
+    >>> from nlctl.analysis.intervals.normal_form import indeterminate
     >>> x = indeterminate("x")
     >>> sorted((x * x - x + 1).terms.values())
     [Fraction(-1, 1), Fraction(1, 1), Fraction(1, 1)]

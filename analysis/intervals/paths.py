@@ -23,10 +23,10 @@ class Undecided(ArithmeticError):  # noqa: N818
     A comparison of a box that is true in parts of it only, where the equation is not divided:
 
     >>> from flint import arb
-    >>> from analysis.intervals.arithmetic import Ball
+    >>> from nlctl.analysis.intervals.arithmetic import Ball
     >>> bool(Ball(arb(0, 1)) > 0)
     Traceback (most recent call last):
-    analysis.intervals.paths.Undecided: ...
+    nlctl.analysis.intervals.paths.Undecided: ...
     """
 
 

@@ -69,7 +69,7 @@ def type_question(function: Any) -> str | None:
 
     Examples
     --------
-    >>> from analysis.intervals.type_questions import type_question
+    >>> from nlctl.analysis.intervals.type_questions import type_question
     >>> print(type_question(lambda v: v if isinstance(v, float) else 2 * v).partition(" in ")[0])
     asks isinstance
     >>> print(type_question(lambda v: 2 * v))
@@ -213,5 +213,5 @@ def is_of_library(function: Any) -> bool:
 
 
 def _is_of_library(module: str) -> bool:
-    known = ("numpy", "scipy", "numba", "control", "flint", "nlctl", "analysis", "builtins", "math")
+    known = ("numpy", "scipy", "numba", "control", "flint", "nlctl", "builtins", "math")
     return module.partition(".")[0] in known

@@ -190,7 +190,7 @@ def conservatism(
     C_0^2 / 2 is the sum of its terms:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import conservatism
+    >>> from nlctl.analysis.lyapunov import conservatism
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> found = conservatism(nlctl.paper.example_1(controller=controller), 0.2)
     >>> print(round(sum(share.share for share in found.shares), 9), found.max_r < found.C_0)

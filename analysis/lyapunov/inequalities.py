@@ -1,7 +1,8 @@
 """Each numbered step of the proof, (9)-(36), as a margin along a response.
 
 The forms are the corrected ones.  V' is the gradient of V times the right-hand side of the
-diagram: the rates come from the blocks' own equations, see `analysis.lyapunov.loop.instrumented`.
+diagram: the rates come from the blocks' own equations, see
+`nlctl.analysis.lyapunov.loop.instrumented`.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ def inequalities(signals: Signals, given: Premises) -> tuple[Margin, ...]:
     Parameters
     ----------
     signals : Signals
-        Of a run of `analysis.lyapunov.loop.instrumented`, from the start of the loop.
+        Of a run of `nlctl.analysis.lyapunov.loop.instrumented`, from the start of the loop.
     given : Premises
         The constants that the steps suppose.
 

@@ -47,7 +47,7 @@ class Ledger:
     loop : str
         Name of the diagram.
     loop_facts : mapping
-        What the diagram consists of, see `analysis.loop_record`.
+        What the diagram consists of, see `nlctl.analysis.loop_record`.
     lines : tuple of Line
     constants : Constants
     horizon : float
@@ -193,7 +193,7 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     Without the network, which leaves little to be bounded, over a fifth of a second:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import examine, ledger
+    >>> from nlctl.analysis.lyapunov import examine, ledger
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> found = examine(nlctl.paper.example_1(controller=controller), 0.2)
     >>> book = ledger(found)

@@ -151,7 +151,7 @@ def tighten(
     Parameters
     ----------
     loop : control.InterconnectedSystem
-        As for `analysis.lyapunov.ledger`.
+        As for `nlctl.analysis.lyapunov.ledger`.
     u_limit : float
         Limit of max |u| along the run.
     bound : {"C_0", "ultimate"}, optional
@@ -180,7 +180,7 @@ def tighten(
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import tighten
+    >>> from nlctl.analysis.lyapunov import tighten
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> loop = nlctl.paper.example_1(controller=controller)
     >>> found = tighten(loop, u_limit=20.0, horizon=0.5, evaluations=4)

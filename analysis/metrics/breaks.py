@@ -29,7 +29,7 @@ def breaks_of(response: Any) -> np.ndarray | None:
     --------
     >>> from types import SimpleNamespace
     >>> import pandas as pd
-    >>> from analysis.metrics import breaks_of
+    >>> from nlctl.analysis.metrics import breaks_of
     >>> breaks_of(SimpleNamespace(events=pd.DataFrame({"time": [2.0, 0.5, 2.0]})))
     array([0.5, 2. ])
     """
@@ -45,7 +45,7 @@ def with_breaks(function: Callable[..., float], breaks: np.ndarray | None) -> Ca
     Parameters
     ----------
     function : callable
-        Of times and samples: one of `analysis.metrics`, of a `Metric` or of a requirement.
+        Of times and samples: one of `nlctl.analysis.metrics`, of a `Metric` or of a requirement.
     breaks : ndarray of shape (m,), or None
         Increasing times (s).
 
@@ -59,7 +59,7 @@ def with_breaks(function: Callable[..., float], breaks: np.ndarray | None) -> Ca
     A ramp that jumps back at 1 s has its peak between samples:
 
     >>> import numpy as np
-    >>> from analysis.metrics import peak, with_breaks
+    >>> from nlctl.analysis.metrics import peak, with_breaks
     >>> t = np.array([0.0, 0.3, 0.6, 0.9, 1.2, 1.5])
     >>> round(with_breaks(peak, np.array([1.0]))(t, t % 1), 9), float(peak(t, t % 1))
     (1.0, 0.9)

@@ -42,7 +42,7 @@ def vertex(h_before: float, h_after: float, before: float, here: float, after: f
     --------
     Of 1 - (t - 0.25)^2 at -1, 0 and 1:
 
-    >>> from analysis.metrics import vertex
+    >>> from nlctl.analysis.metrics import vertex
     >>> vertex(1.0, 1.0, 1 - 1.25**2, 1 - 0.25**2, 1 - 0.75**2)
     (0.25, 1.0)
     """
@@ -80,7 +80,7 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     A parabola's vertex is found exactly, a clipped one has the limit as its largest value:
 
     >>> import numpy as np
-    >>> from analysis.metrics import highest
+    >>> from nlctl.analysis.metrics import highest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> y = 1 - (t - 0.1) ** 2
     >>> round(highest(t, y), 9), highest(t, np.minimum(y, 0.9))
@@ -120,7 +120,7 @@ def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import lowest
+    >>> from nlctl.analysis.metrics import lowest
     >>> t = np.linspace(-1.0, 1.0, 9)
     >>> round(lowest(t, (t - 0.1) ** 2 - 1), 9)
     -1.0
@@ -149,7 +149,7 @@ def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import spread
+    >>> from nlctl.analysis.metrics import spread
     >>> t = np.linspace(0.0, 2 * np.pi, 1001)
     >>> round(spread(t, 3 * np.sin(t)), 6)
     6.0
@@ -178,7 +178,7 @@ def peak(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import peak
+    >>> from nlctl.analysis.metrics import peak
     >>> peak(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
     3.0
     """
@@ -212,7 +212,7 @@ def ultimate_bound(
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import ultimate_bound
+    >>> from nlctl.analysis.metrics import ultimate_bound
     >>> t = np.linspace(0.0, 4.0, 401)
     >>> print(round(ultimate_bound(t, np.exp(-t)), 6), round(np.exp(-3), 6))
     0.049787 0.049787
@@ -240,7 +240,7 @@ def final(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import final
+    >>> from nlctl.analysis.metrics import final
     >>> final(np.array([0.0, 1.0]), np.array([5.0, 7.0]))
     7.0
     """

@@ -17,7 +17,7 @@ OWN = [getattr(home, name) for home in (extremes, integrals, travel) for name in
 
 
 def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function of `analysis.metrics`, or one with arguments by `partial`, as machine code.
+    """Return a metric's function, or one with arguments by `partial`, as machine code.
 
     It keeps no thread of an ensemble waiting, and agrees with the original to rounding.  Other
     functions are returned as they are.
@@ -35,7 +35,7 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import in_machine_code, integral
+    >>> from nlctl.analysis.metrics import in_machine_code, integral
     >>> t = np.array([0.0, 0.5, 1.0])
     >>> round(in_machine_code(integral)(t, t**2), 12)
     0.333333333333

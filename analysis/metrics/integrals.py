@@ -33,7 +33,7 @@ def consecutive_differences(y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import consecutive_differences
+    >>> from nlctl.analysis.metrics import consecutive_differences
     >>> print(consecutive_differences(np.array([1.0, 4.0, 9.0])))
     [3. 5.]
     """
@@ -63,7 +63,7 @@ def integral(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import integral
+    >>> from nlctl.analysis.metrics import integral
     >>> t = np.array([0.0, 0.3, 1.0])
     >>> round(integral(t, t**2), 12)  # exact for parabolas
     0.333333333333
@@ -102,7 +102,7 @@ def rms(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import rms
+    >>> from nlctl.analysis.metrics import rms
     >>> t = np.linspace(0.0, 2 * np.pi, 1001)
     >>> print(round(rms(t, np.sin(t)), 6), round(np.sqrt(0.5), 6))
     0.707107 0.707107
@@ -129,7 +129,7 @@ def absolute_integral(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import absolute_integral
+    >>> from nlctl.analysis.metrics import absolute_integral
     >>> t = np.linspace(0.0, 1.0, 3)
     >>> absolute_integral(t, -2 * np.ones(3))
     2.0
@@ -156,7 +156,7 @@ def square_integral(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import square_integral
+    >>> from nlctl.analysis.metrics import square_integral
     >>> t = np.linspace(0.0, 1.0, 3)
     >>> square_integral(t, -2 * np.ones(3))
     4.0
@@ -183,7 +183,7 @@ def time_weighted_integral(t: np.ndarray, y: np.ndarray):
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import time_weighted_integral
+    >>> from nlctl.analysis.metrics import time_weighted_integral
     >>> t = np.linspace(1.0, 2.0, 3)
     >>> time_weighted_integral(t, -2 * np.ones(3))
     1.0

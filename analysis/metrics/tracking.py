@@ -43,7 +43,7 @@ class Metric:
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import Metric, peak
+    >>> from nlctl.analysis.metrics import Metric, peak
     >>> effort = Metric(key="peak_u", signal="u", unit="1", meaning="largest input", function=peak)
     >>> effort.signals, effort.function(np.array([0.0, 1.0, 2.0]), np.array([-3.0, 1.0, 1.0]))
     (('u',), 3.0)
@@ -96,7 +96,7 @@ def over(t: np.ndarray, y: np.ndarray, start: float, end: float) -> tuple[np.nda
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import over
+    >>> from nlctl.analysis.metrics import over
     >>> t = np.linspace(0.0, 1.0, 5)
     >>> print(*over(t, t**2, 0.4, 1.0))
     [0.5  0.75 1.  ] [0.25   0.5625 1.    ]
@@ -150,7 +150,7 @@ def tracking_metrics(
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.robustness import tracking_metrics
+    >>> from nlctl.analysis.robustness import tracking_metrics
     >>> metrics = {metric.key: metric for metric in tracking_metrics(start=1.0, band=0.1)}
     >>> times = np.linspace(0.0, 2 * np.pi, 1001)
     >>> peak = metrics["peak_u"]

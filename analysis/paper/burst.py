@@ -6,8 +6,8 @@ integrator follows it.  From there the loop is carried on in three ways.
 1. *Averaged.*  While v sweeps through the ripple, the mean of 1 + gain_v sin^2 v moves the plant,
    1 + gain_v / 2; of the backlash the slope counts, its gap is small against v.  That leaves out
    what r changes by in one period of the ripple, which is small against r.
-2. *By its integral.*  `analysis.lyapunov.aftermath` bounds the peak and the place of rest whatever
-   the gain does within its bounds, without the averaging.
+2. *By its integral.*  `nlctl.analysis.lyapunov.aftermath` bounds the peak and the place of rest
+   whatever the gain does within its bounds, without the averaging.
 3. *At rest.*  There N(zeta) is about -3e10 and zeta stands still, zeta' = r u / N.  The loop is
    then run as it is, with a constant N = -K; where K is large its signals no longer depend on K,
    which two values show.

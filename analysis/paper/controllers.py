@@ -55,7 +55,7 @@ class _Gains:
     r_0 : float
         Dead zone of r in zeta', for |e| <= 0.133 (example 1) and 0.13 (example 2).
     weights, robust, law : dict
-        Gains for which `analysis.lyapunov.certify` proves a bound.
+        Gains for which `nlctl.analysis.lyapunov.certify` proves a bound.
     """
 
     pid: dict[str, float]
@@ -108,8 +108,8 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
           `nlctl.ablations`, where the fixed gain is -N(zeta) that the paper's loop has reached
           after 20 s;
         * "PID", "sliding mode": see `baselines`;
-        * "certified": `nlctl.KnownSignLaw` with gains that `analysis.lyapunov.certify` proves a
-          bound for;
+        * "certified": `nlctl.KnownSignLaw` with gains that `nlctl.analysis.lyapunov.certify` proves
+          a bound for;
         * "dead zone in zeta'", "leakage", "monotone zeta": the paper's gains with another law for
           the Nussbaum argument.
 

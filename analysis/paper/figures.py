@@ -174,7 +174,7 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
     Parameters
     ----------
     record : pandas.DataFrame
-        Of `analysis.paper.sampling_limits`.
+        Of `nlctl.analysis.paper.sampling_limits`.
     titles : mapping of str to str
         Of the examples.
     band : float
@@ -214,7 +214,7 @@ def actuator_errors(
     Parameters
     ----------
     record : pandas.DataFrame
-        Lines of one example of `analysis.paper.limits.actuators`.
+        Lines of one example of `nlctl.analysis.paper.limits.actuators`.
     meets : callable
         Says which lines meet the spec.
     band : float

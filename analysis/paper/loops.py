@@ -1,6 +1,6 @@
 """The examples' loops with one keyword per question: noise, wrong sign, saturation, controller.
 
-For study files, ``analysis.paper.loops:example_1``: every choice may be given by a label or a
+For study files, ``nlctl.analysis.paper.loops:example_1``: every choice may be given by a label or a
 number.  What is asked of the actuator are parameters of its cascade: ``actuator.body.b_r``,
 ``actuator.body.c_r``, ``actuator.saturation.limit``, ``actuator.gain.k``.
 """

@@ -1,7 +1,7 @@
 """The kept record of Example 2 until its gain loses the sign: minutes of computing, once.
 
-``python -m analysis.paper.reference_run`` makes it again, from runs at two tolerances whose bursts
-must agree.
+``python -m nlctl.analysis.paper.reference_run`` makes it again, from runs at two tolerances whose
+bursts must agree.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def continued(beginning: LongRun, record: LongRun) -> LongRun:
         raise ValueError(
             f"the record of '{record.loop}' has zeta = {before:.5f} at {end:g} s, a run of today "
             f"{beginning.signals['zeta'][-1]:.5f}: make it again with "
-            "'python -m analysis.paper.reference_run'"
+            "'python -m nlctl.analysis.paper.reference_run'"
         )
     later = record.time > end
     signals = {

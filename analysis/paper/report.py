@@ -3,7 +3,7 @@
 In a notebook::
 
     made = compose(Path("reports/paper"))
-    write_report(made.report, Path("reports/paper"))          # of analysis.report
+    write_report(made.report, Path("reports/paper"))          # of nlctl.analysis.report
 """
 
 from __future__ import annotations
@@ -71,7 +71,8 @@ class Composed:
     ----------
     report : Report
     drawn : mapping
-        Those of its figures that are drawn already, for `analysis.report.render.write_report`.
+        Those of its figures that are drawn already, for
+        `nlctl.analysis.report.render.write_report`.
     passed : bool
         Whether all numbers of the reproduction are those that were to be reached.
     """
@@ -139,7 +140,7 @@ def robustness(
     Parameters
     ----------
     folders : sequence of Path
-        Of `analysis.studies.run`, of any loops.
+        Of `nlctl.analysis.studies.run`, of any loops.
     threads : int, optional
         For the rows that are simulated again to be drawn.
     tell : callable, optional
@@ -175,7 +176,7 @@ def compose(
         Where the studies are run, each in a folder of its name; what is there is not replaced,
         see `clear`.
     studies : sequence of str, optional
-        Names of `analysis.studies.shipped`; without any there is no part on robustness.
+        Names of `nlctl.analysis.studies.shipped`; without any there is no part on robustness.
     horizon : float, optional
         Length of the runs along which the proof is checked (s).
     far : bool, optional

@@ -47,7 +47,7 @@ def expectations() -> list[Expectation]:
     list of Expectation
         As independent computations have found them.
     """
-    text = files("analysis.paper").joinpath("expected.csv").read_text(encoding="utf-8")
+    text = files("nlctl.analysis.paper").joinpath("expected.csv").read_text(encoding="utf-8")
     return [
         Expectation(
             case=row["case"],

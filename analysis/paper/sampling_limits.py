@@ -1,7 +1,7 @@
 """Where the examples stop meeting their spec on a computer: a kept record, and how it is made.
 
-``python -m analysis.paper.sampling_limits`` makes it again, in two minutes: every controller of
-`controllers.compared_controllers` by Euler's method, over the sampling time, the delay and the
+``python -m nlctl.analysis.paper.sampling_limits`` makes it again, in two minutes: every controller
+of `controllers.compared_controllers` by Euler's method, over the sampling time, the delay and the
 steps of both converters.
 """
 
@@ -231,7 +231,7 @@ def check_lines(kept: pd.DataFrame, today: pd.DataFrame) -> None:
         raise ValueError(
             f"the record of '{line['example']}' with the controller '{line['controller']}' has "
             f"{a.ravel()} at {line['quantity']} = {line['value']:g}, a run of today {b.ravel()}: "
-            "make it again with 'python -m analysis.paper.sampling_limits'"
+            "make it again with 'python -m nlctl.analysis.paper.sampling_limits'"
         )
 
 

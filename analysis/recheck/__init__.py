@@ -1,4 +1,4 @@
-"""Check a saved certificate again, with nothing but integers: ``python -m analysis.recheck FILE``.
+"""``python -m nlctl.analysis.recheck FILE`` checks a saved certificate again, by integers alone.
 
 The file says what a closed loop is (the plant's equation, the gains, the split of the actuator, the
 reference, the starts), what is claimed of it, and the numbers by which the claim follows.  Nothing
@@ -56,8 +56,8 @@ def recheck(content: Any) -> str:
     >>> import json, tempfile
     >>> from pathlib import Path
     >>> import nlctl
-    >>> from analysis.lyapunov import certify
-    >>> from analysis.recheck import recheck, seal_of
+    >>> from nlctl.analysis.lyapunov import certify
+    >>> from nlctl.analysis.recheck import recheck, seal_of
     >>> controller = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0, phi=0.1))
     >>> loop = nlctl.paper.example_1(controller=controller, actuator=nlctl.Gain())
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -69,7 +69,7 @@ def recheck(content: Any) -> str:
     >>> content["seal"] = seal_of(content)
     >>> recheck(content)
     Traceback (most recent call last):
-    analysis.recheck.content.Refuted: |u| <= 10
+    nlctl.analysis.recheck.content.Refuted: |u| <= 10
     """
     whole = Record(content, "the file")
     need([whole["format"], whole["version"]] == FORMAT, "the format is another one")
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print yes or no for a file, and return 0 or 1; 2 where there is no such file."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     if len(given) != 1:
-        print("usage: python -m analysis.recheck FILE")
+        print("usage: python -m nlctl.analysis.recheck FILE")
         return 2
     try:
         with open(given[0], encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""``python -m analysis.recheck FILE``."""
+"""``python -m nlctl.analysis.recheck FILE``."""
 
 import sys
 

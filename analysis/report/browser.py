@@ -73,7 +73,7 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.report import Report, write_pdf, write_report
+    >>> from nlctl.analysis.report import Report, write_pdf, write_report
     >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     page = write_report(report, folder)

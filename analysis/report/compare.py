@@ -75,7 +75,7 @@ def compare_contents(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.report import Report, compare_contents, write_report
+    >>> from nlctl.analysis.report import Report, compare_contents, write_report
     >>> def arm(e):
     ...     return Report(
     ...         title="Arm", verdict="", claims=[], sections=[], command="", numbers={"e": e}

@@ -2,7 +2,7 @@
 
 Text is plain text; a formula inside it stands between ``\\(`` and ``\\)``, in LaTeX.
 
-A report is data until the last step; `analysis.report.render` turns it into a page and into
+A report is data until the last step; `nlctl.analysis.report.render` turns it into a page and into
 ``report.json``, so that every number on the page is also in the file beside it.
 """
 
@@ -58,7 +58,7 @@ class Equation:
     Examples
     --------
     >>> import json
-    >>> from analysis.report import Equation, Report, Section, render_json
+    >>> from nlctl.analysis.report import Equation, Report, Section, render_json
     >>> law = Equation(latex=r"\\dot{x} = -\beta x", number="(1)")
     >>> shown = Section(key="law", title="The law", items=[law])
     >>> report = Report(title="A law", verdict="", claims=[], sections=[shown], command="")
@@ -84,7 +84,7 @@ class Table:
 
     Examples
     --------
-    >>> from analysis.report import Report, Section, Table, render_html
+    >>> from nlctl.analysis.report import Report, Section, Table, render_html
     >>> table = Table(caption="Gains", columns=["gain", "value"], rows=[["beta", 2.5]])
     >>> shown = Section(key="gains", title="Gains", items=[table])
     >>> report = Report(title="Gains", verdict="", claims=[], sections=[shown], command="")
@@ -109,7 +109,7 @@ class Figure:
     Examples
     --------
     >>> import matplotlib.figure
-    >>> from analysis.report import Figure, Report, Section, render_html
+    >>> from nlctl.analysis.report import Figure, Report, Section, render_html
     >>> drawn = matplotlib.figure.Figure(figsize=(3, 2))
     >>> lines = drawn.add_subplot().plot([0, 1], [0, 1])
     >>> figure = Figure(key="line", caption="A line", description="From 0 to 1", figure=drawn)
@@ -153,7 +153,7 @@ class History:
 
     Examples
     --------
-    >>> from analysis.report import History
+    >>> from nlctl.analysis.report import History
     >>> History(key="x", caption="x", description="x", time=[0.0, 1.0], signals={"x": [1.0]})
     Traceback (most recent call last):
     nlctl.errors.ParameterError: signal 'x' of history 'x' has shape (1,), its time (2,)
@@ -229,7 +229,7 @@ class Claim:
     --------
     A claim of ours that does not hold has failed, one of somebody else is refuted:
 
-    >>> from analysis.report import Claim, Report, render_html
+    >>> from nlctl.analysis.report import Claim, Report, render_html
     >>> def verdict(by=""):
     ...     claim = Claim(
     ...         text="|e| <= 0.1", measured="0.2", limit="0.1", holds=False, evidence="", by=by
@@ -273,7 +273,7 @@ class Report:
         Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
         (``doi 10...``) becomes a link, the only kind that leads out of the page.
     files : mapping
-        Name and SHA-256 of each data file beside the page (`analysis.report.file_hashes`).
+        Name and SHA-256 of each data file beside the page (`nlctl.analysis.report.file_hashes`).
     question : str
         What was asked; it stands before the verdict.
     lead : Figure, optional
@@ -286,7 +286,7 @@ class Report:
     --------
     A page with one claim and its evidence:
 
-    >>> from analysis.report import Claim, Paragraph, Report, Section, render_html
+    >>> from nlctl.analysis.report import Claim, Paragraph, Report, Section, render_html
     >>> shown = Section(key="one", title="A sum", items=[Paragraph(text="Two and two are four.")])
     >>> claim = Claim(text="2 + 2 = 4", measured="4", limit="4", holds=True, evidence="one")
     >>> report = Report(title="Sum", verdict="Known.", claims=[claim], sections=[shown], command="")

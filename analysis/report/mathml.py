@@ -252,7 +252,7 @@ def subset(source: str | os.PathLike[str]) -> bytes:
 @cache
 def font_face() -> str:
     """Return the CSS rule that holds the whole font, so that the page fetches nothing."""
-    data = base64.b64encode(files("analysis.report").joinpath(FILE).read_bytes()).decode()
+    data = base64.b64encode(files("nlctl.analysis.report").joinpath(FILE).read_bytes()).decode()
     return (
         f'@font-face {{ font-family: "{FAMILY}"; '
         f'src: url("data:font/woff2;base64,{data}") format("woff2"); }}\n'

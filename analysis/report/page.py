@@ -70,13 +70,13 @@ def _digest(text: str) -> str:
 
 
 def _own(name: str) -> str:
-    return files("analysis.report").joinpath(name).read_text(encoding="utf-8")
+    return files("nlctl.analysis.report").joinpath(name).read_text(encoding="utf-8")
 
 
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("analysis.report"),
+        loader=PackageLoader("nlctl.analysis.report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

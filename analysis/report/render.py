@@ -59,7 +59,7 @@ def render_html(
     pool : concurrent.futures.Executor, optional
         Processes that help with drawing the figures.
     drawn : mapping, optional
-        Figures that are drawn already, see `analysis.report.svg.draw_ahead`.
+        Figures that are drawn already, see `nlctl.analysis.report.svg.draw_ahead`.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def render_json(report: Report) -> str:
     Examples
     --------
     >>> import json, math
-    >>> from analysis.report import Report, render_json
+    >>> from nlctl.analysis.report import Report, render_json
     >>> numbers = {"e": 0.14, "settling": math.inf}
     >>> report = Report(
     ...     title="Arm", verdict="", claims=[], sections=[], command="", numbers=numbers
@@ -221,7 +221,7 @@ def write_report(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.report import Report, compare_contents, write_gallery, write_report
+    >>> from nlctl.analysis.report import Report, compare_contents, write_gallery, write_report
     >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     pages = [write_report(report, Path(folder, name)) for name in ("one", "two")]
@@ -281,7 +281,7 @@ def framed(report: Report) -> Framed:
 
     Examples
     --------
-    >>> from analysis.report import Report, framed
+    >>> from nlctl.analysis.report import Report, framed
     >>> report = Report(title="Nothing", verdict="Nothing.", claims=[], sections=[], command="")
     >>> framed(report)
     report 'Nothing', ... kB
@@ -314,7 +314,7 @@ def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     --------
     >>> import hashlib, tempfile
     >>> from pathlib import Path
-    >>> from analysis.report import file_hashes
+    >>> from nlctl.analysis.report import file_hashes
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     _ = Path(folder, "rows.csv").write_bytes(b"1,2")
     ...     hashes = file_hashes([Path(folder, "rows.csv")])

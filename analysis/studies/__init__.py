@@ -1,6 +1,7 @@
 """Study files: what is uncertain, what is asked, and everything connected to answer it."""
 
 from .differences import origin_differences, run_differences
+from .file.asked import Asked, Varied
 from .file.errors import Problem, StudyError
 from .file.parse import StudyFile, read_study
 from .file.schema import Study
@@ -8,7 +9,7 @@ from .file.shipped import shipped
 from .file.written import from_toml, to_toml
 from .finding import Finding
 from .folder import load_result
-from .kind import Asked, Ground, Kind, Setup, Varied, made
+from .kind import Ground, Kind, Setup, made
 from .kinds import KINDS
 from .plan import Plan, plan
 from .replay import Replay, replay, replay_figure

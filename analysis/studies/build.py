@@ -12,8 +12,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from analysis.metrics import Metric
-from analysis.robustness import (
+from nlctl.errors import ParameterError
+from nlctl.faults import Fault
+from nlctl.names import unknown
+
+from ..metrics import Metric
+from ..robustness import (
     Choice,
     Design,
     Experiment,
@@ -28,10 +32,6 @@ from analysis.robustness import (
     sobol,
     tracking_metrics,
 )
-from nlctl.errors import ParameterError
-from nlctl.faults import Fault
-from nlctl.names import unknown
-
 from ..robustness.stl.text import parse_formula
 from .file.resolve import DEFAULT, loop_function, option, uncertain
 from .file.schema import Choices, Faulty, Rows, Study
@@ -169,7 +169,7 @@ def _metric(value: Any, folder: Path) -> Metric:
     if missing:
         raise ParameterError(
             f"a metric needs {', '.join(METRIC)}, what {value.get('function')} returns lacks "
-            f"{', '.join(missing)}; see analysis.metrics.Metric"
+            f"{', '.join(missing)}; see nlctl.analysis.metrics.Metric"
         )
     return made
 

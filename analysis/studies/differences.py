@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.robustness.runs.identity import differences_of
 from nlctl.annotations import as_annotated
 from nlctl.wording import counted
 
+from ..robustness.runs.identity import differences_of
 from .folder import checked, load_result, load_run
 from .origin import loop_differences, version_differences
 from .result import LISTED, Result
@@ -79,7 +79,7 @@ def run_differences(first: Path, second: Path) -> list[str]:
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import origin_differences, read_study, run, run_differences
+    >>> from nlctl.analysis.studies import origin_differences, read_study, run, run_differences
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }

@@ -2,7 +2,7 @@
 
 study.toml           the study as it was run, with the settings of the command line
 run.json             where the files that it refers to are, and what all is computed from: `origin`
-rows/                the main table, see `analysis.robustness.runs.store`
+rows/                the main table, see `nlctl.analysis.robustness.runs.store`
 KEY/finding.json     what one analysis found, its tables beside it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
@@ -23,13 +23,13 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness import Design, Space
-from analysis.robustness.runs.store import opened, read_parquet
-from analysis.robustness.runs.sweep import Sweep, load
 from nlctl.annotations import as_annotated
 from nlctl.host.files import replace_file
 from nlctl.wording import counted
 
+from ..robustness import Design, Space
+from ..robustness.runs.store import opened, read_parquet
+from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
 from .code.record import study_digest
 from .code.rule import Grant
@@ -39,7 +39,7 @@ from .file.schema import Study, keyed
 from .file.toml import read_toml, study_text
 from .file.written import from_toml
 from .finding import Finding
-from .kind import Kind
+from .kind import Kind, kind_of
 from .origin import plain_study
 from .result import Result
 from .sealed import (
@@ -235,7 +235,7 @@ def read_through(folder: Path) -> None:
 
 
 @as_annotated
-def load_result(folder: Path, *, trust: bool = False) -> Result:
+def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
     Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
@@ -243,7 +243,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
     trust : bool, optional
         As in `read_study`.
@@ -262,6 +262,7 @@ def load_result(folder: Path, *, trust: bool = False) -> Result:
     --------
     See `run`.
     """
+    folder = Path(folder)
     checked(folder)
     return _result_in(folder, *_own_kinds(folder, trust))
 
@@ -334,8 +335,8 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             f"{', '.join(expected) or 'none'}: continue with --resume"
         )
     if result.complete and result.study.runs is not None:
-        stops = [a for a in result.study.analysis if a.definition.needs_rows]
-        early = len(stops) == 1 and stops[0].definition.stop is not None
+        stops = [a for a in result.study.analysis if kind_of(a).needs_rows]
+        early = len(stops) == 1 and kind_of(stops[0]).stop is not None
         if rows is None or not (rows.complete or early):
             there = 0 if rows is None else rows.done
             raise RunFolderError(
@@ -344,7 +345,7 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             )
     for finding in result.findings:
         asked = result.asked[finding.key]
-        told = asked.claim if asked.definition.name != STAND_IN else finding.claim
+        told = asked.claim if kind_of(asked).name != STAND_IN else finding.claim
         same = finding.claim == told or not (told or finding.is_answered)
         if finding.kind != asked.kind or not same or bool(finding.claim) != bool(finding.answer):
             raise RunFolderError(

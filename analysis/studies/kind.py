@@ -1,7 +1,8 @@
 """What a kind of analysis is: one record, from its table in a study file to its part of the page.
 
-nlctl's own kinds are the modules of `analysis.studies.kinds`.  A kind of one's own is a `Kind` in a
-file beside the study, or in an installed package; a study names it as it names its loop::
+nlctl's own kinds are the modules of `nlctl.analysis.studies.kinds`.  A kind of one's own is a
+`Kind` in a file beside the study, or in an installed package; a study names it as it names its
+loop::
 
     [[analysis]]
     kind = "spread.py:spread"     # or "module:spread"
@@ -18,97 +19,40 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, create_model
+from pydantic import create_model
 
-from analysis.robustness import Design, Experiment, Prepared, Space
-from analysis.robustness.runs.progress import Progress
-from analysis.robustness.runs.sweep import Sweep
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
-from .file.field_types import Names, Strict
+from ..robustness import Design, Experiment, Prepared, Space
+from ..robustness.runs.progress import Progress
+from ..robustness.runs.sweep import Sweep
+from .file.asked import Asked
+from .file.schema import Study
 from .finding import Finding
+from .result import Result
 
 if TYPE_CHECKING:
     from ..report.document import Item
-    from .file.schema import Study
-    from .result import Result
 
 __all__ = [
-    "Asked",
     "Ground",
     "Kind",
     "RunDesign",
     "Setup",
-    "Varied",
     "answer",
     "column",
+    "kind_of",
     "made",
     "tagged",
     "unanswered",
 ]
 
 _NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
-
-
-class Asked(Strict):
-    """What a study file says of every analysis; the schema of a kind adds its own keys.
-
-    Examples
-    --------
-    The keys of a table of one's own, checked as those of nlctl's kinds are:
-
-    >>> from pydantic import Field
-    >>> from analysis.studies import Asked
-    >>> class Spread(Asked):
-    ...     of: str = Field("spec", description="Column of the main table.")
-    ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
-    ...     @property
-    ...     def claim(self):
-    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
-    >>> Spread(kind="spread", limit=0.5).claim
-    'the spread is at most 0.5'
-    >>> Spread(kind="spread", limit=-1.0)
-    Traceback (most recent call last):
-    pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
-    limit
-      Input should be greater than 0 ...
-    """
-
-    key: str = Field(
-        "",
-        pattern=r"^[a-z0-9-]*$",
-        description="Name of its folder: lower-case letters, digits, hyphens; by default the kind.",
-    )
-    title: str = Field("", description="Its heading in the report.")
-    kind: str
-    definition: ClassVar[Kind]
-
-    @property
-    def claim(self) -> str:
-        """What the study claims by asking for it; empty if it asks and claims nothing."""
-        return ""
-
-
-class Varied(Asked):
-    """An analysis that may vary a part of the quantities.
-
-    Examples
-    --------
-    >>> from analysis.studies import Varied
-    >>> class Corners(Varied):
-    ...     levels: int = 2
-    >>> Corners(kind="corners", quantities=["lag.T"]).quantities
-    ('lag.T',)
-    >>> Corners(kind="corners").quantities  # all
-    ()
-    """
-
-    quantities: Names = Field((), description="What is varied, the rest nominal; all by default.")
 
 
 class RunDesign(Protocol):
@@ -134,13 +78,14 @@ class Setup:
     What Morris' screening takes is known before anything runs: with r trajectories of k quantities
     r (k + 1) simulations.
 
-    >>> from analysis.studies import Setup, read_study, shipped
+    >>> from nlctl.analysis.studies import Setup, read_study, shipped
+    >>> from nlctl.analysis.studies.kind import kind_of
     >>> file = read_study(shipped("example-1-quick"))
     >>> setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     >>> (asked,) = [asked for asked in file.study.analysis if asked.kind == "morris"]
     >>> asked.trajectories, len(setup.experiment.space.names)
     (4, 5)
-    >>> asked.definition.planned(asked, setup)
+    >>> kind_of(asked).planned(asked, setup)
     24
     """
 
@@ -163,8 +108,8 @@ class Ground:
     rows : Sweep or None
         The main table, with its design.
     simulate : callable
-        Runs rows here, see `analysis.robustness.search.evaluation.Evaluate`; what a table leaves
-        out is nominal.
+        Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
+        leaves out is nominal.
     run_design : RunDesign
 
     Examples
@@ -255,7 +200,7 @@ class Kind:
         numbers have ``runs`` and ``confidence``.
     stop : callable, optional
         ``stop(asked, design)`` returns what ends the main table early, where no other analysis
-        needs it; see `analysis.robustness.runs.sweep`.
+        needs it; see `nlctl.analysis.robustness.runs.sweep`.
     columns, quantities, keywords : tuple of str
         Keys of its table that name a column of its rows, quantities of the space, a keyword of the
         loop: they are checked before anything runs.
@@ -299,9 +244,9 @@ class Kind:
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, run
+    >>> from nlctl.analysis.studies import read_study, run
     >>> code = '''
-    ... from analysis.studies import Asked, Kind, made
+    ... from nlctl.analysis.studies import Asked, Kind, made
     ...
     ... class Failures(Asked):
     ...     pass
@@ -412,6 +357,12 @@ def tagged(kind: Kind, tag: str) -> type[Asked]:
     return model
 
 
+def kind_of(asked: Asked) -> Kind:
+    """Return the kind of an analysis that a study file asks for."""
+    model: Any = type(asked)
+    return model.definition
+
+
 def column(rows: Sweep, name: str) -> np.ndarray:
     """Return one column of a sweep."""
     return rows.columns(name)[name].to_numpy()
@@ -438,7 +389,7 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
     Examples
     --------
-    >>> from analysis.studies import Asked, made
+    >>> from nlctl.analysis.studies import Asked, made
     >>> asked = Asked(kind="spread")
     >>> found = made(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
     >>> found.kind, found.numbers["spread"], found.holds
@@ -466,7 +417,7 @@ def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
     KeyboardInterrupt
         If Ctrl-C ended a search.
     """
-    found = asked.definition.run(asked, ground)
+    found = kind_of(asked).run(asked, ground)
     if found is None:
         return None
     return _headed(key, asked, found)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from analysis.json_values import as_json, from_json
-from analysis.loop_record import (
+from ..json_values import as_json, from_json
+from ..loop_record import (
     difference_text,
     fact_differences,
     loop_facts,
@@ -20,12 +20,11 @@ from analysis.loop_record import (
     unseen_parts,
     values_differ,
 )
-from analysis.robustness import Prepared, diagrams
-from analysis.robustness.runs.identity import differences_of, experiment_facts, labels_text
-
+from ..robustness import Prepared, diagrams
+from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
 from .file.parse import StudyFile
 from .file.schema import Study, keyed
-from .kind import Setup
+from .kind import Setup, kind_of
 
 __all__ = [
     "compared_differences",
@@ -58,14 +57,14 @@ def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
     every = [p.system for _, p in prepared.loops]
     setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
     for key, asked in keyed(file.study).items():
-        if asked.definition.experiment is not None:
-            own = asked.definition.experiment(asked, setup)
+        if (experiment := kind_of(asked).experiment) is not None:
+            own = experiment(asked, setup)
             for labels, diagram in diagrams(own.space, own.build):
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
                 every.append(diagram)
-    own_kinds = {a.kind: short_key(a.definition.run) for a in file.study.analysis if ":" in a.kind}
+    own_kinds = {a.kind: short_key(kind_of(a).run) for a in file.study.analysis if ":" in a.kind}
     facts |= {"kinds": own_kinds} if own_kinds else {}
     unseen = dict[str, list[str]]()
     for diagram in every:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from analysis.robustness import Prepared, evaluate, independent, prepare
-from analysis.robustness.runs.experiment import columns_of
 from nlctl.annotations import as_annotated
 
+from ..robustness import Prepared, evaluate, independent, prepare
+from ..robustness.runs.experiment import columns_of
 from .build import main_design
 from .file.parse import StudyFile
 from .file.schema import keyed
-from .kind import Setup
+from .kind import Setup, kind_of
 
 __all__ = ["Plan", "plan"]
 
@@ -74,13 +74,13 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
     Raises
     ------
     UsageError
-        As in `analysis.robustness.prepare`.
+        As in `nlctl.analysis.robustness.prepare`.
 
     Examples
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import plan, read_study
+    >>> from nlctl.analysis.studies import plan, read_study
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }
@@ -108,11 +108,11 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
         kept += runs["rows"]
     setup = Setup(study=study, folder=file.folder, experiment=prepared.experiment)
     for key, asked in keyed(study).items():
-        count = asked.definition.planned(asked, setup)
+        count = kind_of(asked).planned(asked, setup)
         if count:
             runs[key] = count
-            kept += count if asked.definition.keeps_rows else 0
-    at_most = [key for key, asked in keyed(study).items() if asked.definition.ends_early]
+            kept += count if kind_of(asked).keeps_rows else 0
+    at_most = [key for key, asked in keyed(study).items() if kind_of(asked).ends_early]
     width = len(columns_of(prepared))
     return Plan(
         runs=runs,

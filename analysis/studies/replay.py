@@ -11,18 +11,18 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures.axes import BLUE, ORANGE, TIME, stacked_axes
-from analysis.robustness import Experiment, Prepared, evaluate, prepare
-from analysis.robustness.runs.experiment import by_diagram, simulate_rows
-from analysis.robustness.stl.formula import Band, parts_of
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
+from ..figures.axes import BLUE, ORANGE, TIME, stacked_axes
+from ..robustness import Experiment, Prepared, evaluate, prepare
+from ..robustness.runs.experiment import by_diagram, simulate_rows
+from ..robustness.stl.formula import Band, parts_of
 from .file.parse import StudyFile
 from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
-from .kind import Setup
+from .kind import Setup, kind_of
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
@@ -92,12 +92,12 @@ class Replay:
 
 
 @as_annotated
-def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
+def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False) -> Replay:
     """Run one row of a run folder again.
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
     row : int
         Number of the row, from 0.
@@ -125,7 +125,7 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     >>> import math
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, replay, replay_figure, run
+    >>> from nlctl.analysis.studies import read_study, replay, replay_figure, run
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }
@@ -147,6 +147,7 @@ def replay(folder: Path, row: int, part: str = "", *, trust: bool = False) -> Re
     >>> replay_figure(last).axes[0].get_title(loc="left")
     'rises: always from 1 s on v >= 0.9'
     """
+    folder = Path(folder)
     run = reopened(folder, trust=trust)
     table = _table(folder, part)
     if row not in table.index:
@@ -184,10 +185,11 @@ def _table(folder: Path, part: str) -> pd.DataFrame:
 def _widened(file: StudyFile, part: str) -> Experiment | None:
     """Return what the rows of a part were run with, where it is not the study's experiment."""
     asked = keyed(file.study).get(part)
-    if asked is None or asked.definition.experiment is None:
+    experiment = None if asked is None else kind_of(asked).experiment
+    if experiment is None:
         return None
     setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
-    return asked.definition.experiment(asked, setup)
+    return experiment(asked, setup)
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -9,11 +9,11 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness.runs.sweep import Sweep
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 from nlctl.wording import counted, some_of
 
+from ..robustness.runs.sweep import Sweep
 from .file.schema import Study, keyed
 from .finding import Finding
 from .sealed import as_json, origin_key

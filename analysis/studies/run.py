@@ -12,14 +12,14 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.robustness import Design, Prepared, evaluate, nominal, prepare
-from analysis.robustness.runs.progress import Progress
-from analysis.robustness.runs.store import StoreError, locked
-from analysis.robustness.runs.sweep import Sweep, load, sweep
 from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
+from ..robustness import Design, Prepared, evaluate, nominal, prepare
+from ..robustness.runs.progress import Progress
+from ..robustness.runs.store import StoreError, locked
+from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
 from .code.record import study_digest
 from .code.rule import remember_code
@@ -29,7 +29,7 @@ from .file.toml import read_toml
 from .file.written import to_toml
 from .finding import Finding
 from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
-from .kind import Ground, answer, unanswered
+from .kind import Ground, answer, kind_of, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
@@ -75,7 +75,7 @@ class _Way:
 @as_annotated
 def run(
     file: StudyFile,
-    folder: Path,
+    folder: str | Path,
     *,
     resume: bool = False,
     force: bool = False,
@@ -92,7 +92,7 @@ def run(
     ----------
     file : StudyFile
         What `read_study` returns.
-    folder : Path
+    folder : str or Path
         See `folder` for what is in it.
     resume : bool, optional
         Whether to take up what the folder holds.  It must be of the same study, loop and versions.
@@ -101,7 +101,7 @@ def run(
     executor : concurrent.futures.Executor, optional
         Where rows are run whose number is known in advance; searches run here.
     threads : int, optional
-        As in `analysis.robustness.runs.sweep`.
+        As in `nlctl.analysis.robustness.runs.sweep`.
     watch : callable, optional
         See `Watch`.
 
@@ -128,7 +128,7 @@ def run(
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import load_result, read_study, run
+    >>> from nlctl.analysis.studies import load_result, read_study, run
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }  # T v' = u - v
@@ -150,6 +150,7 @@ def run(
     >>> result.verdict, again.verdict
     ('The claim is shown.', 'The claim is shown.')
     """
+    folder = Path(folder)
     with locked(folder, RunFolderError):
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
@@ -205,13 +206,13 @@ def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Swe
     """Run the main table, or as much of it as the analyses need."""
     assert study.runs is not None
     design = main_design(study.runs, prepared.experiment.space, study.study.seed)
-    users = [(key, a) for key, a in keyed(study).items() if a.definition.needs_rows]
+    users = [(key, a) for key, a in keyed(study).items() if kind_of(a).needs_rows]
     key, only = users[0] if len(users) == 1 else ("", None)
-    if only is not None and only.definition.stop is not None:
+    if only is not None and (stop := kind_of(only).stop) is not None:
         if load_finding(folder, key, way.key) is not None:
             return replace(load(folder / "rows", design), decided=True)
-        stop = only.definition.stop(only, design)
-        return _swept(prepared, design, folder / "rows", way, "rows", stop=stop)
+        ends = stop(only, design)
+        return _swept(prepared, design, folder / "rows", way, "rows", stop=ends)
     return _swept(prepared, design, folder / "rows", way, "rows")
 
 
@@ -279,7 +280,7 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        own = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
+        own = {asked.kind: kind_of(asked) for asked in file.study.analysis if ":" in asked.kind}
         changed = _changed(load_study(folder, own), file.study)
         if changed:
             raise RunFolderError(

@@ -10,9 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from analysis.json_values import as_json, from_json
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
+
+from ..json_values import as_json, from_json
 
 __all__ = [
     "ANEW",
@@ -41,10 +42,10 @@ class RunFolderError(UsageError):
     Examples
     --------
     >>> from pathlib import Path
-    >>> from analysis.studies import load_result
+    >>> from nlctl.analysis.studies import load_result
     >>> load_result(Path("arm"))
     Traceback (most recent call last):
-    analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study
+    nlctl.analysis.studies.sealed.RunFolderError: 'arm' holds no run of a study
     """
 
 

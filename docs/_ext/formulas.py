@@ -2,8 +2,8 @@
 
 from sphinx.util import logging
 
-from analysis.report.document import Equation
-from analysis.report.mathml import inline, mathml
+from nlctl.analysis.report.document import Equation
+from nlctl.analysis.report.mathml import inline, mathml
 
 logger = logging.getLogger(__name__)
 

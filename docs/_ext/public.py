@@ -3,7 +3,6 @@
 import importlib
 import inspect
 
-import click
 import typer
 from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
@@ -76,7 +75,7 @@ class StudyKeys(SphinxDirective):
     """``.. study-keys::``: every table and key of a study file, from its schema."""
 
     def run(self):
-        from analysis.studies import Study
+        from nlctl.analysis.studies import Study
 
         schema = Study.model_json_schema()
         tables = {"A study": schema, **schema.get("$defs", {})}
@@ -106,16 +105,16 @@ class CommandLine(SphinxDirective):
     option_spec = {"program": directives.unchanged}
 
     def run(self):
-        from analysis.cli.main import app
+        from nlctl.analysis.cli.main import app
 
         program = typer.main.get_command(app)
-        context = click.Context(program, info_name="nlctl")
+        context = typer.Context(program, info_name="nlctl")
         lines = []
         for name in program.list_commands(context):
             command = program.get_command(context, name)
             if command.hidden:
                 continue
-            inner = click.Context(command, info_name=name, parent=context)
+            inner = typer.Context(command, info_name=name, parent=context)
             usage = " ".join(command.collect_usage_pieces(inner))
             lines += [name, "-" * len(name), "", "::", "", f"    nlctl {name} {usage}", ""]
             lines += [_text(part) + "\n" for part in (command.help or "").split("\n\n")]

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
-from analysis.paper import expectations
+from nlctl.analysis.paper import expectations
 
 t = np.linspace(0, 20, 20_001)
 figure, axes = plt.subplots(figsize=(6, 3))

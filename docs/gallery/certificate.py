@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
-from analysis.lyapunov import certify
+from nlctl.analysis.lyapunov import certify
 
 loop = nlctl.paper.example_1(
     controller=nlctl.adaptive_neural(

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy import stats
 
-from analysis.robustness import clopper_pearson
+from nlctl.analysis.robustness import clopper_pearson
 
 n, confidence = 100, 0.95
 counts = np.arange(n + 1)

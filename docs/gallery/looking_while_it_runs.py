@@ -10,7 +10,7 @@ confidence sequence is not: over 300 studies of 200 runs it misses the true prob
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis.robustness import clopper_pearson, sequence_bounds
+from nlctl.analysis.robustness import clopper_pearson, sequence_bounds
 
 p, runs, studies, confidence = 0.2, 200, 300, 0.9
 rng = np.random.default_rng(1)

@@ -16,7 +16,7 @@ import sys
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis.robustness import clopper_pearson
+from nlctl.analysis.robustness import clopper_pearson
 
 sys.path.append("../data")
 from ainncs import CASES

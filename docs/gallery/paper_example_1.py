@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
-from analysis.paper import expectations
+from nlctl.analysis.paper import expectations
 
 loop = nlctl.paper.example_1()
 t = np.linspace(0, 20, 20_001)

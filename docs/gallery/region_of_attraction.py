@@ -10,7 +10,7 @@ interval arithmetic that :math:`\dot{V} < 0` for :math:`0.05 \leq V \leq 2.25`.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis.lyapunov import Box, prove_decrease
+from nlctl.analysis.lyapunov import Box, prove_decrease
 
 
 def V(x):

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
-from analysis.lyapunov import Box, certify, prove_decrease
+from nlctl.analysis.lyapunov import Box, certify, prove_decrease
 
 W, k, Gamma, sigma, D, P = 2.0, 1.0, 5.0, 0.2, 0.5, 0.5  # 2 k P = 1
 f = nlctl.equation(lambda x, v: 2.0 * x[0] + v)

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
-from analysis import robustness as rb
+from nlctl.analysis import robustness as rb
 
 
 @nlctl.record

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 import nlctl
-from analysis import robustness as rb
+from nlctl.analysis import robustness as rb
 
 space = rb.Space(quantities=(rb.Uncertain(name="actuator.b_r", bounds=(0.3, 2.0)),))
 moderate = rb.always(rb.in_band("u", lower=-12.0, upper=12.0))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import nlctl
-from analysis import robustness as rb
+from nlctl.analysis import robustness as rb
 
 space = rb.Space(quantities=(rb.Uncertain(name="actuator.b_r", bounds=(0.3, 0.7)),))
 small = rb.always(rb.in_band("e", lower=-0.15, upper=0.15), 10, 20)

@@ -14,8 +14,8 @@ import control as ct
 import numpy as np
 
 import nlctl
-from analysis.loop_report import loop_report
-from analysis.report import Claim, Paragraph, Section, Table, write_report
+from nlctl.analysis.loop_report import loop_report
+from nlctl.analysis.report import Claim, Paragraph, Section, Table, write_report
 
 
 def pendulum(t, x, u, params):
@@ -76,7 +76,7 @@ with tempfile.TemporaryDirectory() as folder:
 
 # %%
 # ``write_pdf(page, "report.pdf")`` prints it through an installed Chromium, with a title page where there is an
-# author or a revision. ``analysis.report.framed(made)`` shows it in a notebook.
+# author or a revision. ``nlctl.analysis.report.framed(made)`` shows it in a notebook.
 #
 # The closed loop is linear where the angle is small: there its slowest mode is :math:`e^{-2t}`.
 late = np.abs(response.outputs[0, t >= 4])
@@ -93,5 +93,5 @@ except nlctl.DiagramError as error:
     print(error)
 
 # %%
-# What more fits in: ``ledger=analysis.lyapunov.ledger(loop)``, ``study=analysis.studies.load_result("reports/arm")``,
-# and figures of your own as ``analysis.report.Figure`` with a caption and a description for those who cannot see it.
+# What more fits in: ``ledger=nlctl.analysis.lyapunov.ledger(loop)``, ``study=nlctl.analysis.studies.load_result("reports/arm")``,
+# and figures of your own as ``nlctl.analysis.report.Figure`` with a caption and a description for those who cannot see it.

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 import nlctl
-from analysis import robustness as rb
+from nlctl.analysis import robustness as rb
 
 space = rb.Space(
     quantities=(

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import lambertw
 
 import nlctl
-from analysis import lyapunov
+from nlctl.analysis import lyapunov
 
 ledger = lyapunov.ledger(nlctl.paper.example_1(), 20.0)
 for line in ledger.lines:

@@ -1,6 +1,6 @@
 """Actuators: nonlinearities of (2), v = k(u, t) u + eps_u, and others that it does not describe.
 
-Each record says whether it obeys (2), as `analysis.lyapunov.decompose` finds it: with bounds
+Each record says whether it obeys (2), as `nlctl.analysis.lyapunov.decompose` finds it: with bounds
 (k_1, k_2) of k, its ``gains``, and the least and greatest output at an input, its ``band``; or
 with the reason why not, its ``no_split``.  What breaks an assumption is here to see what a
 controller makes of it.  Friction is here as a force law, from velocity to force.

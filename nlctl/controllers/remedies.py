@@ -97,8 +97,8 @@ class MonotoneNussbaumLaw(NussbaumLaw):
         zeta' = r eta >= 0,    s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d,   zeta(0) = 1
 
     Not a remedy by itself: zeta still drifts.  But it cannot oscillate, and so cannot pump V
-    under a gain that varies with time; `analysis.lyapunov.nussbaum.energy.safe_horizon` supposes a
-    monotone zeta.
+    under a gain that varies with time; `nlctl.analysis.lyapunov.nussbaum.energy.safe_horizon`
+    supposes a monotone zeta.
 
     Examples
     --------

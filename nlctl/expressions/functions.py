@@ -31,8 +31,8 @@ class RealFunction:
         function has a jump or a kink: that of one side, the one that its value belongs to.
     enclosure : callable or None
         The same function of python-flint's ``arb``, for functions of one argument.  Without it
-        balls know only what `analysis.intervals` has operators for (absolute, minimum, maximum,
-        power), and refuse the rest.
+        balls know only what `nlctl.analysis.intervals` has operators for (absolute, minimum,
+        maximum, power), and refuse the rest.
     latex : str
         Format string with ``{0}`` and ``{1}`` for the arguments.
     math : tuple of str

@@ -7,7 +7,7 @@ import inspect
 import itertools
 from collections.abc import Callable
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,10 +24,27 @@ from .library.table import (
 )
 from .operators import elementwise
 
-if TYPE_CHECKING:
-    from .stage import Stage
-
 LIBRARIES = ("numpy", "scipy", "numba")
+
+
+class OnStage(Protocol):
+    """What stands for modules, classes and objects asks of the stage that it stands on."""
+
+    graph: Graph
+    classes: dict[type, type]
+
+    def copied(self, function: Any) -> Any:
+        """Return a copy of a function whose global names and closure lead to the stage."""
+
+    def called_object(self, thing: Any) -> Any:
+        """Return what calls a method, a `functools.partial`, or an object."""
+
+    def instead(self, value: Any) -> Any:
+        """Return what stands for a value that was there before."""
+
+    def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that takes constants, and refuses tracers."""
+        ...
 
 
 def holds_tracers(value: Any) -> bool:
@@ -73,7 +90,7 @@ class StagedModule:
 class StagedType:
     """A class of a library: what it makes of constants is an object of the library."""
 
-    def __init__(self, real: Any, stage: Stage) -> None:
+    def __init__(self, real: Any, stage: OnStage) -> None:
         self.__dict__.update(_real=real, _stage=stage)
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
@@ -99,7 +116,7 @@ class StagedObject:
     __hash__ = None  # type: ignore[assignment]
     _forwards = True
 
-    def __init__(self, real: Any, stage: Stage) -> None:
+    def __init__(self, real: Any, stage: OnStage) -> None:
         self.__dict__.update(_real=real, _stage=stage)
 
     def __getattr__(self, name: str) -> Any:
@@ -158,7 +175,7 @@ for _name in ("neg", "pos", "abs", "invert", "eq", "ne", "lt", "le", "gt", "ge",
 class StagedParent:
     """What ``super()`` is in a method of somebody's object."""
 
-    def __init__(self, thing: StagedObject, stage: Stage, cls: type) -> None:
+    def __init__(self, thing: StagedObject, stage: OnStage, cls: type) -> None:
         original = {made: real for real, made in stage.classes.items()}.get(cls, cls)
         order = type(thing.__dict__["_real"]).__mro__
         self.__dict__.update(_thing=thing, _stage=stage, _rest=order[order.index(original) + 1 :])

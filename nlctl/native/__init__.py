@@ -3,9 +3,9 @@
 `compile` reads a diagram (`diagram/`).  The blocks' functions are run once on symbols
 (`equations/`), and what they compute is planned for one member or several; one generator writes
 LLVM IR from the plan (`codegen/`), and its object code is kept on disk (`machine/`).  What cannot
-be traced is called as it stands, as numba compiles it or back in Python (`machine.called`,
-`thirdparty/`); algebraic loops are refused, or solved by Newton's method with the derivatives of
-their own expressions.
+be traced is called as it stands, as numba compiles it or back in Python (`opaque/`), if it depends
+on its arguments alone (`purity/`).  Algebraic loops are refused, or solved by Newton's method with
+the derivatives of their own expressions.
 
 `timed/` knows before a run when functions of t alone jump, `integrate/` moves batched members
 through time, each with its own steps.  `response` makes of one run what python-control returns,
@@ -13,18 +13,18 @@ through time, each with its own steps.  `response` makes of one run what python-
 """
 
 from ..errors import CompileError
+from .ahead import compile_ahead
 from .audit import AuditError
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import Ensemble, ensemble_response
-from .integrate.driver import Settings
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
-from .machine.ahead import compile_ahead
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
+from .settings import Settings
 from .typesetting import BlockEquations, typeset
 
 __all__ = [

@@ -24,18 +24,18 @@ from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
 from ..supplied import SuppliedOutput, supplying
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
-from .codegen.lower import lower
-from .codegen.program import instants_of
 from .codegen.solver import searched
 from .compiled import Compiled
 from .declared import declared_labels, declared_now, declared_rows, without_nan
 from .diagram.block_inputs import block_inputs
+from .diagram.program import instants_of
 from .diagram.schedule import Schedule, Signal, signal_name
 from .equations.blocks import equations
+from .equations.relays import relay_places
+from .lower import lower
 from .machine.evaluations import Machine, prepared_parameters
 from .machine.routine import lowered_code
 from .rounding.nudged import ROUNDINGS, nudged_values
-from .sliding.reading import relay_places
 
 _EVERY = "every run"
 _POINTS = 5  # of a trajectory, its start and end among them
@@ -99,6 +99,13 @@ class Trial:
         return thing if self.apart is None else self.apart.of(thing)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Audited:
+    """Machine code that has been compared once."""
+
+    code: Machine
+
+
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
     """Compare a run's program with python-control, if that has not been done.
 
@@ -124,10 +131,10 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         width = trial.width if ct.isctime(compiled.system) else 1
         (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
         code, c = prepared_parameters(compiled, trial.p, width, due.patterns)
-        done = compiled.__dict__.setdefault("_audited", [])
-        if wanted != _EVERY and any(known is code for known in done):
+        done = compiled.cache.of(_Audited)
+        if wanted != _EVERY and any(known.code is code for known in done):
             return
-        done.append(code)
+        done.append(_Audited(code=code))
         evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None

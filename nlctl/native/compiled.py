@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,30 +14,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
-from ..diagrams import Apart, apart, not_a_system, override
+from ..diagrams import apart, not_a_system, override
 from ..errors import CompileError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
+from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system
 from ..wording import counted
-from .codegen.lower import Lowered, lower
-from .codegen.program import Program, program
 from .describe import called, described
-from .diagram.schedule import Schedule, schedule
-from .equations.blocks import Equations, equations
+from .diagram.checks import check_sizes
+from .diagram.program import program
+from .diagram.schedule import schedule
 from .jacobians import Tangent, linear_system, parameter_jacobian, tangent
 from .machine.evaluations import evaluations
-from .parameters import packed
-from .thirdparty.captured import changed
-from .thirdparty.checks import check_sizes
+from .reading import Reading
 
-_RESOLVING = threading.Lock()
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
 Rhs = Callable[..., None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Compiled(StandIn):
+class Compiled(Reading, StandIn):
     """A diagram as machine code; made by `compile`.
 
     Attributes
@@ -51,6 +47,8 @@ class Compiled(StandIn):
         The diagram itself; none in another process.
     apart : Apart or None
         The copy of it that was read, in which runs write their parameters.
+    cache : Cache
+        What has been made of it, such as machine code.
 
     Notes
     -----
@@ -68,11 +66,6 @@ class Compiled(StandIn):
     [40.] [[-20.]]
     """
 
-    schedule: Schedule
-    program: Program
-    original: Any = None
-    apart: Apart | None = None
-
     def __reduce__(self) -> tuple[Any, ...]:
         # functions made at run time are pickled by value; machine code is found on disk again
         read = replace(self.schedule, captured=())  # modules' names stay where they are
@@ -87,7 +80,7 @@ class Compiled(StandIn):
     @property
     def system(self) -> Any:
         """The diagram that was compiled; runs write their parameters into a copy of it."""
-        return self.schedule.system if self.original is None else self.original
+        return super().system
 
     def _refused(self, *_: Any, **__: Any) -> Any:
         raise UsageError(
@@ -106,16 +99,6 @@ class Compiled(StandIn):
         code of numba, or back in Python.  Names of loops that are solved have their signals.
         """
         return "\n".join([self.lowered.text, *(f"; {line}" for line in called(self)), ""])
-
-    @cached_property
-    def lowered(self) -> Lowered:
-        """The plan of a program for one member."""
-        return lower(self.schedule, self.program, 1, self.equations)
-
-    @cached_property
-    def equations(self) -> Equations:
-        """What the blocks' functions compute as expressions."""
-        return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
 
     @cached_property
     def native(self) -> tuple[Rhs, Rhs]:
@@ -148,21 +131,7 @@ class Compiled(StandIn):
         UsageError
             If a value that a function reads from around it has changed since.
         """
-        with _RESOLVING:  # python-control keeps what it has resolved in the blocks
-            if self.apart is not None and not self.apart.refreshed():
-                raise UsageError(
-                    f"'{self.system.name}' has other blocks than when it was compiled: compile "
-                    "again"
-                )
-            other = changed(self.schedule.captured)
-            if other is not None:
-                raise UsageError(
-                    f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "
-                    f"compiled and is {_short(other.now)} now: compile again, or make it a "
-                    "parameter"
-                )
-            override(self.schedule.system, params)
-            return packed(self.schedule.holders, self.program.layout, self.program.fixed)
+        return super().parameter_vector(params)
 
     @as_annotated
     def dynamics(
@@ -227,7 +196,7 @@ class Compiled(StandIn):
         """
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 
-    @cached_property
+    @property
     def tangent(self) -> Tangent:
         """The derivatives of the equations along a direction of states, inputs and parameters."""
         return tangent(self)
@@ -426,13 +395,22 @@ def compile(  # noqa: A001 (what it does)
     return made
 
 
-def _short(value: Any) -> str:
-    """Return a value in one line."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else f"{text[:57]}..."
-
-
 def _restored(content: bytes) -> Compiled:
     """Make a compiled diagram of what `Compiled.__reduce__` has written."""
     read, arrays = pickle.loads(content)
     return Compiled(schedule=read, program=arrays)
+
+
+def with_watched(
+    compiled: Compiled, watched: tuple[Watched, ...], params: Mapping[str, Any] | None
+) -> Compiled:
+    """Return a diagram that is compiled with functions of a run."""
+    if not watched:
+        return compiled
+    if not ct.isctime(compiled.system):
+        raise ParameterError(
+            f"'{compiled.system.name}' is in discrete time, where nothing is between two samples: "
+            "stop_when and events are for diagrams in continuous time"
+        )
+    read = replace(compiled.schedule, watched=watched, overrides=dict(params or {}))
+    return replace(compiled, schedule=read)

@@ -15,8 +15,9 @@ from ..blocks import equation_now
 from ..sliding.blocks import slides
 from ..upstream.control_internals import parts_now
 from ..wording import numbered
-from .codegen.program import Program, count_guards, count_switching_functions, memory
-from .diagram.schedule import Node, Schedule
+from .diagram.nodes import Node
+from .diagram.program import Program, count_guards, count_switching_functions, memory
+from .diagram.schedule import Schedule
 
 _DECLARED = {  # the functions of a block, and how many values of each are compared
     "switching": count_switching_functions,

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
 
 from ..blocks import Block
 from ..wording import counted
-from .codegen.program import Program, count_guards, count_switching_functions, memory
-from .diagram.schedule import Node, signal_name
+from .diagram.nodes import Node
+from .diagram.parameters import Slot
+from .diagram.program import Program, count_guards, count_switching_functions, memory
+from .diagram.schedule import signal_name
 from .jacobians import inexact
-from .parameters import Slot
-
-if TYPE_CHECKING:
-    from .compiled import Compiled
+from .machine.evaluations import Machine
+from .reading import Reading
 
 USE = (
     "nlctl.input_output_response, nlctl.ensemble_response, .linearize(x0, u0); "
@@ -26,14 +26,14 @@ SLOW = "called back in Python, no faster than python-control until that is writt
 _SHOWN = 8  # names that are listed before the rest is only counted
 
 
-def described(compiled: Compiled) -> str:
+def described(reading: Reading) -> str:
     """Return what was compiled, block by block in the order of evaluation.
 
     Parameters
     ----------
-    compiled : Compiled
+    reading : Reading
     """
-    schedule, program, p = compiled.schedule, compiled.program, compiled.parameter_vector()
+    schedule, program, p = reading.schedule, reading.program, reading.parameter_vector()
     system, nodes = schedule.system, schedule.nodes
     lines = [
         f"Compiled '{system.name}', {_timebase(system)}: {counted(len(nodes), 'block')}, "
@@ -43,49 +43,47 @@ def described(compiled: Compiled) -> str:
         f"  run it by    {USE}",
     ]
     if ct.isctime(system) and system.nstates:
-        why = inexact(compiled)
+        why = inexact(reading)
         how = "exact" if why is None else f"exact, with differences where {why}"
         lines.append(f"  Jacobian     {how}")
-    lines += [f"  conditions   {line}" for line in _conditions(compiled)]
+    lines += [f"  conditions   {line}" for line in _conditions(reading)]
     for loop in schedule.loops:
         torn = ", ".join(signal_name(nodes, s) for s in loop.torn)
         lines.append(f"  solved for   {torn}")
-    lines += [f"  as it stands {line}" for line in called(compiled)]
+    lines += [f"  as it stands {line}" for line in called(reading)]
     for i in dict.fromkeys(schedule.order):
         lines += [f"  {nodes[i].path}: {_kind(nodes[i])}"]
         lines += [
             f"    {name:<12} {text}" for name, text in _facts(i, nodes[i], program, p) if text
         ]
-        own = [
-            each for each in compiled.equations.conditions.located if each.block == nodes[i].path
-        ]
+        own = [each for each in reading.equations.conditions.located if each.block == nodes[i].path]
         if own:
             lines.append(f"    {'conditions':<12} {sum(each.rows for each in own)}")
     return "\n".join(lines)
 
 
-def called(compiled: Compiled) -> Iterator[str]:
+def called(reading: Reading) -> Iterator[str]:
     """Yield which functions are called as they stand, how, and why: a line each.
 
     Which of the two ways it is, is known as soon as machine code has been made.
     """
-    made = compiled.__dict__.get("_machines", ())
+    made = reading.cache.of(Machine)
     back = {name for each in made for name in each.called_back}
-    for name, call in compiled.equations.calls.items():
+    for name, call in reading.equations.calls.items():
         how = SLOW if name in back else "in machine code of numba"
         how = how if made else "as it stands"
         yield f"{call.kind} of block '{call.block}', {how}: {call.reason}"
 
 
-def _conditions(compiled: Compiled) -> Iterator[str]:
+def _conditions(reading: Reading) -> Iterator[str]:
     """Yield how many conditions of the equations are located, and what may hide others."""
-    found = compiled.equations.conditions
+    found = reading.equations.conditions
     parts = [f"{found.rows} located"] if found.rows else []
     parts += [f"{len(found.of_time)} of t alone, solved before a run"] if found.of_time else []
     parts += [f"{found.beyond} too many to be located"] if found.beyond else []
     if parts:
         yield ", ".join(parts)
-    if compiled.equations.calls:
+    if reading.equations.calls:
         yield "none known of functions that are called as they stand: steps may pass over theirs"
 
 

@@ -21,34 +21,28 @@ from ..names import unknown
 from ..params import checked_times, integer
 from ..responses.arguments import checked_params, input_array
 from ..wording import counted
+from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .histories import variations
-from .integrate.driver import (
-    Run,
-    Settings,
-    begin,
-    finish,
-    prepared,
-    trajectory,
-    watched,
-)
+from .integrate.driver import begin, finish, prepared, trajectory, watched
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Trajectory, made
 from .integrate.state import RUNNING, STIFF, Status
-from .machine.ahead import compile_for
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
+from .run import Run
+from .settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 class MetricLike(Protocol):
-    """What an ensemble asks of a metric; see `analysis.metrics.Metric`."""
+    """What an ensemble asks of a metric; see `nlctl.analysis.metrics.Metric`."""
 
     @property
     def key(self) -> str: ...
@@ -149,8 +143,8 @@ def ensemble_response(
     initial_state, params : mapping, optional
         ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
     metrics : sequence, optional
-        Numbers to take of each member, such as `analysis.metrics.Metric`.  A function that was
-        compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
+        Numbers to take of each member, such as `nlctl.analysis.metrics.Metric`.  A function that
+        was compiled with ``numba.njit(nogil=True)`` keeps no thread waiting.
     keep : sequence of str, optional
         Outputs whose samples are kept.
     threads : int, optional
@@ -206,7 +200,8 @@ def ensemble_response(
     for metric in metrics:
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(
-                f"ensemble_response needs metrics such as analysis.metrics.Metric, got {metric!r}"
+                "ensemble_response needs metrics such as nlctl.analysis.metrics.Metric, "
+                f"got {metric!r}"
             )
     states = {} if initial_state is None else initial_state
     every = members(compiled, checked_params(params) or {}, states)

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..responses.event_log import EventLog
 from ..wording import numbered
-from .codegen.program import count_guards, count_switching_functions
 from .compiled import Compiled
+from .diagram.program import count_guards, count_switching_functions
 from .integrate.log import OF_TIME, log_room
-from .integrate.memory import grown, replaced
+from .integrate.memory import grown, with_fields
 
 _WORDS = {
     "lt": "comparison", "le": "comparison", "gt": "comparison", "ge": "comparison",
@@ -34,7 +34,7 @@ def with_log(task: Any, work: Any) -> Any:
     if not least or free >= least:
         return work
     room = 2 * work.log.t.size + 2 * least
-    return replaced(work, log=grown(work.log, ("t", "row"), room))
+    return with_fields(work, log=grown(work.log, ("t", "row"), room))
 
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:

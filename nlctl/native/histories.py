@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..delays.pieces import smooth_pieces
 from ..delays.variation import Variation, check_positive, variation, variation_table
 from ..errors import ParameterError
-from .integrate.delayed import Lines
+from .diagram.schedule import Schedule
+from .integrate.delayed import DelayLines
 from .integrate.delays import SMOOTH
-from .integrate.memory import grown, replaced, with_table
-
-if TYPE_CHECKING:
-    from .compiled import Compiled
-    from .diagram.schedule import Schedule
+from .integrate.memory import grown, with_fields, with_table
+from .reading import Reading
 
 _ROOM = 256  # steps that are kept at first
 _KEPT = ("powers", "t", "h", "level")
 
 
-def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
+def variations(reading: Reading, times: np.ndarray) -> list[Variation | None]:
     """Return how the delay of each line varies during runs over these times."""
-    read, (begin, end) = compiled.schedule, (float(times[0]), float(times[-1]))
+    read, (begin, end) = reading.schedule, (float(times[0]), float(times[-1]))
     blocks = [line.block or 0 for line in read.lines]
     nodes = {i: read.nodes[i] for i in blocks}
     made = {i: variation(n.system.current_spec, begin, end, n.path) for i, n in nodes.items()}
@@ -32,30 +30,30 @@ def variations(compiled: Compiled, times: np.ndarray) -> list[Variation | None]:
 
 
 def lines_of(
-    compiled: Compiled, p: np.ndarray, varied: list[Variation | None], signals: np.ndarray
-) -> Lines:
+    reading: Reading, p: np.ndarray, varied: list[Variation | None], signals: np.ndarray
+) -> DelayLines:
     """Return the delays of all lines, how they vary, what acts on what, and where signals are."""
-    read = compiled.schedule
+    read = reading.schedule
     delays = np.zeros((len(read.lines), p.shape[1]))
     for row, line in enumerate(read.lines):
-        delays[row] = p[compiled.program.layout[line.block or 0]["delay"].offset]
+        delays[row] = p[reading.program.layout[line.block or 0]["delay"].offset]
         check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
     return with_table(
-        Lines, delays=delays, direct=direct_lines(read).astype(np.int64), signals=signals,
+        DelayLines, delays=delays, direct=direct_lines(read).astype(np.int64), signals=signals,
         **variation_table(varied),
     )  # fmt: skip
 
 
-def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
+def with_past(reading: Reading, task: Any, work: Any, p: np.ndarray) -> Any:
     """Return the workspace of a run that begins with what signals were before it."""
     lines, lanes = task.lines.delays.shape
     if not lines:
         return work
     begin = float(task.times[0])
-    nodes, read = compiled.schedule.nodes, compiled.schedule.lines
+    nodes, read = reading.schedule.nodes, reading.schedule.lines
     specs = [nodes[line.block or 0].system.current_spec for line in read]
     reach = task.lines.delays + np.array([[spec.varied(begin)] for spec in specs])
-    before = _before(compiled)
+    before = _before(reading)
     earliest = begin - reach.max(axis=1)
     told = [row for row, spec in enumerate(specs) if spec.history is not None]
 
@@ -66,7 +64,7 @@ def with_past(compiled: Compiled, task: Any, work: Any, p: np.ndarray) -> Any:
     work = _with_places(work, max(_ROOM, 2 * len(found)))
     work.past.level[: len(found)] = SMOOTH
     for row, line in enumerate(read):
-        slot = compiled.program.layout[line.block or 0]["before"]
+        slot = reading.program.layout[line.block or 0]["before"]
         work.past.powers[: len(found), row, 0] = p[slot.offset]
     for k, piece in enumerate(found):
         work.past.t[k], work.past.h[k] = piece.start, piece.length
@@ -110,7 +108,7 @@ def with_room(task: Any, work: Any) -> Any:
 
 def _with_places(work: Any, room: int) -> Any:
     """Return the workspace with places for so many steps."""
-    return replaced(work, past=grown(work.past, _KEPT, room))
+    return with_fields(work, past=grown(work.past, _KEPT, room))
 
 
 def direct_lines(read: Schedule) -> np.ndarray:
@@ -140,10 +138,10 @@ def direct_lines(read: Schedule) -> np.ndarray:
 # -- before the run --------------------------------------------------------------------------------
 
 
-def _before(compiled: Compiled) -> Callable[[float, np.ndarray], np.ndarray]:
+def _before(reading: Reading) -> Callable[[float, np.ndarray], np.ndarray]:
     """Return the signals of all lines at a time, no earlier than their delays reach back to."""
-    nodes = compiled.schedule.nodes
-    blocks = {line.block or 0: None for line in compiled.schedule.lines}
+    nodes = reading.schedule.nodes
+    blocks = {line.block or 0: None for line in reading.schedule.lines}
 
     def values(t: float, earliest: np.ndarray) -> np.ndarray:
         found, row = [], 0

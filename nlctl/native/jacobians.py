@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -31,15 +31,13 @@ from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
 from ..wording import counted
-from .codegen.calls import Call
-from .codegen.lower import DIRECTION
 from .codegen.solver import searched
+from .diagram.nodes import Node
+from .diagram.parameters import length
 from .equations.blocks import Equations
-from .parameters import length
-
-if TYPE_CHECKING:
-    from .compiled import Compiled
-    from .diagram.schedule import Node
+from .lower import DIRECTION
+from .opaque.calls import Call
+from .reading import Reading
 
 _NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
@@ -63,12 +61,12 @@ class Tangent:
     assumed: Mapping[int, int]
 
 
-def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
+def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
     """Return what derivatives of a diagram's results are taken by differences of, and why.
 
     None if all are exact.
     """
-    found = compiled.equations
+    found = reading.equations
     parts = [expr for name in results for expr, _ in found.pieces(name)]
     names = dict.fromkeys(node.data[0] for node in needed(parts) if node.op == "call")
     used = [found.calls[name] for name in names]
@@ -77,29 +75,36 @@ def inexact(compiled: Compiled, results: Sequence[str] = ("dx",)) -> str | None:
     return ", and ".join(told) or None
 
 
-def tangent(compiled: Compiled) -> Tangent:
-    """Differentiate a diagram's equations by states, inputs and parameters.
+def tangent(reading: Reading) -> Tangent:
+    """Return a diagram's equations differentiated by states, inputs and parameters.
 
     Raises
     ------
     CompileError
         If there are transport delays, or ideal relays slide as inputs' rates say.
     """
-    found = compiled.equations
-    if compiled.schedule.lines:
-        delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(compiled.system))
+    known = reading.cache.of(Tangent)
+    if not known:
+        known.append(_tangent(reading))
+    return known[0]
+
+
+def _tangent(reading: Reading) -> Tangent:
+    found = reading.equations
+    if reading.schedule.lines:
+        delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(reading.system))
         raise CompileError(
-            f"'{compiled.system.name}' has the transport delays {delays}, and so no finite state: "
+            f"'{reading.system.name}' has the transport delays {delays}, and so no finite state: "
             "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "
             "nlctl.sampled(gain, dt, delay=...), which is exact"
         )
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
-    n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
+    n, m = reading.system.nstates or 0, reading.schedule.ninputs
     parts = needed([expr for name in names for expr, _ in found.pieces(name)])
-    rates = range(m - compiled.schedule.rates, m)
+    rates = range(m - reading.schedule.rates, m)
     if any(e.op == "leaf" and e.data[0] == "u" and e.data[1] in rates for e in parts):
         raise CompileError(
-            f"'{compiled.system.name}' has no linearization by its inputs: an ideal relay slides "
+            f"'{reading.system.name}' has no linearization by its inputs: an ideal relay slides "
             "as their rates say, too; put a lag before those that it sees"
         )
     starts = {"x": 0, "u": n, "p": n + m}
@@ -151,7 +156,7 @@ def along(
 
 
 def jacobian(
-    compiled: Compiled, x0: Any, u0: Any, t: float, params: Any, directions: np.ndarray
+    reading: Reading, x0: Any, u0: Any, t: float, params: Any, directions: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the derivatives of the right-hand side and of the outputs along directions.
 
@@ -165,19 +170,19 @@ def jacobian(
         ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k), and of next states of
         sampled blocks ``"sample0"`` and so on.
     """
-    system, made, t = compiled.system, compiled.tangent, number("linearize", "t", t)
-    p = compiled.parameter_vector(params)
+    system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
+    p = reading.parameter_vector(params)
     for place, value in made.assumed.items():
         if p[place] != value:
             raise UsageError(
                 f"the equations of '{system.name}' were differentiated for an integer parameter "
                 f"of {value}, which is {p[place]:g} now: compile again with params={{...}}"
             )
-    u = np.append(_inputs(system, u0), np.zeros(compiled.schedule.rates))  # they stand still
+    u = np.append(_inputs(system, u0), np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
-    searches = searches_of(compiled.equations)
+    searches = searches_of(reading.equations)
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
         wanted = [e for e, _ in rows if e is not None]
@@ -214,7 +219,7 @@ def _inputs(system: Any, u0: Any) -> np.ndarray:
 
 
 def linear_system(
-    compiled: Compiled,
+    reading: Reading,
     x0: Any,
     u0: Any,
     t: float,
@@ -230,19 +235,19 @@ def linear_system(
             raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
     if isinstance(x0, ct.OperatingPoint):
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
-    system = compiled.system
-    n, m, given = system.nstates or 0, system.ninputs or 0, compiled.schedule.ninputs
+    system = reading.system
+    n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
     if n == 1 and m == 0:
         raise UsageError(
             f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
             "give the diagram an input"
         )
-    _tell_of_differences(compiled)
-    directions = np.eye(n + given + length(compiled.program.layout), n + m)
-    found = jacobian(compiled, x0, u0, t, params, directions)
+    _tell_of_differences(reading)
+    directions = np.eye(n + given + length(reading.program.layout), n + m)
+    found = jacobian(reading, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt
-    if compiled.program.sampled:
-        rates, outputs, dt = over_a_period(compiled, found)
+    if reading.program.sampled:
+        rates, outputs, dt = over_a_period(reading, found)
     own = {
         "name": f"{system.name}$linearized",
         "inputs": system.input_labels,
@@ -255,20 +260,20 @@ def linear_system(
     )  # fmt: skip
 
 
-def _tell_of_differences(compiled: Compiled) -> None:
+def _tell_of_differences(reading: Reading) -> None:
     """Warn of derivatives that are not exact."""
-    names = ("dx", "y", *(r for r in compiled.equations.results if r.startswith("sample")))
-    why = inexact(compiled, names)
+    names = ("dx", "y", *(r for r in reading.equations.results if r.startswith("sample")))
+    why = inexact(reading, names)
     if why is not None:
         warnings.warn(
-            f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "
+            f"derivatives of '{reading.system.name}' are differences where {why}, and exact "
             "elsewhere",
             InexactWarning,
             stacklevel=4,
         )
 
 
-def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
+def over_a_period(reading: Reading, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
     """Return the map of a diagram with sampled blocks from period to period, exactly.
 
     States are taken before what happens at the beginning of a period, outputs after it; inputs
@@ -281,13 +286,13 @@ def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[
         Common period of the clocks (s).
     """
     n, width = found["dx"].shape
-    meetings = compiled.program.meetings
-    clocks = clocks_of(node.sampled for node in compiled.schedule.nodes)
+    meetings = reading.program.meetings
+    clocks = clocks_of(node.sampled for node in reading.schedule.nodes)
     begin, end, period = common_period(tuple(clocks.values()))
     due = instants(clocks, begin, end, meetings)
     if len(due.patterns) > len(meetings):
         raise UsageError(
-            f"clocks of '{compiled.system.name}' meet otherwise than when it was compiled: compile "
+            f"clocks of '{reading.system.name}' meet otherwise than when it was compiled: compile "
             "it again with these sampling times"
         )
     flow = np.zeros((width, width))
@@ -296,7 +301,7 @@ def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[
     gaps = np.diff(np.r_[begin, due.times, end])
     total = expm(flow * gaps[0]) @ total
     for k, (which, gap) in enumerate(zip(due.which, gaps[1:], strict=True)):
-        step = _sampled_map(compiled, found, int(which), width)
+        step = _sampled_map(reading, found, int(which), width)
         if k == 0 and gaps[0] == 0.0:
             shown = shown @ step
         total = expm(flow * gap) @ step @ total
@@ -304,19 +309,19 @@ def over_a_period(compiled: Compiled, found: Mapping[str, np.ndarray]) -> tuple[
 
 
 def _sampled_map(
-    compiled: Compiled, found: Mapping[str, np.ndarray], which: int, width: int
+    reading: Reading, found: Mapping[str, np.ndarray], which: int, width: int
 ) -> np.ndarray:
     """Return what an instant does to states and inputs."""
     step, at = np.eye(width), 0
-    for row, array in compiled.equations.results[f"sample{which}"]:
-        places = list(compiled.program.sampled[row : row + array.size])
+    for row, array in reading.equations.results[f"sample{which}"]:
+        places = list(reading.program.sampled[row : row + array.size])
         step[places] = found[f"sample{which}"][at : at + array.size]
         at += array.size
     return step
 
 
 def parameter_jacobian(
-    compiled: Compiled,
+    reading: Reading,
     parameters: Sequence[str],
     x0: Any,
     u0: Any = None,
@@ -324,33 +329,33 @@ def parameter_jacobian(
     params: Any = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
-    system = compiled.system
-    places = float_parameters(compiled)
-    _tell_of_differences(compiled)
-    compiled.parameter_vector(params)  # blocks have the run's parameters then
-    start = (system.nstates or 0) + compiled.schedule.ninputs
-    directions = np.zeros((start + length(compiled.program.layout), len(parameters)))
+    system = reading.system
+    places = float_parameters(reading)
+    _tell_of_differences(reading)
+    reading.parameter_vector(params)  # blocks have the run's parameters then
+    start = (system.nstates or 0) + reading.schedule.ninputs
+    directions = np.zeros((start + length(reading.program.layout), len(parameters)))
     for k, name in enumerate(parameters):
         if name not in places:
             raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
         place, owner = places[name]
         check_enters_alone(owner, name)
         directions[start + place, k] = 1.0
-    found = jacobian(compiled, x0, u0, t, params, directions)
+    found = jacobian(reading, x0, u0, t, params, directions)
     return found["dx"], found["y"]
 
 
-def float_parameters(compiled: Compiled) -> dict[str, tuple[int, Node]]:
+def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
     """Return the parameters that can be differentiated by: place in `p`, and whose they are.
 
     Entries of arrays have their index in their names.
     """
     found = {}
-    for i, own in compiled.program.layout.items():
+    for i, own in reading.program.layout.items():
         for slot in own.values():
             for k in range(slot.size if slot.kind == "f" else 0):
                 name = f"{slot.name}[{k}]" if slot.shape else slot.name
-                found[name] = slot.offset + k, compiled.schedule.holders[i]
+                found[name] = slot.offset + k, reading.schedule.holders[i]
     return found
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from ..errors import CompileError, UsageError
 from ..reference.known import Known
+from ..responses.watched import Watched
 from . import compiled as engine
-from .compiled import Compiled
+from .compiled import Compiled, with_watched
 from .diagram.schedule import AlgebraicLoopError
 from .happened import row_labels
 from .machine.evaluations import prepared_parameters
@@ -20,7 +21,9 @@ from .machine.routine import Routine
 from .timed.ahead import ahead
 
 
-def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
+def known_conditions(
+    system: Any, params: Any, times: np.ndarray, watched: tuple[Watched, ...] = ()
+) -> Known:
     """Return what is known of the conditions of a diagram; nothing where it cannot be read.
 
     Parameters
@@ -30,18 +33,20 @@ def known_conditions(system: Any, params: Any, times: np.ndarray) -> Known:
         Overrides of the run.
     times : ndarray
         Of the run (s).
+    watched : tuple of Watched, optional
+        Functions of the run, whose own conditions are some too.
     """
     if not ct.isctime(system):
         return Known()
     try:
-        compiled = engine.compile(system, params=params)
+        compiled = with_watched(engine.compile(system, params=params), watched, params)
         p = compiled.parameter_vector(params)
         lowered = compiled.lowered
     except (CompileError, AlgebraicLoopError, UsageError):
-        return Known()
-    found = {k: v[0] for k, v in ahead(lowered, p[:, None], times, np.inf).items()}
+        return known_conditions(system, params, times) if watched else Known()
+    found = {k: v[0] for k, v in ahead(lowered.timed, p[:, None], times, np.inf).items()}
     jumps = found["jumps"][np.isfinite(found["jumps"])]
-    located = lowered.conditions.rows
+    located = lowered.conditions.rows - len(watched)  # these the run watches itself
     if not located:
         return Known(stops=jumps, longest=_longest(found, times))
     first = compiled.program.switching

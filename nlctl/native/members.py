@@ -16,7 +16,7 @@ from ..errors import ParameterError, UsageError
 from ..names import Parameters, base_name, find_name
 from ..params import as_numbers, equation_arguments, with_overrides
 from .compiled import Compiled
-from .parameters import Slot, filled
+from .diagram.parameters import Slot, filled
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,7 +6,7 @@ Machine code has NaN where Python raises.  Who reads the message wants the error
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -14,10 +14,8 @@ from scipy.integrate import solve_ivp
 
 from ..diagrams import overridden
 from ..upstream.control_internals import outputs_now, rates_now
-
-if TYPE_CHECKING:
-    from .compiled import Compiled
-    from .integrate.results import Trajectory
+from .integrate.results import Trajectory
+from .reading import Reading
 
 _FURTHER = 1e-3  # part of the run behind its end that is looked at
 _CALLS = 2000  # of the functions, beyond which no error is expected
@@ -28,24 +26,24 @@ class _Enough(BaseException):
 
 
 def own_error(
-    compiled: Compiled, made: Trajectory, params: Mapping[str, Any] | None
+    reading: Reading, made: Trajectory, params: Mapping[str, Any] | None
 ) -> Exception | None:
     """Return what python-control's functions raise just behind the end of a run, if they do.
 
     Parameters
     ----------
-    compiled : Compiled
+    reading : Reading
     made : Trajectory
         It ended before its last time.
     params : mapping or None
         Parameters of the run.
     """
     finite = np.flatnonzero(np.isfinite(made.states).all(axis=0))
-    if compiled.schedule.lines or compiled.program.sampled or compiled.schedule.loops:
+    if reading.schedule.lines or reading.program.sampled or reading.schedule.loops:
         return None  # what these do depends on more than the present
-    if not finite.size or not ct.isctime(compiled.system):
+    if not finite.size or not ct.isctime(reading.system):
         return None
-    system = overridden(compiled.schedule.system, params)
+    system = overridden(reading.schedule.system, params)
     k, left = finite[-1], [_CALLS]
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:

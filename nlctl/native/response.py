@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -17,11 +16,12 @@ from ..responses.watched import Watched, check_numbers, nan_watchers, not_a_numb
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
-from .compiled import Compiled
-from .integrate.driver import Settings, trajectory
+from .compiled import Compiled, with_watched
+from .integrate.driver import trajectory
 from .integrate.results import Statistics, Trajectory
 from .integrate.state import Status
 from .own_errors import own_error
+from .settings import Settings
 
 
 def respond(
@@ -60,7 +60,7 @@ def respond(
         If an argument has a wrong shape, or times do not fit a discrete-time diagram.
     """
     system = compiled.system
-    compiled = _with_watched(compiled, (*watched, *nan_watchers(watched)), params)
+    compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
     wanted = evaluation_array(evaluation_times, times)
     u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
     grid = times if wanted is times else _grid(system, times, wanted)
@@ -86,21 +86,6 @@ def respond(
     shown[-1:] |= ended
     message = None if failed is None else str(failed)
     return _response(compiled, made, np.flatnonzero(shown), (params, form, message))
-
-
-def _with_watched(
-    compiled: Compiled, watched: tuple[Watched, ...], params: Mapping[str, Any] | None
-) -> Compiled:
-    """Return a diagram that is compiled with functions of a run."""
-    if not watched:
-        return compiled
-    if not ct.isctime(compiled.system):
-        raise ParameterError(
-            f"'{compiled.system.name}' is in discrete time, where nothing is between two samples: "
-            "stop_when and events are for diagrams in continuous time"
-        )
-    read = replace(compiled.schedule, watched=watched, overrides=dict(params or {}))
-    return replace(compiled, schedule=read)
 
 
 def _error(

@@ -1,15 +1,27 @@
-"""What python-control is told of its integrator, in machine code: taken, or refused by name."""
+"""How a run is integrated; what python-control is told of its integrator, taken or refused."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from numbers import Real
 from typing import Any
+
+import numpy as np
 
 from ..errors import ParameterError
 from ..names import unknown
-from .integrate.driver import Settings
+from .integrate.methods import EXPLICIT_PAIRS
 from .integrate.methods.tableau import Tableau
+from .integrate.methods.tsit5 import TSIT5
+from .integrate.state import AUTO, EXPLICIT, IMPLICIT, TAYLOR
 
+METHODS = {
+    "auto": AUTO,
+    **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT),
+    "rodas5p": IMPLICIT,
+    "taylor": TAYLOR,
+}
 _STIFF = "method='rodas5p' is its stiff method"
 _EXPLICIT = "method='tsit5' is its explicit Runge-Kutta pair of orders 5(4)"
 _METHODS = {  # of `scipy.integrate.solve_ivp` -> what comes nearest
@@ -28,6 +40,60 @@ _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
     "args": "params= are the parameters",
     **dict.fromkeys(("jac", "jac_sparsity", "lband", "uband"), JACOBIAN),
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a run is integrated.
+
+    Attributes
+    ----------
+    rtol, atol : float
+        Tolerances; the error of a step is weighed with atol + rtol |x|.
+    max_steps : int
+        Attempted steps after which a run ends as STEP_LIMIT.
+    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
+        Explicit pair of orders 5(4); stiff method of orders 5(4); Taylor's method, of an order
+        that follows from rtol, for equations that can be written as expressions and have no
+        memories; whichever is faster; an explicit pair of your own as its tableau.
+    step : float
+        Fixed step (s) instead of error control; 0 for error control.
+    max_step : float
+        Longest step (s), under error control too.
+    """
+
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    max_steps: int = 10_000_000_000
+    method: str | Tableau = "auto"
+    step: float = 0.0
+    max_step: float = np.inf
+
+    @property
+    def pair(self) -> Tableau:
+        """The explicit pair that is used, alone or in turn with the stiff method."""
+        return (
+            self.method
+            if isinstance(self.method, Tableau)
+            else EXPLICIT_PAIRS.get(self.method, TSIT5)
+        )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.method, Tableau) and self.method not in METHODS:
+            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
+        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
+            if not isinstance(getattr(self, name), Real):
+                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
+        for name, most in (("rtol", 1), ("atol", np.inf)):
+            if not 0 < getattr(self, name) < most:
+                rule = "> 0 and < 1" if most == 1 else "> 0"
+                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
+        if not 0 <= self.step < np.inf:
+            raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
+        if not self.max_step > 0:
+            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
+        if self.max_steps < 1:
+            raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
 
 
 def solver_settings(

@@ -18,8 +18,8 @@ import llvmlite.binding as llvm
 import numba
 
 from ..host.files import replace_file
+from .integrators import HERE, SHIPPED, WANTED, sources_key
 from .machine.export import exported
-from .machine.integrators import HERE, SHIPPED, WANTED, sources_key
 
 
 def ship(path: Path = SHIPPED) -> None:

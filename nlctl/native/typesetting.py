@@ -26,9 +26,10 @@ from ..expressions.latex import Index, LatexWriter, index_text, number_text, sym
 from ..params import declared_params
 from ..sliding.blocks import slides
 from .diagram.feedthrough import feedthrough
-from .diagram.schedule import Node, Schedule, Signal, schedule
+from .diagram.nodes import Node
+from .diagram.parameters import Slot, slots_of
+from .diagram.schedule import Schedule, Signal, schedule
 from .equations.reader import Reader
-from .parameters import Slot, slots_of
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
 _RATE = ("a", "b")  # of the rate a + b v of an ideal relay's input

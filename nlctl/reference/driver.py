@@ -104,8 +104,12 @@ class Driver:
                 )
                 self.known.step = (t, stop)
                 resumes = self.jumps.committed(t, x) if t >= end and what else None
+                left = self.jumps.watched_at(min(t, self._last), x) if t > begin else None
                 x, sides = self.jumps.at(t, x, what, sides)
-                self._record(t, x)
+                self._note_jumps(t, x, left)
+                self._record(t, x, ends=self._ended)
+                if self._ended:
+                    return
                 if t >= end:
                     if resumes is not None:  # a run that resumes there takes the sample
                         self.rows[-1] = (*self.rows[-1][:2], resumes)
@@ -242,6 +246,14 @@ class Driver:
         changed = rows[(seen[rows] != 0.0) & (seen[rows] * after[rows] <= 0.0)]
         for i in changed.tolist():
             self._note_change(i, event.time, bool(after[i] > seen[i]), x)
+
+    def _note_jumps(self, t: float, x: np.ndarray, left: np.ndarray | None) -> None:
+        """Note the functions that the run watches whose signs have jumped at an instant."""
+        if left is None or not left.size:
+            return
+        right, first = self.jumps.watched_at(t, x), sum(self.jumps.kinds) - left.size
+        for k in np.flatnonzero(left * right < 0.0).tolist():
+            self._note_change(first + k, t, bool(right[k] > 0.0), x)
 
     def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
         """Note a change of sign, whether it ends the run, and whether there is an end of them."""

@@ -56,7 +56,7 @@ def python_control_response(
     ----------
     run : RunArguments
     known : callable, optional
-        ``known(system, params, times)``: what is known of the conditions of its equations.
+        ``known(system, params, times, watched)``: what is known of the conditions of its equations.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     """Run a diagram in continuous time."""
     system, times, (inputs, x0, wanted), (method, settings) = run.system, run.times, given, how
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
-    conditions = Known() if known is None else known(system, run.params, times)
+    conditions = Known() if known is None else known(system, run.params, times, run.watched)
     past = Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"]))
     jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})), past.leaving)
     grid = times if wanted is None else np.union1d(times, wanted)

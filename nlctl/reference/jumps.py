@@ -99,11 +99,15 @@ class Jumps:
         if self.crossings is not None:
             given = np.concatenate([u, self._leaving(t)])
             seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
-        if self.watched:
-            seen.append(np.array([one.value(t, x, u, self._overrides) for one in self.watched]))
+        seen.append(self.watched_at(t, x))
         if self.labels is None:
             self._label(found, sum(row.size for row in seen))
         return np.concatenate([*seen, *(row for _, row in found["commit"])])
+
+    def watched_at(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return the functions that the run watches."""
+        u = self.inputs(t) if self.watched else _NOTHING
+        return np.array([one.value(t, x, u, self._overrides) for one in self.watched])
 
     def _label(self, found: Mapping[str, Sequence[tuple[str, np.ndarray]]], signed: int) -> None:
         """Say whose is what `look` returns; its first `signed` rows change their signs."""

@@ -18,6 +18,7 @@ __all__ = [
     "nan_watchers",
     "not_a_number",
     "watched_functions",
+    "watches_nan",
 ]  # fmt: skip
 
 STOP = "stop_when"
@@ -151,6 +152,11 @@ def nan_watchers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
     )
 
 
+def watches_nan(name: str) -> bool:
+    """Whether a function of that name is one of `nan_watchers`."""
+    return name.endswith(_IS_NAN)
+
+
 def not_a_number(happened: Iterable[tuple[float, str, str, str]]) -> DivergedError | None:
     """Return the error of a run that one of the `numbers` has ended, None if none has.
 
@@ -160,7 +166,7 @@ def not_a_number(happened: Iterable[tuple[float, str, str, str]]) -> DivergedErr
         Its events.
     """
     for time, block, which, _ in happened:
-        if not block and which.endswith(_IS_NAN):
+        if not block and watches_nan(which):
             return nan_error(which.removesuffix(_IS_NAN), time)
     return None
 

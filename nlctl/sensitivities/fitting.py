@@ -15,7 +15,7 @@ from ..arguments import number
 from ..errors import DivergedError, ParameterError
 from ..native import Compiled
 from ..native import compile as compile_diagram
-from ..native.thirdparty.checks import sized
+from ..native.diagram.checks import sized
 from ..params import as_numbers, checked_times
 from ..wording import counted
 from .names import varied_quantities

@@ -94,8 +94,9 @@ def metric_gradient(metric: MetricLike, response: SensitivityResponse) -> Metric
     Parameters
     ----------
     metric : Metric or Requirement
-        A metric as `nlctl.ensemble_response` takes them, such as those of `analysis.metrics`, or
-        a requirement of signal temporal logic, whose value is its margin.
+        A metric as `nlctl.ensemble_response` takes them, such as those of
+        `nlctl.analysis.metrics`, or a requirement of signal temporal logic, whose value is its
+        margin.
     response : SensitivityResponse
         With the signals that it looks at.
 
@@ -115,7 +116,7 @@ def metric_gradient(metric: MetricLike, response: SensitivityResponse) -> Metric
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.metrics import Metric, integral
+    >>> from nlctl.analysis.metrics import Metric, integral
     >>> lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
     >>> run = nlctl.sensitivity_response(lag, np.linspace(0, 8, 801), 1.0, with_respect_to="lag.T")
     >>> late = Metric(

@@ -11,7 +11,7 @@ from ..diagrams import state_names
 from ..errors import CompileError, ParameterError
 from ..names import find_name, unknown
 from ..native import Compiled
-from ..native.diagram.schedule import Signal as Output
+from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 
 __all__ = ["Observed", "VariedQuantity", "observed_signals", "varied_quantities"]

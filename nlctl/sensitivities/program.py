@@ -16,7 +16,7 @@ import numpy as np
 from ..expressions.arrays import Tracer, as_array, scalar
 from ..expressions.graph import Expr
 from ..native import Compiled
-from ..native.codegen.program import Program
+from ..native.diagram.program import Program
 from ..native.equations.blocks import Equations
 from .directions import Direction, SomeRows
 from .names import Observed, VariedQuantity

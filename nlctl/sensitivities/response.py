@@ -8,8 +8,8 @@ from typing import Any
 from ..annotations import as_annotated
 from ..arguments import tolerances
 from ..native import Compiled, Tableau, compile  # noqa: A004 (what it does)
+from ..native.diagram.checks import sized
 from ..native.settings import solver_settings
-from ..native.thirdparty.checks import sized
 from ..params import checked_times
 from ..responses.arguments import checked_params
 from .record import SensitivityResponse

@@ -15,11 +15,12 @@ from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
 from ..native.histories import variations
-from ..native.integrate.driver import Settings, begin, prepared, trajectory
+from ..native.integrate.driver import begin, prepared, trajectory
 from ..native.integrate.results import Trajectory
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
+from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
 from .missing import missing
 from .names import Observed, VariedQuantity, observed_signals, varied_quantities
@@ -92,20 +93,31 @@ def _compiled(
     settings: Settings,
 ) -> Differentiated:
     """Return a diagram that is compiled with its derivatives, made when it is first needed."""
-    known = compiled.__dict__.setdefault("_sensitivities", {})
     assumed = {i: p[i] for i in compiled.equations.graph.assumptions}
-    key = (repr(signals), repr(quantities), repr(assumed))
-    if key not in known:
-        why = inexact(compiled, tuple(compiled.equations.results))
-        if why is not None:
-            warnings.warn(
-                f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "
-                "elsewhere; jumps of such a function are not known",
-                InexactWarning,
-                stacklevel=4,
-            )
-        known[key] = with_its_derivatives(compiled, signals, quantities, p, settings)
-    return known[key]
+    key = repr((signals, quantities, assumed))
+    known = compiled.cache.of(_Kept)
+    for each in known:
+        if each.key == key:
+            return each.made
+    why = inexact(compiled, tuple(compiled.equations.results))
+    if why is not None:
+        warnings.warn(
+            f"derivatives of '{compiled.system.name}' are differences where {why}, and exact "
+            "elsewhere; jumps of such a function are not known",
+            InexactWarning,
+            stacklevel=4,
+        )
+    made = with_its_derivatives(compiled, signals, quantities, p, settings)
+    known.append(_Kept(key=key, made=made))
+    return made
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kept:
+    """What has been compiled, of what, by what and for which integers."""
+
+    key: str
+    made: Differentiated
 
 
 def _scale(quantities: Sequence[VariedQuantity], p: np.ndarray, x0: np.ndarray) -> np.ndarray:

@@ -12,8 +12,10 @@ import numpy as np
 from ..blocks import block
 from ..delays import TransportDelay
 from ..native import Compiled
-from ..native.diagram.schedule import Node, Schedule, Signal
-from ..native.parameters import Slot, length
+from ..native.diagram.nodes import Node
+from ..native.diagram.parameters import Slot, length
+from ..native.diagram.schedule import Schedule
+from ..native.diagram.wiring import Signal
 
 __all__ = ["Extended", "extended", "stand_in"]
 

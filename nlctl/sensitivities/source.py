@@ -14,11 +14,11 @@ from ..expressions.continuity import may_jump
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled
-from ..native.codegen.program import Program, count_switching_functions, memory
-from ..native.codegen.trace import traced_arguments
-from ..native.diagram.schedule import Node
+from ..native.diagram.nodes import Node
+from ..native.diagram.parameters import slots_of
+from ..native.diagram.program import Program, count_switching_functions, memory
+from ..native.diagram.trace import traced_arguments
 from ..native.equations.blocks import Equations, equations
-from ..native.parameters import slots_of
 from ..native.sliding.pieces import replaced_parts
 from ..sliding.blocks import slides
 from .branches import jumping

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.catalogue import block_records
-from analysis.lyapunov import DecompositionError, decompose, examine
 from nlctl import actuators
+from nlctl.analysis.catalogue import block_records
+from nlctl.analysis.lyapunov import DecompositionError, decompose, examine
 
 RECORDS = {
     name: kind for name, kind in block_records().items() if getattr(actuators, name, None) is kind

@@ -7,12 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov import certify
-from analysis.lyapunov.nussbaum.forecast import BurstForecast
-from analysis.metrics import Metric, absolute_integral, final, peak
-from analysis.paper import loops
-from analysis.paper.controllers import baselines, compared_controllers, sensor
-from analysis.paper.tuning import tune
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.lyapunov.nussbaum.forecast import BurstForecast
+from nlctl.analysis.metrics import Metric, absolute_integral, final, peak
+from nlctl.analysis.paper import loops
+from nlctl.analysis.paper.controllers import baselines, compared_controllers, sensor
+from nlctl.analysis.paper.tuning import tune
 from nlctl.params import equation_arguments
 
 numbers = st.floats(-50, 50)

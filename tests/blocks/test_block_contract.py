@@ -9,7 +9,7 @@ import pytest
 from rows import each_row
 
 import nlctl
-from analysis.catalogue import block_records
+from nlctl.analysis.catalogue import block_records
 from nlctl.params import declared_params, equation_arguments
 
 

@@ -1,7 +1,6 @@
 """The command line, run as a user runs it."""
 
 import multiprocessing
-import os
 import subprocess
 import sys
 import time
@@ -15,8 +14,8 @@ from command_line import nlctl, nlctl_here
 from places import ROOT
 from rows import each_row
 
-from analysis.catalogue import block_records, block_summaries
-from analysis.cli.report import _other_process
+from nlctl.analysis.catalogue import block_records, block_summaries
+from nlctl.analysis.cli.report import _other_process
 
 
 def refused(*arguments, cwd=None):
@@ -39,7 +38,7 @@ def test_help_imports_nothing_heavy():
     """Help is instant, since nothing that computes is imported for it."""
     code = (
         "import sys\n"
-        "from analysis.cli.main import main\n"
+        "from nlctl.analysis.cli.main import main\n"
         "sys.argv = ['nlctl', '--help']\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "heavy = {'control', 'numba', 'scipy', 'numpy', 'matplotlib', 'pandas'}\n"
@@ -277,18 +276,3 @@ def test_the_list_imports_no_library_of_numbers():
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True, capture_output=True)
-
-
-@pytest.mark.parametrize("name", ["analysis.py", "analysis/__init__.py"])
-def test_a_file_that_hides_the_analysis_package_is_named(name, tmp_path):
-    """A module or package of the user's own, found first: one sentence, no traceback."""
-    (tmp_path / name).parent.mkdir(exist_ok=True)
-    (tmp_path / name).write_text("", encoding="utf-8")
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    told = subprocess.run(
-        [sys.executable, "-P", "-m", "nlctl", "check", "example-1"],
-        capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": path},
-    )  # fmt: skip
-    assert told.returncode == 2
-    assert len(told.stderr.strip().splitlines()) == 1
-    assert f"'{tmp_path / name}' hides nlctl's package 'analysis'" in told.stderr

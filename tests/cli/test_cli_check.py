@@ -12,15 +12,15 @@ from command_line import nlctl_here
 from rich.console import Console
 from rows import each_row
 
-from analysis.cli.check import (
+from nlctl import paper
+from nlctl.analysis.cli.check import (
     ledger_summary,
     random_start,
     repeat_command,
     show_ledger,
     worst_lines,
 )
-from analysis.lyapunov.ledger import ledger
-from nlctl import paper
+from nlctl.analysis.lyapunov.ledger import ledger
 from nlctl.diagrams import initial_state, state_names
 from nlctl.errors import ParameterError, UnknownNameError
 

@@ -11,9 +11,9 @@ import pytest
 from command_line import nlctl, nlctl_here
 from studies_example import HEAD, write
 
-from analysis.cli.printing import in_json, printable
-from analysis.studies import read_study, run
-from analysis.studies.sealed import file_digest, read_json, write_json
+from nlctl.analysis.cli.printing import in_json, printable
+from nlctl.analysis.studies import read_study, run
+from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 from nlctl.host.files import replace_file
 
 SMALL = '[runs]\nsize = 8\n\n[[analysis]]\nkind = "probability"\nlimit = 0.9\n'
@@ -127,8 +127,8 @@ def test_few_threads_of_others_read_a_folder(done):
     """Those of pyarrow wait for ever where no memory is left to begin more."""
     script = (
         "import sys, threading, pathlib\n"
-        "from analysis.studies import load_result\n"
-        "from analysis.robustness.runs.store import read_parquet\n"
+        "from nlctl.analysis.studies import load_result\n"
+        "from nlctl.analysis.robustness.runs.store import read_parquet\n"
         "import pyarrow.parquet, pandas\n"
         "count = lambda: len(list(pathlib.Path('/proc/self/task').iterdir()))\n"
         "before = count()\n"

@@ -15,8 +15,8 @@ from command_line import NLCTL, nlctl, nlctl_here
 from places import ROOT
 from studies_example import HEAD, ROWS, write
 
-from analysis.studies import load_result, read_study
-from analysis.studies import run as run_study
+from nlctl.analysis.studies import load_result, read_study
+from nlctl.analysis.studies import run as run_study
 
 MANY = ROWS.replace("size = 200", "size = 3000")
 

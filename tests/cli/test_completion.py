@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from analysis.cli.main import app
+from nlctl.analysis.cli.main import app
 
 COMMANDS = sorted(
     c.name or c.callback.__name__.rstrip("_") for c in app.registered_commands if c.callback

@@ -4,8 +4,8 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from analysis.studies import RunFolderError, read_study, run
-from analysis.studies.folder import remove_run
+from nlctl.analysis.studies import RunFolderError, read_study, run
+from nlctl.analysis.studies.folder import remove_run
 
 pytestmark = pytest.mark.ci
 

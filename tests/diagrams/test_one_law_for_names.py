@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.robustness import Space, Uncertain, resolved
 from nlctl import AmbiguousNameError, ParameterError, UnknownNameError
+from nlctl.analysis.robustness import Space, Uncertain, resolved
 from nlctl.diagrams import leaves
 from nlctl.upstream.control_internals import current_parameters
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.robustness import Requirement, Space, Spec, Uncertain, always, in_band
-from analysis.robustness.runs.experiment import Experiment
-from analysis.studies import read_study
+from nlctl.analysis.robustness import Requirement, Space, Spec, Uncertain, always, in_band
+from nlctl.analysis.robustness.runs.experiment import Experiment
+from nlctl.analysis.studies import read_study
 from nlctl.native import Settings
 
 T = np.linspace(0.0, 1.0, 11)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov import read_parts
+from nlctl.analysis.lyapunov import read_parts
 
 TIMES = np.array([0.0, 0.1])
 

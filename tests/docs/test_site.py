@@ -13,15 +13,21 @@ from places import ROOT
 from reference import documented_names
 from rows import each_row
 
-from analysis.catalogue import block_records
-from analysis.report.browser import BROWSERS
+from nlctl.analysis.catalogue import block_records
+from nlctl.analysis.report.browser import BROWSERS
 
 DOCS = ROOT / "docs"
 GALLERY = sorted((DOCS / "gallery").glob("*.py"))
 SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
 PUBLIC = [
-    *("nlctl", "nlctl.paper", "analysis.lyapunov", "analysis.robustness", "analysis.studies"),
-    *("analysis.report", "analysis.loop_report"),
+    *(
+        "nlctl",
+        "nlctl.paper",
+        "nlctl.analysis.lyapunov",
+        "nlctl.analysis.robustness",
+        "nlctl.analysis.studies",
+    ),
+    *("nlctl.analysis.report", "nlctl.analysis.loop_report"),
 ]
 
 

@@ -17,7 +17,7 @@ import nlctl
 from nlctl.errors import UsageError
 from nlctl.expressions.functions import FUNCTIONS, MATH
 from nlctl.expressions.graph import numpy_function
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import derivatives
 from nlctl.native.integrate.state import DIRECTIONS
 
 ROWS = sorted(FUNCTIONS)

@@ -6,7 +6,7 @@ import pytest
 from scipy import special
 
 import nlctl
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import derivatives
 from nlctl.native.integrate.state import DIRECTIONS
 
 POINT, INPUT, TIME = [0.7, -0.4], [0.3], 0.2

@@ -12,9 +12,9 @@ from latex_values import values
 from test_derivatives import quiet
 
 import nlctl
-from analysis.catalogue import block_records
-from analysis.report.document import Equation
-from analysis.report.mathml import mathml
+from nlctl.analysis.catalogue import block_records
+from nlctl.analysis.report.document import Equation
+from nlctl.analysis.report.mathml import mathml
 from nlctl.errors import UsageError
 from nlctl.expressions.latex import number_text, symbol
 from nlctl.native.typesetting import _dotted

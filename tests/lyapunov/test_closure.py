@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 import nlctl
-from analysis.lyapunov import Box, constants, premises, read_parts
-from analysis.lyapunov.bounds.error_bounds import reference_bounds
-from analysis.lyapunov.bounds.final_bound import KAPPA
-from analysis.lyapunov.closure import FARTHEST, StateReach, closed_set, least_bound
+from nlctl.analysis.lyapunov import Box, constants, premises, read_parts
+from nlctl.analysis.lyapunov.bounds.error_bounds import reference_bounds
+from nlctl.analysis.lyapunov.bounds.final_bound import KAPPA
+from nlctl.analysis.lyapunov.closure import FARTHEST, StateReach, closed_set, least_bound
 from nlctl.params import equation_arguments
 
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov import Box, certify, enclose, prove_decrease
 from nlctl import ParameterError
+from nlctl.analysis.lyapunov import Box, certify, enclose, prove_decrease
 
 FUNCTIONS = {
     "sign": lambda x, y: np.sign(x) + 0.5 * np.sign(y - 1),

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.intervals.arithmetic import JUMPS, Ball, as_ball
-from analysis.intervals.branch_and_bound import Box, Undecided, enclose, prove
+from nlctl.analysis.intervals.arithmetic import JUMPS, Ball, as_ball
+from nlctl.analysis.intervals.branch_and_bound import Box, Undecided, enclose, prove
 from nlctl.errors import ParameterError, UnknownNameError
 from nlctl.expressions.functions import FUNCTIONS as TABLE
 from nlctl.expressions.graph import numpy_function

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov.bounds.decomposition import (
+from nlctl.analysis.lyapunov.bounds.decomposition import (
     Decomposition,
     DecompositionError,
     clipped_split,

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov import (
+from nlctl import DiagramError
+from nlctl.analysis.lyapunov import (
     Box,
     NussbaumIntegral,
     constants,
@@ -23,11 +24,10 @@ from analysis.lyapunov import (
     sharpest,
     signals_of,
 )
-from analysis.lyapunov.assumptions import assumptions
-from analysis.lyapunov.inequalities import terms
-from analysis.lyapunov.loop.instrumented import input_gain
-from analysis.lyapunov.loop.signals import Signals, inequality
-from nlctl import DiagramError
+from nlctl.analysis.lyapunov.assumptions import assumptions
+from nlctl.analysis.lyapunov.inequalities import terms
+from nlctl.analysis.lyapunov.loop.instrumented import input_gain
+from nlctl.analysis.lyapunov.loop.signals import Signals, inequality
 from nlctl.functions import nussbaum
 from nlctl.plants import duffing_f
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov import (
+from nlctl import ParameterError, UnknownNameError
+from nlctl.analysis.lyapunov import (
     Box,
     conservatism,
     decompose,
@@ -20,9 +21,8 @@ from analysis.lyapunov import (
     literal,
     premises,
 )
-from analysis.lyapunov.conclusions import slow_drift_of
-from analysis.lyapunov.loop.simulation import observed_loop
-from nlctl import ParameterError, UnknownNameError
+from nlctl.analysis.lyapunov.conclusions import slow_drift_of
+from nlctl.analysis.lyapunov.loop.simulation import observed_loop
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

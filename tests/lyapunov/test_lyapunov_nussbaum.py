@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from analysis.lyapunov.nussbaum.property import (
+from nlctl import ParameterError
+from nlctl.analysis.lyapunov.nussbaum.property import (
     antiderivative,
     lobe_around,
     lobes,
     nussbaum_property,
     running_means,
 )
-from nlctl import ParameterError
 from nlctl.functions import nussbaum, nussbaum_derivative
 
 

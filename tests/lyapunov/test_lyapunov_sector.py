@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.intervals.arithmetic import Ball
-from analysis.intervals.branch_and_bound import Box, Undecided
-from analysis.intervals.quotient import slope_in
-from analysis.lyapunov.bounds.sector import plant_terms, sector
+from nlctl.analysis.intervals.arithmetic import Ball
+from nlctl.analysis.intervals.branch_and_bound import Box, Undecided
+from nlctl.analysis.intervals.quotient import slope_in
+from nlctl.analysis.lyapunov.bounds.sector import plant_terms, sector
 from nlctl.errors import DiagramError, UnknownNameError
 
 QUOTIENTS = {  # q(v), and (q(v) - q(0))/v in closed form

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import special
 
 import nlctl
-from analysis.intervals.arithmetic import Ball, as_ball
-from analysis.intervals.normal_form import LARGEST_POWER, Sum, exact, indeterminate
-from analysis.intervals.paths import Undecided
+from nlctl.analysis.intervals.arithmetic import Ball, as_ball
+from nlctl.analysis.intervals.normal_form import LARGEST_POWER, Sum, exact, indeterminate
+from nlctl.analysis.intervals.paths import Undecided
 from nlctl.expressions.functions import FUNCTIONS
 
 X, Y = indeterminate("x"), indeterminate("y")

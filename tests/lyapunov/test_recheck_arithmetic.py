@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.recheck import Refuted
-from analysis.recheck.equations import WrittenEquation, stays
-from analysis.recheck.integers import ALL, KNOWN_FUNCTIONS, PI_ENCLOSED, Interval
+from nlctl.analysis.recheck import Refuted
+from nlctl.analysis.recheck.equations import WrittenEquation, stays
+from nlctl.analysis.recheck.integers import ALL, KNOWN_FUNCTIONS, PI_ENCLOSED, Interval
 
 TRUE = {"exp": math.exp, "sin": math.sin, "cos": math.cos, "tanh": math.tanh, "sqrt": math.sqrt,
         "log": math.log, "arctan": math.atan, "absolute": abs}  # fmt: skip

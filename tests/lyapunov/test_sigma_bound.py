@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.lyapunov import Box, prove_decrease
+from nlctl.analysis.lyapunov import Box, prove_decrease
 
 W, K, GAMMA, SIGMA, D, P = 2.0, 1.0, 5.0, 0.2, 0.5, 0.5
 FLOOR = (P * D**2 / K + SIGMA * W**2) * max(1 / K, 1 / (GAMMA * SIGMA))

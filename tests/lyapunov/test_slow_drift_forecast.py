@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nlctl
-from analysis.lyapunov.nussbaum.slow_drift import slow_drift
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov.nussbaum.slow_drift import slow_drift
 
 NAMES = ("zeta", "r", "u")
 SHARE = 0.5  # of the time until the burst, from which it is forecast

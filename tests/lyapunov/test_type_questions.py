@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.intervals.type_questions import type_question
-from analysis.lyapunov import Box, certify, enclose, prove, prove_decrease
 from nlctl import ParameterError
+from nlctl.analysis.intervals.type_questions import type_question
+from nlctl.analysis.lyapunov import Box, certify, enclose, prove, prove_decrease
 from nlctl.errors import UsageError
 
 BOX = Box.of(v=(-1.0, 1.0))

@@ -12,11 +12,11 @@ from sweep_examples import experiment
 from sweep_examples import loop as lag
 
 import nlctl
-from analysis.lyapunov.examination import compile_examination_ahead as examine_ahead
-from analysis.lyapunov.examination import examine
-from analysis.robustness import prepare
-from analysis.robustness.runs.experiment import compile_experiment_ahead as rows_ahead
-from analysis.robustness.runs.experiment import evaluate
+from nlctl.analysis.lyapunov.examination import compile_examination_ahead as examine_ahead
+from nlctl.analysis.lyapunov.examination import examine
+from nlctl.analysis.robustness import prepare
+from nlctl.analysis.robustness.runs.experiment import compile_experiment_ahead as rows_ahead
+from nlctl.analysis.robustness.runs.experiment import evaluate
 from nlctl.native import compile_ahead
 from nlctl.native.machine import finish
 

@@ -7,7 +7,7 @@ import pytest
 import nlctl
 from nlctl.expressions.arrays import concatenated
 from nlctl.native import AuditError
-from nlctl.native.codegen.program import count_switching_functions
+from nlctl.native.diagram.program import count_switching_functions
 from nlctl.native.equations import watched
 from nlctl.native.equations.reader import Reader
 

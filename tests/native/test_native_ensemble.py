@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.metrics import Metric, final, peak
+from nlctl.analysis.metrics import Metric, final, peak
 
 
 @nlctl.equation

@@ -11,7 +11,7 @@ import source_text
 from numba.core import config
 
 import nlctl
-from analysis.paper import CASES, checks, measured, sample_times
+from nlctl.analysis.paper import CASES, checks, measured, sample_times
 from nlctl.native import Status
 from nlctl.native.integrate.methods.tsit5 import TSIT5
 from nlctl.native.machine.store import cache_folder

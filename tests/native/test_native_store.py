@@ -24,14 +24,14 @@ from numba.core import config, event
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native.codegen.calls import Source
+from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
-from nlctl.native.machine.called import TAUGHT
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
-from nlctl.native.machine.integrators import integrator_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
 from nlctl.native.machine.module import loaded
 from nlctl.native.machine.store import CacheWarning
+from nlctl.native.opaque.called import TAUGHT
+from nlctl.native.opaque.calls import Source
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)
@@ -428,7 +428,7 @@ class TestKeys:
         """Whatever the order of sets and the addresses of objects there are."""
         script = (
             "import hashlib, nlctl\n"
-            "from nlctl.native.codegen.lower import lower\n"
+            "from nlctl.native.lower import lower\n"
             "compiled = nlctl.compile(nlctl.paper.example_2())\n"
             "lowered = lower(compiled.schedule, compiled.program)\n"
             "text = hashlib.sha256(lowered.text.encode()).hexdigest()\n"
@@ -483,8 +483,8 @@ def keys_of_copy(path, edits):
         assert source.count(before) == 1
         module.write_text(source.replace(before, after), encoding="utf-8")
     script = (
-        "import nlctl; from nlctl.native.machine.integrators import integrator_key\n"
-        "from nlctl.native.machine.called import TAUGHT\n"
+        "import nlctl; from nlctl.native.integrators import integrator_key\n"
+        "from nlctl.native.opaque.called import TAUGHT\n"
         "from nlctl.native.machine.fingerprint import module_key\n"
         "print(nlctl.__file__, integrator_key(), module_key(*TAUGHT))"
     )
@@ -531,7 +531,7 @@ class TestSources:
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"thirdparty/vectors.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"purity/vectors.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
         assert taught != module_key(*TAUGHT)

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.integrate import quad
 
 import nlctl
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import derivatives
 
 
 def update(t, x, u, p):

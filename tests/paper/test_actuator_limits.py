@@ -6,8 +6,10 @@ import pytest
 from matplotlib.collections import PathCollection
 from places import ROOT
 
-from analysis.paper.figures import actuator_errors
-from analysis.paper.limits.actuators import (
+from nlctl import paper
+from nlctl.actuators import Gain, Lag
+from nlctl.analysis.paper.figures import actuator_errors
+from nlctl.analysis.paper.limits.actuators import (
     ACTUATOR_RECORD,
     actuator_run,
     actuators_of_the_table,
@@ -15,10 +17,8 @@ from analysis.paper.limits.actuators import (
     assumption_text,
     controllers_text,
 )
-from analysis.paper.rivals import rival_controllers
-from analysis.paper.sampling_limits import BAND, meets_the_spec
-from nlctl import paper
-from nlctl.actuators import Gain, Lag
+from nlctl.analysis.paper.rivals import rival_controllers
+from nlctl.analysis.paper.sampling_limits import BAND, meets_the_spec
 
 RECORD = pd.read_csv(ACTUATOR_RECORD)
 PAGE = ROOT / "docs" / "explanation" / "actuators.md"

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov import read_parts
-from analysis.lyapunov.nussbaum.long_run import long_run
-from analysis.lyapunov.nussbaum.property import antiderivative
-from analysis.paper.burst import averaged, through_the_burst
+from nlctl.analysis.lyapunov import read_parts
+from nlctl.analysis.lyapunov.nussbaum.long_run import long_run
+from nlctl.analysis.lyapunov.nussbaum.property import antiderivative
+from nlctl.analysis.paper.burst import averaged, through_the_burst
 from nlctl.diagrams import state_names
 
 pytestmark = pytest.mark.slow

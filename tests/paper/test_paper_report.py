@@ -5,9 +5,9 @@ from contextlib import contextmanager
 import pytest
 from studies_example import write
 
-from analysis.paper import CASES
-from analysis.paper.report import clear, compose, proof, reproduction, robustness
-from analysis.studies import RunFolderError, read_study, run
+from nlctl.analysis.paper import CASES
+from nlctl.analysis.paper.report import clear, compose, proof, reproduction, robustness
+from nlctl.analysis.studies import RunFolderError, read_study, run
 
 
 class Watched:

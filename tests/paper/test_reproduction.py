@@ -5,9 +5,17 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis import metrics
-from analysis.paper import CASES, METRICS, checks, expectations, measured, run_case, sample_times
-from analysis.paper.reproduction import CaseRun
+from nlctl.analysis import metrics
+from nlctl.analysis.paper import (
+    CASES,
+    METRICS,
+    checks,
+    expectations,
+    measured,
+    run_case,
+    sample_times,
+)
+from nlctl.analysis.paper.reproduction import CaseRun
 
 CASE = {case.key: case for case in CASES}
 

@@ -9,8 +9,8 @@ import pytest
 from places import ROOT
 
 import nlctl
-from analysis.metrics import Metric, absolute_integral, peak
-from analysis.paper.limits.rivals import (
+from nlctl.analysis.metrics import Metric, absolute_integral, peak
+from nlctl.analysis.paper.limits.rivals import (
     RIVAL_ACTUATORS,
     RIVALS_RECORD,
     beaten_by,
@@ -19,8 +19,8 @@ from analysis.paper.limits.rivals import (
     rivals_study,
     rivals_text,
 )
-from analysis.paper.page.rivals import rivals_section
-from analysis.paper.rivals import (
+from nlctl.analysis.paper.page.rivals import rivals_section
+from nlctl.analysis.paper.rivals import (
     KNOWLEDGE,
     behind,
     rival_actuators,
@@ -28,9 +28,9 @@ from analysis.paper.rivals import (
     rival_loop,
     rival_searches,
 )
-from analysis.paper.tuning import tune
-from analysis.report.document import Table
-from analysis.studies import read_study, run, shipped
+from nlctl.analysis.paper.tuning import tune
+from nlctl.analysis.report.document import Table
+from nlctl.analysis.studies import read_study, run, shipped
 
 EXAMPLES = sorted(nlctl.paper.EXAMPLES)
 
@@ -166,7 +166,8 @@ def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
     record.loc[record.index[-1], column] = other
     record.to_csv(tmp_path / "record.csv", index=False)
     with pytest.raises(
-        ValueError, match=rf"example_2' is of another {kind}.*python -m analysis\.paper\.limits\.r"
+        ValueError,
+        match=rf"example_2' is of another {kind}.*python -m nlctl\.analysis\.paper\.limits\.r",
     ):
         checked_rivals(tmp_path / "record.csv")
 

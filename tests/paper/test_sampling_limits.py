@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.paper.controllers import compared_controllers
-from analysis.paper.page.sampling import sampling_section
-from analysis.paper.sampling_limits import (
+from nlctl import paper
+from nlctl.analysis.paper.controllers import compared_controllers
+from nlctl.analysis.paper.page.sampling import sampling_section
+from nlctl.analysis.paper.sampling_limits import (
     QUANTITIES,
     SAMPLING_RECORD,
     check_lines,
@@ -15,7 +16,6 @@ from analysis.paper.sampling_limits import (
     spec_ends,
     where_it_ends,
 )
-from nlctl import paper
 
 
 def table(errors, peaks=0.0):
@@ -53,7 +53,9 @@ def test_a_record_of_other_equations_is_refused(tmp_path):
     record = pd.read_csv(SAMPLING_RECORD)
     record["error"] *= 1.01
     record.to_csv(tmp_path / "record.csv", index=False)
-    with pytest.raises(ValueError, match=r"example_1.*python -m analysis\.paper\.sampling_limits"):
+    with pytest.raises(
+        ValueError, match=r"example_1.*python -m nlctl\.analysis\.paper\.sampling_limits"
+    ):
         checked_record(tmp_path / "record.csv")
 
 

@@ -50,16 +50,16 @@ def counts(tree):
 
 
 SEVERAL = {  # never one: of a fixed size, or another text is written for one
-    ("analysis.paper.page.claims", "total"),
-    ("analysis.paper.page.report", "_count(number, compared)"),
-    ("analysis.paper.page.rivals", "own['samples'].iloc[0]"),
-    ("analysis.report.outline", "total"),
-    ("analysis.robustness.uncertainty.design", "rows"),
-    ("analysis.robustness.uncertainty.design", "columns"),
-    ("analysis.robustness.uncertainty.design", "MOST_HELD // columns"),
-    ("analysis.studies.page.rows", "len(worst)"),
-    ("analysis.studies.replay", "count"),
-    ("analysis.studies.result", "count"),
+    ("nlctl.analysis.paper.page.claims", "total"),
+    ("nlctl.analysis.paper.page.report", "_count(number, compared)"),
+    ("nlctl.analysis.paper.page.rivals", "own['samples'].iloc[0]"),
+    ("nlctl.analysis.report.outline", "total"),
+    ("nlctl.analysis.robustness.uncertainty.design", "rows"),
+    ("nlctl.analysis.robustness.uncertainty.design", "columns"),
+    ("nlctl.analysis.robustness.uncertainty.design", "MOST_HELD // columns"),
+    ("nlctl.analysis.studies.page.rows", "len(worst)"),
+    ("nlctl.analysis.studies.replay", "count"),
+    ("nlctl.analysis.studies.result", "count"),
     ("nlctl.native.integrate.methods.tableau", "stages - 1"),
     ("nlctl.native.integrate.methods.tableau", "stages"),
 }

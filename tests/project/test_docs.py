@@ -8,14 +8,14 @@ import pytest
 from places import ROOT
 from rows import each_row
 
-from analysis.lyapunov.lines import LineStatus
-from analysis.report.outline import ANSWERS
-from analysis.robustness.stl.text import parse_formula
-from analysis.robustness.uncertainty.quantity import QUANTILES
-from analysis.studies import StudyError, read_study
-from analysis.studies.file.resolve import uncertain
-from analysis.studies.file.schema import Law
-from analysis.studies.kinds import KINDS
+from nlctl.analysis.lyapunov.lines import LineStatus
+from nlctl.analysis.report.outline import ANSWERS
+from nlctl.analysis.robustness.stl.text import parse_formula
+from nlctl.analysis.robustness.uncertainty.quantity import QUANTILES
+from nlctl.analysis.studies import StudyError, read_study
+from nlctl.analysis.studies.file.resolve import uncertain
+from nlctl.analysis.studies.file.schema import Law
+from nlctl.analysis.studies.kinds import KINDS
 
 GUIDE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
 

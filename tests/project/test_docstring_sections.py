@@ -9,8 +9,8 @@ from reference import entries, methods, offered
 from rows import each_row
 
 import nlctl
-from analysis import lyapunov
 from nlctl import arguments, names, params
+from nlctl.analysis import lyapunov
 from nlctl.diagrams import places
 from nlctl.errors import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
 

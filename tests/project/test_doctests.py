@@ -3,38 +3,35 @@
 import doctest
 import importlib
 import inspect
-import pkgutil
 import re
 
 import pytest
-from reference import documented_names
+from reference import documented_names, our_modules
 from rows import each_row
 
-import analysis
 import nlctl
 
 REFERS = re.compile(r"\nExamples\n--------\nSee `(\w+)`\.$")
 
 
 LONG = {  # take seconds
-    "analysis.lyapunov.certificate.certify.certify",
-    "analysis.lyapunov.certificate.gains.design",
-    "analysis.lyapunov.conservatism.conservatism",
-    "analysis.lyapunov.ledger.ledger",
-    "analysis.lyapunov.tighten.tighten",
+    "nlctl.analysis.lyapunov.certificate.certify.certify",
+    "nlctl.analysis.lyapunov.certificate.gains.design",
+    "nlctl.analysis.lyapunov.conservatism.conservatism",
+    "nlctl.analysis.lyapunov.ledger.ledger",
+    "nlctl.analysis.lyapunov.tighten.tighten",
 }
 
 
 def examples():
     """The examples of all docstrings, by name."""
     finder, found = doctest.DocTestFinder(exclude_empty=True), {}
-    for package in (nlctl, analysis):
-        for place in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if not place.ispkg and not place.name.endswith("__main__"):
-                module = importlib.import_module(place.name)
-                if ">>> " in inspect.getsource(module):
-                    made = finder.find(module, place.name, extraglobs={"nlctl": nlctl})
-                    found |= {each.name: each for each in made if each.examples}
+    for place in our_modules():
+        if not place.ispkg and not place.name.endswith("__main__"):
+            module = importlib.import_module(place.name)
+            if ">>> " in inspect.getsource(module):
+                made = finder.find(module, place.name, extraglobs={"nlctl": nlctl})
+                found |= {each.name: each for each in made if each.examples}
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.catalogue import block_records
+from nlctl.analysis.catalogue import block_records
 from nlctl.errors import UsageError
 
 TIMES = np.linspace(0, 0.1, 6)

@@ -17,11 +17,11 @@ import pandas as pd
 import pytest
 from call_examples import GROUPS
 
-import analysis
 import nlctl
 from nlctl.errors import DivergedError, UsageError
+from nlctl.host.checkout import SOURCES
 
-OWN = [Path(package.__file__).parent for package in (nlctl, analysis)]
+OWN = [Path(folder) for folder in SOURCES]
 LIMIT = 10.0  # s that a call may take
 WRONG = [
     None, True, 0, 1, -1, 10**30, -2.5, float("nan"), float("inf"), 1e308, 1j, "", "no such",

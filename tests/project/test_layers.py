@@ -5,6 +5,7 @@ import subprocess
 import sys
 from graphlib import TopologicalSorter
 
+import pytest
 from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
@@ -25,42 +26,74 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.expressions"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.sensitivities", "nlctl.__main__"],
-    ["analysis.json_values", "analysis.catalogue", "analysis.metrics", "analysis.intervals"]
-    + ["analysis.loop_record", "analysis.response_of_loop", "analysis.recheck"],
-    ["analysis.lyapunov", "analysis.robustness"],
-    ["analysis.figures", "analysis.report"],
-    ["analysis.studies"],
-    ["analysis.paper"],
-    ["analysis.loop_report"],
-    ["analysis.cli"],
+    [
+        "nlctl.analysis.json_values",
+        "nlctl.analysis.catalogue",
+        "nlctl.analysis.metrics",
+        "nlctl.analysis.intervals",
+    ]
+    + ["nlctl.analysis.loop_record", "nlctl.analysis.response_of_loop", "nlctl.analysis.recheck"],
+    ["nlctl.analysis.lyapunov", "nlctl.analysis.robustness"],
+    ["nlctl.analysis.figures", "nlctl.analysis.report"],
+    ["nlctl.analysis.studies"],
+    ["nlctl.analysis.paper"],
+    ["nlctl.analysis.loop_report"],
+    ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
+INSIDE = {  # the same within large packages: their rooms and single modules, from the bottom
+    "nlctl.native": [
+        ["cache", "codegen", "purity", "rounding", "sliding"],  # know no diagram
+        ["codegen.ir"],
+        ["diagram"],
+        ["declared", "opaque"],
+        ["equations"],
+        ["timed", "typesetting"],
+        ["lower"],
+        ["reading"],
+        ["machine"],
+        ["jacobians"],
+        ["describe"],
+        ["compiled"],
+        ["integrate", "linearized", "members"],
+        ["along", "audit", "happened", "histories", "integrators", "settings"],
+        ["ahead", "chattering", "known", "ship"],
+        ["run"],
+        ["taylor"],
+        ["integrate.results"],
+        ["integrate.driver", "own_errors"],
+        ["ensemble", "response"],
+    ],
+    "nlctl.expressions": [
+        ["graph"],
+        ["functions", "elimination"],
+        ["arrays", "integers", "operators", "masked", "indexing"],
+        ["conditions", "continuity", "dependence", "differences", "evaluate", "latex", "ordered"],
+        ["library"],
+        ["staged", "stage"],
+        ["derivatives", "trace"],
+    ],
+    "nlctl.analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
+}
 FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
 
 
 def module_name(path):
     parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = parts if parts[0] == "nlctl" else ("nlctl", *parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
 PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
-MEMBERS = [name for name in MODULES if name not in ("nlctl", "analysis")]  # these only re-export
-
-
-def runtime_nodes(tree):
-    """Yield the nodes of a module, but not what stands under `if TYPE_CHECKING:`."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
-            continue
-        yield node
-        yield from runtime_nodes(node)
+ROOTS = ("nlctl", "nlctl.analysis")  # these only re-export
+MEMBERS = [name for name in MODULES if name not in ROOTS]
 
 
 def imports(name):
-    """Return the modules of this project that a module imports, also inside functions."""
+    """Return the modules of this project that a module imports, also in functions and for types."""
     found = set()
-    for node in runtime_nodes(MODULES[name]):
+    for node in ast.walk(MODULES[name]):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -71,7 +104,7 @@ def imports(name):
             source = ".".join([*base, *([node.module] if node.module else [])])
             members = {f"{source}.{alias.name}" for alias in node.names}
             found |= (members & set(MODULES)) or {source}
-    return {module for module in found if module.split(".")[0] in ("nlctl", "analysis")}
+    return {module for module in found if module.split(".")[0] == "nlctl"}
 
 
 def within(name, prefixes):
@@ -79,22 +112,58 @@ def within(name, prefixes):
     return any(name == prefix or name.startswith(f"{prefix}.") for prefix in prefixes)
 
 
-def layer(name):
-    """Return the number of a module's layer."""
+def entry(name, layers=LAYERS):
+    """Return the number of a module's layer, and the longest name in it that the module is in."""
     fits = [
-        (len(prefix), number)
-        for number, prefixes in enumerate(LAYERS)
+        (len(prefix), number, prefix)
+        for number, prefixes in enumerate(layers)
         for prefix in prefixes
         if within(name, [prefix])
     ]
-    assert fits, f"{name} belongs to no layer: give it a place in LAYERS"
-    return max(fits)[1]
+    assert fits, f"{name} belongs to no layer: give it a place in the layers of this test"
+    return max(fits)[1:]
 
 
-def test_imports_go_downwards_only():
-    """No module imports one of a higher layer, not even lazily inside a function."""
-    upwards = {n: {m for m in imports(n) if layer(m) > layer(n)} for n in MEMBERS}
+def layer(name, layers=LAYERS):
+    """Return the number of a module's layer."""
+    return entry(name, layers)[0]
+
+
+def order_inside(package):
+    """Return the layers of a package with full names, and its modules without the package."""
+    layers = [[f"{package}.{name}" for name in names] for names in INSIDE[package]]
+    return layers, [m for m in MEMBERS if m.startswith(f"{package}.")]
+
+
+ORDERS = {"all": (LAYERS, MEMBERS), **{name: order_inside(name) for name in INSIDE}}
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_imports_go_downwards_only(where):
+    """No module imports one of a higher layer: not lazily inside a function, nor for its types."""
+    layers, members = ORDERS[where]
+    known = {n: layer(n, layers) for n in members}
+    upwards = {n: {m for m in imports(n) if known.get(m, -1) > known[n]} for n in members}
     assert {name: found for name, found in upwards.items() if found} == {}
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_rooms_know_each_other_in_one_direction(where):
+    """Also those of one layer: there is an order of the names that stand in it."""
+    layers, members = ORDERS[where]
+    rooms = {n: entry(n, layers)[1] for n in members}
+    below = {room: set() for room in rooms.values()}
+    for name, room in rooms.items():
+        below[room] |= {rooms[m] for m in imports(name) if m in rooms} - {room}
+    assert len(list(TopologicalSorter(below).static_order())) == len(below)
+
+
+@pytest.mark.parametrize("where", ORDERS)
+def test_names_of_layers_are_those_of_modules(where):
+    """A name that no module has any more would hold nothing."""
+    layers, members = ORDERS[where]
+    named = {prefix for prefixes in layers for prefix in prefixes}
+    assert named == {entry(n, layers)[1] for n in members}
 
 
 def test_there_are_imports_to_look_at():
@@ -102,6 +171,7 @@ def test_there_are_imports_to_look_at():
     assert "nlctl.params" in imports("nlctl.plants")
     assert "nlctl.functions" in imports("nlctl.controllers.rbf")
     assert "nlctl.controllers" in imports("nlctl.paper")
+    assert "nlctl.native" in imports("nlctl.response")  # for types, and for engines
     assert layer("nlctl.controllers.rbf") == 3
 
 
@@ -114,13 +184,13 @@ def test_no_module_imports_itself_in_a_ring():
 
 def test_nlctl_knows_nothing_of_analysis():
     """Blocks, diagrams and the engine can be used without it; the command is looked up by name."""
-    upwards = {n for n in MEMBERS if n.startswith("nlctl.") for m in imports(n) if "analysis" in m}
-    assert upwards == set()
+    below = [n for n in MEMBERS if not within(n, ["nlctl.analysis"])]
+    assert {n for n in below for m in imports(n) if within(m, ["nlctl.analysis"])} == set()
 
 
 def test_the_recheck_knows_nothing_of_the_prover():
     """Nor of any third-party package: it stands on Python's own library."""
-    own = [m for m in MEMBERS if within(m, ["analysis.recheck"])]
+    own = [m for m in MEMBERS if within(m, ["nlctl.analysis.recheck"])]
     assert {m: found for m in own if (found := imports(m) - set(own))} == {}
     taken = {name.partition(".")[0] for m in own for name in imported(m)}
     assert taken <= set(sys.stdlib_module_names)
@@ -159,7 +229,7 @@ PRIVATE = ("numba.core", "numba.np", "numba.misc", "numba.typed", "numba.cpython
 
 def is_private_of_others(module):
     """Whether a name of another library is none that it documents."""
-    return within(module, PRIVATE) or ("._" in module and not within(module, ["nlctl", "analysis"]))
+    return within(module, PRIVATE) or ("._" in module and not within(module, ["nlctl"]))
 
 
 def test_private_names_of_numba_stand_in_one_module():
@@ -212,7 +282,7 @@ def test_rooms_say_what_is_in_them():
 def test_importing_is_cheap():
     """`nlctl --help` and `import nlctl` load none of the heavy libraries."""
     heavy = ["control", "scipy", "numba", "matplotlib", "pandas"]
-    for module in ("nlctl", "analysis.cli.main"):
+    for module in ("nlctl", "nlctl.analysis.cli.main"):
         code = f"import {module}, sys; print(*(m for m in {heavy} if m in sys.modules))"
         run = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True

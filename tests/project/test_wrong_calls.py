@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 from wrong_calls import GROUPS
 
-import analysis
-import nlctl
 from nlctl.errors import UsageError
+from nlctl.host.checkout import SOURCES
 
-OWN = [Path(package.__file__).parent for package in (nlctl, analysis)]  # wherever it is installed
+OWN = [Path(folder) for folder in SOURCES]
 
 
 def refusal(call):

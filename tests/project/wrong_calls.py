@@ -7,10 +7,10 @@ from scipy import stats
 from small_systems import chain, function
 
 import nlctl
-from analysis import lyapunov, paper, robustness
-from analysis.intervals.box import Box
-from analysis.metrics import Metric, peak
-from analysis.robustness import (
+from nlctl.analysis import lyapunov, paper, robustness
+from nlctl.analysis.intervals.box import Box
+from nlctl.analysis.metrics import Metric, peak
+from nlctl.analysis.robustness import (
     Choice,
     Requirement,
     Space,

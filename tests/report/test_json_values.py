@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.json_values import as_json, from_json
+from nlctl.analysis.json_values import as_json, from_json
 
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text("abc .", max_size=4)
 VALUES = st.recursive(

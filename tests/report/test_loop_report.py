@@ -13,9 +13,9 @@ from matplotlib.figure import Figure as Picture
 from rows import each_row
 
 import nlctl
-from analysis.loop_report import loop_report
-from analysis.lyapunov import certify
-from analysis.report import (
+from nlctl.analysis.loop_report import loop_report
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.report import (
     Claim,
     Figure,
     Paragraph,
@@ -25,7 +25,7 @@ from analysis.report import (
     render_html,
     write_report,
 )
-from analysis.studies import read_study, run
+from nlctl.analysis.studies import read_study, run
 
 TIMES = np.linspace(0, 2, 41)
 EVIL = '<script>alert("x")</script><b onload=y>&amp;'
@@ -172,7 +172,7 @@ def test_what_is_of_another_loop_is_refused(given, words, tmp_path_factory):
     if "study" in given:
         given = {"study": studied(tmp_path_factory.mktemp("study"))}
     if "ledger" in given:
-        from analysis.lyapunov import ledger
+        from nlctl.analysis.lyapunov import ledger
 
         given = {"ledger": ledger(nlctl.paper.example_1(), 1.0)}
     with pytest.raises(
@@ -197,7 +197,7 @@ def test_values_of_a_run_that_are_not_the_loops_are_told():
 @pytest.mark.slow
 def test_the_ledger_of_a_namesake_is_refused():
     """Of the same name, blocks and wires, with one other value: the sentence names it."""
-    from analysis.lyapunov import ledger
+    from nlctl.analysis.lyapunov import ledger
 
     one = nlctl.paper.example_1()
     other = nlctl.paper.example_1(actuator=nlctl.DeadZone(b_r=0.6))

@@ -8,8 +8,8 @@ import pytest
 import studies_example
 
 import nlctl
-from analysis.lyapunov import certify, ledger
-from analysis.studies import read_study, run
+from nlctl.analysis.lyapunov import certify, ledger
+from nlctl.analysis.studies import read_study, run
 from nlctl.host.notebook import table_html
 
 EVIL = '<img src=x onerror="alert(1)">&amp;<script>'

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from analysis.paper import CASES, METRICS, TAIL, CaseRun, expectations
-from analysis.paper.page.report import paper_report
-from analysis.report import (
+from nlctl.analysis.paper import CASES, METRICS, TAIL, CaseRun, expectations
+from nlctl.analysis.paper.page.report import paper_report
+from nlctl.analysis.report import (
     Claim,
     Equation,
     Figure,
@@ -163,7 +163,8 @@ def test_report_is_the_same_bytes_in_another_process(runs, tmp_path):
     """Neither hash seeds nor time leave a trace."""
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import test_report as t;"
-        "from analysis.report import write_report; from analysis.paper.page.report import *;"
+        "from nlctl.analysis.report import write_report;"
+        "from nlctl.analysis.paper.page.report import *;"
         "write_report(paper_report(t.made_up_runs()), sys.argv[2])"
     )
     here = str(__import__("pathlib").Path(__file__).parent)

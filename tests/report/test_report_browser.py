@@ -10,9 +10,9 @@ from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
 
-from analysis.paper.page.report import paper_report
-from analysis.report import write_gallery, write_pdf, write_report
-from analysis.report.browser import BROWSERS
+from nlctl.analysis.paper.page.report import paper_report
+from nlctl.analysis.report import write_gallery, write_pdf, write_report
+from nlctl.analysis.report.browser import BROWSERS
 
 pytestmark = pytest.mark.browser
 

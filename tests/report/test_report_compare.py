@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from rows import each_row
 from test_report_page import HOSTILE, Reader
 
-from analysis.cli.report import (
+from nlctl.analysis.cli.report import (
     check_report_options,
     compare_reports,
     finish_report,
     write_gallery_of,
 )
-from analysis.report import (
+from nlctl.analysis.report import (
     Claim,
     Report,
     Section,
@@ -28,7 +28,7 @@ from analysis.report import (
     write_pdf,
     write_report,
 )
-from analysis.report.compare import ABSENT, _row_names, _same
+from nlctl.analysis.report.compare import ABSENT, _row_names, _same
 from nlctl.errors import UsageError
 
 

@@ -10,10 +10,10 @@ from fontTools.ttLib import TTFont
 from rows import each_row
 
 import nlctl
-from analysis.paper.page import text as text
-from analysis.report import Equation
-from analysis.report.equations import equations_of
-from analysis.report.mathml import (
+from nlctl.analysis.paper.page import text as text
+from nlctl.analysis.report import Equation
+from nlctl.analysis.report.equations import equations_of
+from nlctl.analysis.report.mathml import (
     ATTRIBUTES,
     CHARACTERS,
     ELEMENTS,
@@ -41,7 +41,7 @@ UNREADABLE = [r"\frac{", r"x_1_2", r"\left(", "{" * 3000, r"\begin{cases} a", "\
 @pytest.fixture(scope="module")
 def font():
     """The subset of the math font, as the page holds it."""
-    data = files("analysis.report").joinpath("fonts/nlctl-math.woff2").read_bytes()
+    data = files("nlctl.analysis.report").joinpath("fonts/nlctl-math.woff2").read_bytes()
     return TTFont(io.BytesIO(data))
 
 
@@ -78,7 +78,7 @@ def test_the_font_has_every_character_that_it_should(font):
 
 def test_font_comes_with_its_licence_and_in_the_page():
     """The rule holds the whole font as data."""
-    licence = files("analysis.report").joinpath("fonts/OFL.txt").read_text(encoding="utf-8")
+    licence = files("nlctl.analysis.report").joinpath("fonts/OFL.txt").read_text(encoding="utf-8")
     assert "SIL OPEN FONT LICENSE" in licence
     assert re.search(r'url\("data:font/woff2;base64,[A-Za-z0-9+/=]+"\)', font_face())
 
@@ -133,7 +133,7 @@ def test_a_sign_is_close_to_its_number_and_a_function_apart_from_its_factor():
 
 def test_subset_of_the_subset_keeps_all_that_is_asked_for(tmp_path):
     """The command that makes the font leaves characters and the table of mathematics in it."""
-    source = files("analysis.report").joinpath("fonts/nlctl-math.woff2")
+    source = files("nlctl.analysis.report").joinpath("fonts/nlctl-math.woff2")
     (tmp_path / "font.woff2").write_bytes(source.read_bytes())
     again = TTFont(io.BytesIO(subset(tmp_path / "font.woff2")))
     assert {ord(c) for c in CHARACTERS} <= set(again.getBestCmap())

@@ -18,12 +18,12 @@ from test_report import made_up_runs
 from test_report_page import HOSTILE, LADDER, Reader
 from typer.testing import CliRunner
 
-from analysis.cli.main import app
-from analysis.paper.page.report import paper_report
-from analysis.report import Figure, History, Report, Section, render_html, write_report
-from analysis.report.history import chart, thinned
-from analysis.studies.page.histories import Histories
-from analysis.studies.page.rows import fan_items
+from nlctl.analysis.cli.main import app
+from nlctl.analysis.paper.page.report import paper_report
+from nlctl.analysis.report import Figure, History, Report, Section, render_html, write_report
+from nlctl.analysis.report.history import chart, thinned
+from nlctl.analysis.studies.page.histories import Histories
+from nlctl.analysis.studies.page.rows import fan_items
 from nlctl.errors import UsageError
 
 VENDOR = ROOT / "analysis" / "report" / "vendor" / "uplot"

@@ -12,20 +12,20 @@ from rows import each_row
 from test_report import made_up_runs, outline
 
 import nlctl
-from analysis import figures
-from analysis.lyapunov.loop.roles import read_parts
-from analysis.lyapunov.loop.signals import equality, inequality
-from analysis.lyapunov.nussbaum.long_run import LongRun, long_run
-from analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
-from analysis.paper import BOUND
-from analysis.paper.burst import through_the_burst
-from analysis.paper.evidence import far_runs_in_background
-from analysis.paper.figures import after_burst
-from analysis.paper.page import proof_text as text
-from analysis.paper.page.notation import formulas
-from analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
-from analysis.paper.page.report import paper_report
-from analysis.paper.reference_run import (
+from nlctl.analysis import figures
+from nlctl.analysis.lyapunov.loop.roles import read_parts
+from nlctl.analysis.lyapunov.loop.signals import equality, inequality
+from nlctl.analysis.lyapunov.nussbaum.long_run import LongRun, long_run
+from nlctl.analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
+from nlctl.analysis.paper import BOUND
+from nlctl.analysis.paper.burst import through_the_burst
+from nlctl.analysis.paper.evidence import far_runs_in_background
+from nlctl.analysis.paper.figures import after_burst
+from nlctl.analysis.paper.page import proof_text as text
+from nlctl.analysis.paper.page.notation import formulas
+from nlctl.analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
+from nlctl.analysis.paper.page.report import paper_report
+from nlctl.analysis.paper.reference_run import (
     AGREE,
     agreed,
     continued,
@@ -33,8 +33,16 @@ from analysis.paper.reference_run import (
     thinned_run,
     write_record,
 )
-from analysis.report import Figure, Paragraph, Report, Section, Table, render_html, render_json
-from analysis.report.outline import claim_status, light, summary
+from nlctl.analysis.report import (
+    Figure,
+    Paragraph,
+    Report,
+    Section,
+    Table,
+    render_html,
+    render_json,
+)
+from nlctl.analysis.report.outline import claim_status, light, summary
 
 pytestmark = pytest.mark.ci
 

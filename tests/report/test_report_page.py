@@ -23,8 +23,8 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from places import SUPPORT
 from rows import each_row
 
-import analysis.report
-from analysis.report import (
+import nlctl.analysis.report
+from nlctl.analysis.report import (
     Claim,
     Equation,
     Figure,
@@ -37,7 +37,7 @@ from analysis.report import (
     render_json,
     write_report,
 )
-from analysis.report.outline import (
+from nlctl.analysis.report.outline import (
     LIGHTS,
     MEANINGS,
     claim_status,
@@ -48,10 +48,10 @@ from analysis.report.outline import (
     sort_key,
     summary,
 )
-from analysis.report.outline import cells as cells_of
-from analysis.report.page import fill
-from analysis.report.svg import draw_ahead, shapes_svg, short_path, svg, svg_files
-from analysis.report.typography import pieces
+from nlctl.analysis.report.outline import cells as cells_of
+from nlctl.analysis.report.page import fill
+from nlctl.analysis.report.svg import draw_ahead, shapes_svg, short_path, svg, svg_files
+from nlctl.analysis.report.typography import pieces
 from nlctl.errors import UsageError
 
 HOSTILE = {
@@ -319,7 +319,7 @@ def test_templates_refuse_what_is_missing_and_let_no_markup_through():
     with pytest.raises(UndefinedError, match="is undefined"):
         fill("report.html")
     environment = Environment(autoescape=True)
-    templates = Path(analysis.report.__file__ or "").parent / "templates"
+    templates = Path(nlctl.analysis.report.__file__ or "").parent / "templates"
     found = sorted(templates.glob("*.html"))
     assert found
     for template in found:

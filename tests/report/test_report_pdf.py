@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from analysis.report import browser, write_pdf
+from nlctl.analysis.report import browser, write_pdf
 from nlctl.errors import UsageError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")

@@ -9,13 +9,13 @@ import pytest
 from rows import each_row
 from studies_example import HEAD, LOOP, ROWS, write
 
-from analysis import figures
-from analysis.report import Equation, Figure, Table, render_html
-from analysis.robustness import Requirement, always, eventually, in_band, prepare
-from analysis.studies import read_study, run
-from analysis.studies.page.histories import histories, limits_of_requirements
-from analysis.studies.page.loop import StudyLoop, loop_of, loop_sections
-from analysis.studies.page.report import study_report
+from nlctl.analysis import figures
+from nlctl.analysis.report import Equation, Figure, Table, render_html
+from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
+from nlctl.analysis.studies import read_study, run
+from nlctl.analysis.studies.page.histories import histories, limits_of_requirements
+from nlctl.analysis.studies.page.loop import StudyLoop, loop_of, loop_sections
+from nlctl.analysis.studies.page.report import study_report
 
 
 @pytest.fixture(scope="module")

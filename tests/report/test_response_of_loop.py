@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.response_of_loop import check_response
+from nlctl.analysis.response_of_loop import check_response
 
 TIMES = np.linspace(0, 4, 81)
 

@@ -5,9 +5,9 @@ import pytest
 from closed_form_runs import block
 
 import nlctl
-from analysis.metrics import Metric as Described
-from analysis.metrics import final, highest, integral, peak, rms
-from analysis.robustness import Requirement, always, eventually, in_band
+from nlctl.analysis.metrics import Metric as Described
+from nlctl.analysis.metrics import final, highest, integral, peak, rms
+from nlctl.analysis.robustness import Requirement, always, eventually, in_band
 
 T = np.linspace(0, 6, 1201)
 

@@ -5,14 +5,15 @@ import pytest
 from closed_form_runs import block
 
 import nlctl
+from nlctl.sensitivities.run import _Kept
 
 
 def jumps(law, params):
     """How many comparisons of a block count as jumps."""
     compiled = nlctl.compile(block(law, params, ("x", "y")))
     nlctl.sensitivity_response(compiled, [0, 1e-3], with_respect_to=["plant.a"])
-    (made,) = compiled.__dict__["_sensitivities"].values()
-    return len(made.sides.sides)
+    (kept,) = compiled.cache.of(_Kept)
+    return len(kept.made.sides.sides)
 
 
 def dead_zone(t, x, u, p):

@@ -11,7 +11,7 @@ import source_text
 from places import ROOT
 
 import nlctl
-from analysis.loop_record import loop_facts, loop_values, values_differ
+from nlctl.analysis.loop_record import loop_facts, loop_values, values_differ
 
 THIRD_PARTY = """
 import functools
@@ -223,7 +223,7 @@ def test_a_record_is_the_same_in_another_process():
     """Addresses, hash seeds and the order of sets are no part of it."""
     script = (
         "import json, nlctl\n"
-        "from analysis.loop_record import loop_facts, loop_values\n"
+        "from nlctl.analysis.loop_record import loop_facts, loop_values\n"
         "loop = nlctl.paper.example_2()\n"
         "print(json.dumps([loop_facts(loop), loop_values(loop, 20.0)]))\n"
     )

@@ -11,7 +11,7 @@ import source_text
 from places import ROOT
 
 import nlctl
-from analysis.loop_record import loop_facts, unseen_parts
+from nlctl.analysis.loop_record import loop_facts, unseen_parts
 
 HEAD = """
 import array, collections, contextlib, datetime, decimal, enum, fractions, functools, itertools

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from analysis.studies.file.errors import StudyError
-from analysis.studies.file.parse import read_study
+from nlctl.analysis.studies.file.errors import StudyError
+from nlctl.analysis.studies.file.parse import read_study
 
 STUDY = """
 loop = "example-1"

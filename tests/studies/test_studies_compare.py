@@ -7,8 +7,8 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from analysis.robustness.runs.identity import differences_of
-from analysis.studies import read_study, run
+from nlctl.analysis.robustness.runs.identity import differences_of
+from nlctl.analysis.studies import read_study, run
 
 SEARCHED = f"""{HEAD}{ROWS}
 [[analysis]]

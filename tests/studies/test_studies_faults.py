@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from rows import each_row
 
-from analysis.robustness import Requirement
-from analysis.robustness.stl.text import parse_formula
-from analysis.robustness.stl.violation_time import violation_time
-from analysis.studies import StudyError, load_result, plan, read_study, run
-from analysis.studies.page.report import study_report
-from analysis.studies.replay import replay
+from nlctl.analysis.robustness import Requirement
+from nlctl.analysis.robustness.stl.text import parse_formula
+from nlctl.analysis.robustness.stl.violation_time import violation_time
+from nlctl.analysis.studies import StudyError, load_result, plan, read_study, run
+from nlctl.analysis.studies.page.report import study_report
+from nlctl.analysis.studies.replay import replay
 
 LOOP = '''
 import nlctl

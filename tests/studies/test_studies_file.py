@@ -7,12 +7,12 @@ import pytest
 from rows import each_row
 from studies_example import HEAD, ROWS, write
 
-from analysis.robustness import nominal, resolved
-from analysis.studies import StudyError, from_toml, read_study, to_toml
-from analysis.studies.file.errors import line_numbers, place_text
-from analysis.studies.file.own_kinds import model_of
-from analysis.studies.file.schema import keyed
 from nlctl import ParameterError, paper
+from nlctl.analysis.robustness import nominal, resolved
+from nlctl.analysis.studies import StudyError, from_toml, read_study, to_toml
+from nlctl.analysis.studies.file.errors import line_numbers, place_text
+from nlctl.analysis.studies.file.own_kinds import model_of
+from nlctl.analysis.studies.file.schema import keyed
 from nlctl.names import unknown
 
 

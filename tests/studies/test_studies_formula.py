@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_row
 
-from analysis.robustness.stl.formula import (
+from nlctl import ParameterError
+from nlctl.analysis.robustness.stl.formula import (
     And,
     SampledSignals,
     always,
@@ -15,8 +16,7 @@ from analysis.robustness.stl.formula import (
     in_band,
     margin_trace,
 )
-from analysis.robustness.stl.text import parse_formula
-from nlctl import ParameterError
+from nlctl.analysis.robustness.stl.text import parse_formula
 
 numbers = st.integers(-400, 400).map(lambda n: n / 8)
 names = st.sampled_from(["e", "u", "x1", "plant.x2", "y[0]", "W_norm", "s_1", "inner"])

@@ -12,7 +12,7 @@ import pytest
 import tomli_w
 from studies_example import HEAD, write
 
-from analysis.studies import StudyError, plan, read_study
+from nlctl.analysis.studies import StudyError, plan, read_study
 from nlctl.errors import UsageError
 
 WHOLE = """

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from rows import each_row
 
-from analysis.robustness import nominal
-from analysis.robustness.runs.experiment import evaluate, prepare
-from analysis.robustness.search.evaluation import as_table
-from analysis.studies import StudyError, read_study
+from nlctl.analysis.robustness import nominal
+from nlctl.analysis.robustness.runs.experiment import evaluate, prepare
+from nlctl.analysis.robustness.search.evaluation import as_table
+from nlctl.analysis.studies import StudyError, read_study
 
 LOOP = """\
 import control as ct

@@ -11,7 +11,7 @@ import pytest
 from processes import alive, descendants, wait_until
 from studies_example import HEAD, write
 
-from analysis.studies import RunFolderError, load_result, read_study, run
+from nlctl.analysis.studies import RunFolderError, load_result, read_study, run
 from nlctl.host.workers import process_pool
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -92,7 +92,7 @@ def work(path, out, pooled):
 def server():
     """Processes that begin with everything imported."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["analysis.studies"])
+    context.set_forkserver_preload(["nlctl.analysis.studies"])
     return context
 
 

@@ -7,8 +7,8 @@ import pytest
 from command_line import nlctl
 from studies_example import HEAD, LOOP, write
 
-from analysis.studies import StudyError, read_study, replay, run
-from analysis.studies.code.loading import load_file, loaded_with
+from nlctl.analysis.studies import StudyError, read_study, replay, run
+from nlctl.analysis.studies.code.loading import load_file, loaded_with
 from nlctl.errors import ParameterError
 
 SMALL = "[runs]\nsize = 8\n"

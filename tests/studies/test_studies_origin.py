@@ -9,9 +9,9 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from analysis.robustness.runs import identity
-from analysis.studies import RunFolderError, load_result, read_study, run
-from analysis.studies.sealed import read_json, write_json
+from nlctl.analysis.robustness.runs import identity
+from nlctl.analysis.studies import RunFolderError, load_result, read_study, run
+from nlctl.analysis.studies.sealed import read_json, write_json
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

@@ -10,12 +10,12 @@ from command_line import nlctl_here
 from places import ROOT
 from rows import each_row
 
-from analysis.cli.study_report import report_study
-from analysis.report.document import Figure, Paragraph, Table
-from analysis.studies import Asked, Kind, StudyError, load_result, plan, read_study, run
-from analysis.studies.folder import remove_run
-from analysis.studies.page.report import study_part, study_report
 from nlctl import DeadZone
+from nlctl.analysis.cli.study_report import report_study
+from nlctl.analysis.report.document import Figure, Paragraph, Table
+from nlctl.analysis.studies import Asked, Kind, StudyError, load_result, plan, read_study, run
+from nlctl.analysis.studies.folder import remove_run
+from nlctl.analysis.studies.page.report import study_part, study_report
 from nlctl.errors import UsageError
 
 LOOP = '''
@@ -62,9 +62,9 @@ KIND = '''
 import numpy as np
 from pydantic import Field
 
-from analysis.figures import margins_figure
-from analysis.report.document import Figure
-from analysis.studies import Asked, Kind, made
+from nlctl.analysis.figures import margins_figure
+from nlctl.analysis.report.document import Figure
+from nlctl.analysis.studies import Asked, Kind, made
 
 
 class Spread(Asked):
@@ -346,8 +346,8 @@ def test_a_kind_that_cannot_be_one_is_refused_where_it_is_made(fields, words):
 REACHED = '''
 import numpy as np
 import pandas as pd
-from analysis.loop_record import short_key
-from analysis.studies import Asked, Kind
+from nlctl.analysis.loop_record import short_key
+from nlctl.analysis.studies import Asked, Kind
 
 
 class Mean(Asked):

@@ -25,9 +25,9 @@ from test_studies_trust import (
     nested,
 )
 
-from analysis.studies import StudyError, load_result, read_study, replay, run
-from analysis.studies.code.record import record_file
-from analysis.studies.sealed import file_digest, read_json, write_json
+from nlctl.analysis.studies import StudyError, load_result, read_study, replay, run
+from nlctl.analysis.studies.code.record import record_file
+from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 
 
 class Touches:
@@ -71,14 +71,14 @@ ARGUMENTS = {  # functions of others, with what makes them dangerous
     "nlctl.host.files:replace_file": 'path = "{0}/ran", write = 1',
     "nlctl:input_output_response": "sys = 1",
     "nlctl.native.machine.store:stored": 'key = "x"',
-    "analysis.cli.loops:named_loop": 'name = "{0}/evil.py:loop"',
-    "analysis.cli.report:write_gallery_of": 'folder = "{0}", open_ = false',
-    "analysis.studies.file.resolve:named_function": 'name = "{0}/evil.py:loop", folder = "/"',
-    "analysis.studies.file.resolve:option": 'value = 1, folder = "/"',
-    "analysis.studies.code.loading:load_file": 'path = "{0}/evil.py"',
-    "analysis.studies.code.record:remember": "statements = []",
-    "analysis.studies:read_study": 'path = "{0}/evil.toml", trust = true',
-    "analysis.studies.folder:remove_run": 'folder = "{0}"',
+    "nlctl.analysis.cli.loops:named_loop": 'name = "{0}/evil.py:loop"',
+    "nlctl.analysis.cli.report:write_gallery_of": 'folder = "{0}", open_ = false',
+    "nlctl.analysis.studies.file.resolve:named_function": 'name = "{0}/evil.py:loop", folder = "/"',
+    "nlctl.analysis.studies.file.resolve:option": 'value = 1, folder = "/"',
+    "nlctl.analysis.studies.code.loading:load_file": 'path = "{0}/evil.py"',
+    "nlctl.analysis.studies.code.record:remember": "statements = []",
+    "nlctl.analysis.studies:read_study": 'path = "{0}/evil.toml", trust = true',
+    "nlctl.analysis.studies.folder:remove_run": 'folder = "{0}"',
 }
 EVIL = "import pathlib\npathlib.Path({mark!r}).touch()\n"
 
@@ -111,7 +111,7 @@ def test_a_study_alone_calls_nobody_elses_function(home, name, where):
 
 @pytest.mark.parametrize(
     "name",
-    ["analysis.cli.loops:named_loop", "analysis.loop_report:loop_report",
+    ["nlctl.analysis.cli.loops:named_loop", "nlctl.analysis.loop_report:loop_report",
      "nlctl.host.workers:process_pool", "pandas:read_pickle"],
 )  # fmt: skip
 @pytest.mark.parametrize("where", [in_loop, in_kind])
@@ -127,7 +127,7 @@ import pandas
 import pandas as table
 from pandas import read_pickle
 from numpy import load as opened
-from analysis.studies.file.resolve import named_function
+from nlctl.analysis.studies.file.resolve import named_function
 
 partial = functools.partial(read_pickle)
 cached = functools.lru_cache(read_pickle)
@@ -239,7 +239,7 @@ def test_a_received_folder_executes_nothing(home, tmp_path, place):
 
 
 KIND = '''
-from analysis.studies import Asked, Kind, made
+from nlctl.analysis.studies import Asked, Kind, made
 
 
 class Rows(Asked):

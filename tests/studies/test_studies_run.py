@@ -12,14 +12,15 @@ import pandas as pd
 import pytest
 from studies_example import HEAD, ROWS, write
 
-from analysis.robustness import (
+from nlctl import ParameterError, UnknownNameError
+from nlctl.analysis.robustness import (
     clopper_pearson,
     elementary_effects,
     load,
     prepare,
     sobol_indices,
 )
-from analysis.studies import (
+from nlctl.analysis.studies import (
     RunFolderError,
     StudyError,
     load_result,
@@ -30,11 +31,11 @@ from analysis.studies import (
     run,
     run_differences,
 )
-from analysis.studies.file.schema import keyed
-from analysis.studies.folder import load_finding, load_run, save_finding
-from analysis.studies.sealed import origin_key
-from analysis.studies.whole.contents import seal
-from nlctl import ParameterError, UnknownNameError
+from nlctl.analysis.studies.file.schema import keyed
+from nlctl.analysis.studies.folder import load_finding, load_run, save_finding
+from nlctl.analysis.studies.kind import kind_of
+from nlctl.analysis.studies.sealed import origin_key
+from nlctl.analysis.studies.whole.contents import seal
 
 EVERY_KIND = """
 [runs]
@@ -411,7 +412,7 @@ def test_failed_rows_count_as_the_least_margin_of_the_others(failing):
     made = {"shares": ("indices", sobol_indices), "effects": ("effects", elementary_effects)}
     for key, (name, analysis) in made.items():
         asked = keyed(file.study)[key]
-        design = asked.definition.design(asked, space, file.study.study.seed)
+        design = kind_of(asked).design(asked, space, file.study.study.seed)
         end = solution(design.table, 2.0)
         margin = (0.5 - np.fmax(solution(design.table, 1.0), end)) / 0.5
         if asked.of == "spec":

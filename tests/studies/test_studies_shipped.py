@@ -3,8 +3,8 @@
 import pytest
 from places import ROOT
 
-from analysis.studies import read_study, shipped
 from nlctl import UnknownNameError
+from nlctl.analysis.studies import read_study, shipped
 
 NAMES = sorted(path.stem for path in (ROOT / "reports").glob("*.toml"))
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from resealed import reseal, write_chunk
 from studies_example import HEAD, write
 
-from analysis.report import write_gallery
-from analysis.robustness.runs.store import read_parquet
-from analysis.studies import RunFolderError, read_study, run, verify
-from analysis.studies.sealed import file_digest, read_json, write_json
-from analysis.studies.whole.page import check_page, recorded_print
+from nlctl.analysis.report import write_gallery
+from nlctl.analysis.robustness.runs.store import read_parquet
+from nlctl.analysis.studies import RunFolderError, read_study, run, verify
+from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
+from nlctl.analysis.studies.whole.page import check_page, recorded_print
 from nlctl.errors import UsageError
 
 EVERY_KIND = """

@@ -6,8 +6,8 @@ import pytest
 from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
-from analysis.studies import StudyError, read_study
-from analysis.studies.file.resolve import loop_function
+from nlctl.analysis.studies import StudyError, read_study
+from nlctl.analysis.studies.file.resolve import loop_function
 from nlctl.errors import ParameterError
 
 MARK = "import pathlib\npathlib.Path({mark!r}).touch()\n"
@@ -240,8 +240,8 @@ def with_functions(folder, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", ["numpy:save", "_pytest.config:main", "pandas:read_pickle", "analysis.cli.main:main",
-             "analysis.cli.report:write_gallery_of", "matplotlib.pyplot:savefig"]
+    "name", ["numpy:save", "_pytest.config:main", "pandas:read_pickle", "matplotlib.pyplot:savefig",
+             "nlctl.analysis.cli.main:main", "nlctl.analysis.cli.report:write_gallery_of"]
 )  # fmt: skip
 def test_installed_packages_make_loops_or_are_not_called(place, name):
     """What is not built on nlctl needs trust; whoever is trusted offers mostly no diagram."""
@@ -257,11 +257,11 @@ def test_installed_packages_make_loops_or_are_not_called(place, name):
 def test_installed_packages_and_nlctl_are_trusted(place):
     """The studies that come with nlctl name its own modules."""
     folder, _ = place
-    head = HEAD.replace("loop.py:loop", "analysis.paper.loops:example_1")
+    head = HEAD.replace("loop.py:loop", "nlctl.analysis.paper.loops:example_1")
     head = head.replace('"lag.rate" = { uniform = [0.5, 2.5] }', "").replace("y <=", "e <=")
     head = head.replace('"lag.x(0)"', '"plant.x1(0)"').replace("|z|", "|u|").replace("1 s", "0 s")
     head = head.replace('error = "y"\ncontrol = "z"\n', "")
-    assert read_study(write(folder, head, ROWS)).study.loop.startswith("analysis")
+    assert read_study(write(folder, head, ROWS)).study.loop.startswith("nlctl.")
 
 
 @pytest.mark.parametrize("command", ["run", "validate", "replay", "report"])

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from studies_example import HEAD, write
 
-from analysis.robustness.runs import store
-from analysis.studies import (
+from nlctl.analysis.robustness.runs import store
+from nlctl.analysis.studies import (
     RunFolderError,
     load_result,
     origin_differences,
@@ -22,7 +22,7 @@ from analysis.studies import (
     run_differences,
     verify,
 )
-from analysis.studies.sealed import file_digest, read_json, write_json
+from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
 from nlctl.errors import UsageError
 
 STUDY = """

@@ -13,10 +13,10 @@ import sweep_examples
 from small_systems import chain, function
 
 import nlctl
-from analysis import figures, lyapunov, metrics, paper, report, robustness, studies
-from analysis.intervals.box import Box
-from analysis.loop_report import loop_report
-from analysis.robustness import Choice, Requirement, Space, Spec, Uncertain, always, in_band
+from nlctl.analysis import figures, lyapunov, metrics, paper, report, robustness, studies
+from nlctl.analysis.intervals.box import Box
+from nlctl.analysis.loop_report import loop_report
+from nlctl.analysis.robustness import Choice, Requirement, Space, Spec, Uncertain, always, in_band
 
 T = np.linspace(0.0, 1.0, 11)
 X = Uncertain(name="x", bounds=(-1.0, 1.0), nominal=0.0)

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 from unittest import mock
 
-from analysis.cli.main import main
+from nlctl.analysis.cli.main import main
 
-NLCTL = [sys.executable, "-c", "from analysis.cli.main import main; main()"]
+NLCTL = [sys.executable, "-c", "from nlctl.analysis.cli.main import main; main()"]
 
 
 def nlctl(*arguments, cwd=None, **options):

@@ -3,10 +3,10 @@
 import control as ct
 import numpy as np
 
-from nlctl.native.codegen.lower import lower
-from nlctl.native.codegen.program import count_switching_functions, memory
 from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.diagram.program import count_switching_functions, memory
 from nlctl.native.equations.blocks import equations
+from nlctl.native.lower import lower
 from nlctl.native.machine.routine import plain_functions
 from nlctl.upstream.control_internals import outputs_now, rates_now
 

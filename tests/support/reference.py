@@ -7,8 +7,8 @@ import re
 
 from places import ROOT
 
-import analysis
 import nlctl
+import nlctl.analysis
 
 PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?: +.*\n?)+)", re.MULTILINE)
 SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
@@ -28,17 +28,23 @@ def functions(package):
     return {name: made for name, made in found.items() if inspect.isfunction(made)}
 
 
+def our_modules():
+    """Every module below `nlctl`, in a checkout too, where `nlctl.analysis` lies elsewhere."""
+    found = {}
+    for package in (nlctl, nlctl.analysis):
+        walked = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+        found |= {place.name: place for place in walked}
+    return found.values()
+
+
 def offered():
     """The public functions of all packages, by the names under which they are offered."""
-    for package in (nlctl, analysis):
-        homes = [package.__name__]
-        walked = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-        homes += [found.name for found in walked if found.ispkg]
-        for home in homes:
-            if hasattr(importlib.import_module(home), "__all__"):
-                for name, made in functions(home).items():
-                    if made.__module__.partition(".")[0] in ("nlctl", "analysis"):
-                        yield f"{home}.{name}", made
+    homes = ["nlctl", "nlctl.analysis", *(place.name for place in our_modules() if place.ispkg)]
+    for home in dict.fromkeys(homes):
+        if hasattr(importlib.import_module(home), "__all__"):
+            for name, made in functions(home).items():
+                if made.__module__.partition(".")[0] == "nlctl":
+                    yield f"{home}.{name}", made
 
 
 def section(made, title):

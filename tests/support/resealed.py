@@ -5,9 +5,9 @@ import json
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analysis.robustness.runs import store
-from analysis.studies.sealed import file_digest, read_json, write_json
-from analysis.studies.whole.contents import _rows, _tables
+from nlctl.analysis.robustness.runs import store
+from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
+from nlctl.analysis.studies.whole.contents import _rows, _tables
 
 
 def reseal(folder, *names):

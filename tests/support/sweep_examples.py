@@ -5,9 +5,17 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis import metrics
-from analysis.metrics import Metric
-from analysis.robustness import Experiment, Requirement, Space, Spec, Uncertain, always, in_band
+from nlctl.analysis import metrics
+from nlctl.analysis.metrics import Metric
+from nlctl.analysis.robustness import (
+    Experiment,
+    Requirement,
+    Space,
+    Spec,
+    Uncertain,
+    always,
+    in_band,
+)
 
 T = np.linspace(0, 2, 101)
 

@@ -2,7 +2,7 @@
 
 from sweep_examples import experiment
 
-from analysis.robustness import evaluate, independent, prepare
+from nlctl.analysis.robustness import evaluate, independent, prepare
 
 made = prepare(experiment())
 evaluate(made, independent(made.experiment.space, 3, 1).table, threads=1)

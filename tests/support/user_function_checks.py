@@ -17,8 +17,8 @@ import user_functions
 
 import nlctl
 from nlctl.errors import UsageError
-from nlctl.native.codegen.lower import lower
 from nlctl.native.equations.blocks import equations
+from nlctl.native.lower import lower
 from nlctl.native.machine.routine import plain_functions
 
 LANES = 20

@@ -48,7 +48,7 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 
     Examples
     --------
-    >>> from analysis.lyapunov import clipped_split
+    >>> from nlctl.analysis.lyapunov import clipped_split
     >>> part = clipped_split(0.5, 2.0)
     >>> print(part(1.0, 1.5), part(1.0, 3.0))  # k = v/u, and at most 2
     1.5 2.0

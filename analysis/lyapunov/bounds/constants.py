@@ -49,7 +49,7 @@ def kappa() -> Proof:
 
     Examples
     --------
-    >>> from analysis.lyapunov import kappa
+    >>> from nlctl.analysis.lyapunov import kappa
     >>> kappa().holds
     True
     """
@@ -69,7 +69,7 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     times : (start, end)
         In s; ``(0, inf)`` bounds d for all time, with the phases at their worst.
     tol : float, optional
-        As in `analysis.intervals.branch_and_bound.enclose`.
+        As in `nlctl.analysis.intervals.branch_and_bound.enclose`.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import Box, disturbance
+    >>> from nlctl.analysis.lyapunov import Box, disturbance
     >>> box = Box(names=("x1", "x2", "x3"), low=(-1.0,) * 3, high=(1.0,) * 3)
     >>> found = disturbance(nlctl.Genesio(), box, (0.0, np.inf))
     >>> -1.0001 < found.low <= -1.0 and 1.0 <= found.high < 1.0001

@@ -36,10 +36,10 @@ class DecompositionError(UsageError):
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import decompose
+    >>> from nlctl.analysis.lyapunov import decompose
     >>> decompose(nlctl.Saturation())
     Traceback (most recent call last):
-    analysis.lyapunov.bounds.decomposition.DecompositionError: Saturation is not of the form (2)...
+    nlctl.analysis...DecompositionError: Saturation is not of the form (2)...
     """
 
 
@@ -188,7 +188,7 @@ def decompose(
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import decompose
+    >>> from nlctl.analysis.lyapunov import decompose
     >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
     >>> print(split.k_1, split.k_2, split.eps_low, split.eps_high, split.provenance)
     0.8 1.0 -0.5 0.3 computed

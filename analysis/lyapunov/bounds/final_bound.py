@@ -13,7 +13,7 @@ import numpy as np
 __all__ = ["KAPPA", "Gains", "alpha_0", "alpha_1", "final_bound", "initial_V", "total_error"]
 
 KAPPA = 0.2785
-"""Bound of s - s tanh s for s >= 0, (29); `analysis.lyapunov.bounds.constants.kappa` proves it."""
+"""Bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -155,7 +155,7 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import Box, constants, literal, premises
+    >>> from nlctl.analysis.lyapunov import Box, constants, literal, premises
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]
     >>> loop = nlctl.paper.example_1(controller=controller)
     >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, -5.0), high=(1.0, 1.0, 5.0))

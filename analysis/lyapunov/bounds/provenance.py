@@ -62,7 +62,7 @@ class Constant:
 
     Examples
     --------
-    >>> from analysis.lyapunov import Constant
+    >>> from nlctl.analysis.lyapunov import Constant
     >>> given = Constant(symbol="tau", value=0.2, unit="1", provenance="given", how="", over="")
     >>> print(given.symbol, given.value, given.provenance)
     tau 0.2 given
@@ -189,7 +189,7 @@ class Shown:
     params : mapping
         Parameters of the proof that are not those of the loop as it stands.
     loop_facts : mapping
-        What the loop consists of, see `analysis.loop_record`.
+        What the loop consists of, see `nlctl.analysis.loop_record`.
     """
 
     name: str
@@ -250,8 +250,8 @@ class Shown:
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
 
-        ``python -m analysis.recheck FILE`` answers yes or no, with integer arithmetic of its own.
-        Bounds are rounded up, as a rule by less than a thousandth.
+        ``python -m nlctl.analysis.recheck FILE`` answers yes or no, with integer arithmetic of its
+        own.  Bounds are rounded up, as a rule by less than a thousandth.
 
         Parameters
         ----------

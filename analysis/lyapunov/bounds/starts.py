@@ -43,7 +43,7 @@ class Starts:
 
     Examples
     --------
-    >>> from analysis.lyapunov import Starts
+    >>> from nlctl.analysis.lyapunov import Starts
     >>> print(Starts(names=("plant.x1", "plant.x2"), low=(-1.0, 0.0), high=(1.0, 0.0)))
     plant.x1(0) in [-1, 1], all other states 0, at t = 0
     """

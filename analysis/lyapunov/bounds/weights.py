@@ -109,8 +109,8 @@ def minimax_weights(network: Network, largest: float | None = None) -> np.ndarra
     The best constant for g = x1^2 on [0, 1] misses it by 1/2 at both ends:
 
     >>> import numpy as np
-    >>> from analysis.lyapunov import minimax_weights
-    >>> from analysis.lyapunov.bounds.weights import Network
+    >>> from nlctl.analysis.lyapunov import minimax_weights
+    >>> from nlctl.analysis.lyapunov.bounds.weights import Network
     >>> x = np.linspace(0, 1, 11)[:, None]
     >>> network = Network(psi=np.ones((11, 1)), g=x[:, 0] ** 2, points=x)
     >>> W = minimax_weights(network)
@@ -176,8 +176,8 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import read_parts, tightest_weights
-    >>> from analysis.lyapunov.bounds.weights import Network
+    >>> from nlctl.analysis.lyapunov import read_parts, tightest_weights
+    >>> from nlctl.analysis.lyapunov.bounds.weights import Network
     >>> x = np.linspace(0, 1, 11)[:, None]
     >>> network = Network(psi=np.ones((11, 1)), g=x[:, 0] ** 2, points=x)
     >>> gains = read_parts(nlctl.paper.example_1()).gains
@@ -239,7 +239,7 @@ def approximation_error(
     Without weights it is the range of g, here -6 x1 + x1^2 for x1 in [0, 0.1]:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import Box, approximation_error
+    >>> from nlctl.analysis.lyapunov import Box, approximation_error
     >>> box = Box(names=("x1", "x2", "x3"), low=(0.0,) * 3, high=(0.1, 0.0, 0.0))
     >>> found = approximation_error(nlctl.Genesio(), None, (), box)
     >>> print(round(found.low, 2), round(abs(found.high), 2))

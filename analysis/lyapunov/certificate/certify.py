@@ -106,7 +106,7 @@ def certify(
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import certify
+    >>> from nlctl.analysis.lyapunov import certify
     >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
     >>> weights = nlctl.AdaptiveWeights(Gamma=10.0)
     >>> controller = nlctl.adaptive_neural(2, law=law, weights=weights, robust=robust)

@@ -147,7 +147,7 @@ def design(
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import design
+    >>> from nlctl.analysis.lyapunov import design
     >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
     >>> no_network = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
     >>> controller = nlctl.adaptive_neural(2, law=law, weights=no_network, robust=robust)

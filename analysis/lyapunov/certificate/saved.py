@@ -1,8 +1,8 @@
 """A certificate as a file that others check: rationals, boxes, and the claim, as JSON.
 
-`analysis.recheck` reads it, and knows nothing of what found it.  Bounds are written a little wider
-than they were proved, so that plain interval arithmetic follows them, and nothing is written that
-the recheck does not answer with yes.
+`nlctl.analysis.recheck` reads it, and knows nothing of what found it.  Bounds are written a little
+wider than they were proved, so that plain interval arithmetic follows them, and nothing is written
+that the recheck does not answer with yes.
 """
 
 from __future__ import annotations

@@ -128,7 +128,7 @@ class SlidingModeCertificate(Shown):
     The plant of Example 1 behind a linear actuator; |r| is in the layer in the end:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import certify
+    >>> from nlctl.analysis.lyapunov import certify
     >>> controller = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0, phi=0.1))
     >>> loop = nlctl.paper.example_1(controller=controller, actuator=nlctl.Gain())
     >>> found = certify(loop)

@@ -14,8 +14,8 @@ import numpy as np
 from nlctl.diagrams import Place
 from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
 from nlctl.expressions.trace import trace
-from nlctl.native.codegen.trace import traced_arguments
-from nlctl.native.parameters import slots_of
+from nlctl.native.diagram.parameters import slots_of
+from nlctl.native.diagram.trace import traced_arguments
 from nlctl.plants import PureFeedback, integrator_chain
 
 __all__ = ["terms_with_parameters", "update_is_declared"]

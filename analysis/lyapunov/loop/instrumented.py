@@ -95,7 +95,7 @@ def observed(
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import (
+    >>> from nlctl.analysis.lyapunov import (
     ...     Box, comparison, constants, inequalities, observed, premises, read_parts, signals_of
     ... )
     >>> controller = nlctl.controllers.ablations(nlctl.adaptive_neural(2))["no network"]

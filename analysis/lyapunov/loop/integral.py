@@ -45,7 +45,7 @@ def sharpest(split: Decomposition) -> Decomposition:
     Where v = k u is within the bounds of k nothing is left for eps_u:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import decompose, sharpest
+    >>> from nlctl.analysis.lyapunov import decompose, sharpest
     >>> split = decompose(nlctl.DeadZone(ripple_r=0, ripple_l=0))
     >>> zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0), "actuator")
     >>> v = float(zone.output(0, [], [10.0])[0])
@@ -76,7 +76,7 @@ class NussbaumIntegral:
     Its three integrals are states and outputs:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import NussbaumIntegral
+    >>> from nlctl.analysis.lyapunov import NussbaumIntegral
     >>> nlctl.block(NussbaumIntegral(), "integral").state_labels
     ['I', 'I_bar', 'I_printed']
     """

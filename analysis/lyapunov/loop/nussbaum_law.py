@@ -22,8 +22,8 @@ _SIGNALS = ("zeta", "r", "u")
 def law_of_response(loop: Any, response: Any) -> GainFunction:
     """Return the Nussbaum function of the loop that a response is of.
 
-    The response is compared with the loop, see `analysis.response_of_loop`, and at its samples
-    N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
+    The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
+    samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
 
     Parameters
     ----------

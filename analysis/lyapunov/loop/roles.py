@@ -21,8 +21,8 @@ from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 from nlctl.diagrams import Place, initial_state, interconnect, overridden
 from nlctl.diagrams.points import values_now
 from nlctl.errors import CompileError, DiagramError
+from nlctl.native.diagram.checks import check_functions, check_sizes
 from nlctl.native.diagram.wiring import Combination, Signal, Wiring
-from nlctl.native.thirdparty.checks import check_functions, check_sizes
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import Around
 
@@ -423,12 +423,12 @@ def read_parts(
     Raises
     ------
     DiagramError
-        As `analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
+        As `nlctl.analysis.lyapunov.loop.roles.read_roles` does, or if there are external inputs.
 
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.lyapunov import read_parts
+    >>> from nlctl.analysis.lyapunov import read_parts
     >>> parts = read_parts(nlctl.paper.example_1(), params={"law.beta": 3.0})
     >>> type(parts.actuator).__name__, parts.gains.beta
     ('DeadZone', 3.0)

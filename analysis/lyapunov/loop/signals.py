@@ -21,7 +21,7 @@ INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
 
 @dataclass(frozen=True, kw_only=True)
 class Signals:
-    """Signals of `analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``.
+    """Signals of `nlctl.analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ def signals_of(response: Any) -> Signals:
     --------
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import signals_of
+    >>> from nlctl.analysis.lyapunov import signals_of
     >>> response = nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 0.1, 11))
     >>> float(signals_of(response)["zeta"][0])
     1.0

@@ -75,7 +75,7 @@ class MemberRun:
     message : str
         Why it ended early.
     reference : Margin or None
-        Of the reference's derivatives, see `analysis.lyapunov.loop.reference_rates`.
+        Of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`.
     """
 
     member: Member
@@ -167,7 +167,7 @@ def observe(
     split: Decomposition,
     max_steps: int = 2_000_000,
 ) -> Iterator[MemberRun]:
-    """Run the members, observed; see `analysis.lyapunov.loop.instrumented`.
+    """Run the members, observed; see `nlctl.analysis.lyapunov.loop.instrumented`.
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ def aftermath(
     Where k G is constant, zeta rests where the integral of N since the beginning is 0:
 
     >>> import nlctl
-    >>> from analysis.lyapunov import aftermath
+    >>> from nlctl.analysis.lyapunov import aftermath
     >>> found = aftermath(3.0, kG=(2.0, 2.0))
     >>> low, high = found.rest
     >>> print(round(low, 4), round(high, 4))

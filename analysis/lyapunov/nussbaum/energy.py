@@ -107,7 +107,7 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     --------
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import drift, drift_margin
+    >>> from nlctl.analysis.lyapunov import drift, drift_margin
     >>> loop = nlctl.paper.example_1()
     >>> run = drift(nlctl.input_output_response(loop, np.linspace(0, 1, 101)))
     >>> print(run.mismatch < 0.01, drift_margin(run, 1.0, 10.0, l_min=0.7, l_max=1.3).monotone)
@@ -269,7 +269,7 @@ def safe_horizon(
     --------
     With a constant gain and no V(0) it is what the lobe holds, over alpha_0:
 
-    >>> from analysis.lyapunov import nussbaum_property, safe_horizon
+    >>> from nlctl.analysis.lyapunov import nussbaum_property, safe_horizon
     >>> lobe = nussbaum_property().lobes[1]
     >>> found = safe_horizon(0.0, 0.1, l_min=1.0, l_max=1.0)
     >>> print(round(found.time, 3), round((abs(lobe.integral) - (lobe.high - lobe.low)) / 0.1, 3))

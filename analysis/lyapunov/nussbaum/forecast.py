@@ -31,9 +31,9 @@ class BurstForecast:
     """Time (s) at which zeta will have crossed its lobe, by the balance of its drift.
 
     A metric of `nlctl.ensemble_response` and of `experiment.Experiment`, for loops with the law
-    (23), (24): see `analysis.lyapunov.nussbaum.slow_drift`.  Infinite where the drift stops or
-    reverses before; the time of the burst itself where it lies within the run.  A forecast, not a
-    bound: it supposes that disturbance and reference go on as they were.
+    (23), (24): see `nlctl.analysis.lyapunov.nussbaum.slow_drift`.  Infinite where the drift stops
+    or reverses before; the time of the burst itself where it lies within the run.  A forecast, not
+    a bound: it supposes that disturbance and reference go on as they were.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class BurstForecast:
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.robustness import BurstForecast
+    >>> from nlctl.analysis.robustness import BurstForecast
     >>> N = nlctl.functions.nussbaum_integral
     >>> zetas = np.linspace(1.0, 3.0, 4001)  # a lobe of N
     >>> t = np.linspace(0.0, 100.0, 10001)

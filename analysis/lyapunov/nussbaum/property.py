@@ -265,7 +265,7 @@ def nussbaum_property(
 
     Examples
     --------
-    >>> from analysis.lyapunov import nussbaum_property
+    >>> from nlctl.analysis.lyapunov import nussbaum_property
     >>> found = nussbaum_property()
     >>> [(lobe.low, lobe.high) for lobe in found.lobes[:3]]  # cos(pi zeta / 2) changes its sign
     [(0.0, 1.0), (1.0, 3.0), (3.0, 5.0)]

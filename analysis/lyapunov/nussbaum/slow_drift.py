@@ -193,7 +193,7 @@ def burst_peak(lobe: Lobe, kG: float) -> float:
     --------
     Through the lobe of the paper's N from 1 to 3, with a gain of 1:
 
-    >>> from analysis.lyapunov import burst_peak, nussbaum_property
+    >>> from nlctl.analysis.lyapunov import burst_peak, nussbaum_property
     >>> lobe = nussbaum_property().lobes[1]
     >>> print(round(burst_peak(lobe, 1.0), 4), round((2 * abs(lobe.integral)) ** 0.5, 4))
     28.0091 28.0091
@@ -226,7 +226,7 @@ def slow_drift(
         The Nussbaum function of the law.
     loop : control.InterconnectedSystem or Compiled, optional
         The loop that the response is of: N is then that of its law, and it is checked that the
-        loop is one that this is about, see `analysis.lyapunov.loop.nussbaum_law`.
+        loop is one that this is about, see `nlctl.analysis.lyapunov.loop.nussbaum_law`.
     window : float, optional
         Length of the windows (s) over which rates are averaged; whole periods of the reference,
         of which the default holds four for the paper's.
@@ -255,7 +255,7 @@ def slow_drift(
     >>> import control as ct
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.lyapunov import slow_drift
+    >>> from nlctl.analysis.lyapunov import slow_drift
     >>> N = nlctl.functions.nussbaum_integral
     >>> zetas, t = np.linspace(1.0, 3.0, 4001), np.linspace(0.0, 100.0, 10001)
     >>> zeta = np.interp(0.4 * t, N(1.0) - N(zetas), zetas)

@@ -1,7 +1,7 @@
 """The paper's controller, unchanged, and its rivals through every actuator of nlctl: a kept record.
 
-``python -m analysis.paper.limits.actuators FOLDER`` makes it again, in five minutes, prints the
-tables of ``docs/explanation/actuators.md`` and draws its figures into FOLDER.  Friction is left
+``python -m nlctl.analysis.paper.limits.actuators FOLDER`` makes it again, in five minutes, prints
+the tables of ``docs/explanation/actuators.md`` and draws its figures into FOLDER.  Friction is left
 out: it takes a velocity and makes a force, and is not an actuator of the form
 v = k(u, t) u + eps_u (2) between the controller and the plant.
 """
@@ -96,7 +96,7 @@ def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any
     name : str
         Of `actuators_of_the_table`.
     label : str, optional
-        Controller, of `analysis.paper.rivals.rival_controllers`.
+        Controller, of `nlctl.analysis.paper.rivals.rival_controllers`.
 
     Returns
     -------

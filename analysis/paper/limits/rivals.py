@@ -1,7 +1,7 @@
 """What the studies ``reports/rivals-1.toml`` and ``rivals-2.toml`` found: a kept record.
 
-``python -m analysis.paper.limits.rivals`` runs both again, in six minutes, and prints the tables
-of ``docs/explanation/rivals.md``.
+``python -m nlctl.analysis.paper.limits.rivals`` runs both again, in six minutes, and prints the
+tables of ``docs/explanation/rivals.md``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ KEY = ["parameters", "rates"]
 RIVAL_ACTUATORS = {"ideal": "no nonlinearity"} | {
     name: name for name in ("dead zone", "backlash", "saturation")
 }
-"""What tables call the actuators of `analysis.paper.rivals.rival_actuators`."""
+"""What tables call the actuators of `nlctl.analysis.paper.rivals.rival_actuators`."""
 
 
 def rivals_study(example: str) -> Path:
@@ -61,7 +61,7 @@ def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
     Parameters
     ----------
     example, controller, actuator : str
-        See `analysis.paper.rivals.rival_loop`.
+        See `nlctl.analysis.paper.rivals.rival_loop`.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
         has other parameters or other rates.
     """
     record = pd.read_csv(path)
-    again = "make it again with 'python -m analysis.paper.limits.rivals'"
+    again = "make it again with 'python -m nlctl.analysis.paper.limits.rivals'"
     for example in paper.EXAMPLES:
         made = set(record.loc[record["example"] == example, "study"])
         if made != {study_key(example)}:

@@ -21,9 +21,9 @@ def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[
     Parameters
     ----------
     runs : mapping
-        Result of `analysis.paper.run_all`.
+        Result of `nlctl.analysis.paper.run_all`.
     numerics : pandas.DataFrame, optional
-        Result of `analysis.paper.numerics`.
+        Result of `nlctl.analysis.paper.numerics`.
     """
     return [_choices(runs), _numerics(runs, numerics), _limits(runs)]
 

@@ -40,7 +40,7 @@ def lyapunov_sections(
     found : mapping
         Result of `evidence` by number of the example; without any there is no part.
     far : mapping, optional
-        Runs far beyond 20 s, by key of `analysis.paper.evidence.FAR_HORIZONS`.
+        Runs far beyond 20 s, by key of `nlctl.analysis.paper.evidence.FAR_HORIZONS`.
     burst : Burst, optional
         Example 2 beyond its run.
 

@@ -14,7 +14,7 @@ from ..burst import Burst
 from ..evidence import Evidence
 from .notation import formulas
 
-_IMPORT = "import nlctl; from analysis.lyapunov.nussbaum.long_run import long_run"
+_IMPORT = "import nlctl; from nlctl.analysis.lyapunov.nussbaum.long_run import long_run"
 LONG_RUN = f'python -c "{_IMPORT}; print(long_run(nlctl.paper.example_2(), rtol=1e-8))"'
 LONG_RUN_1 = (
     f"python -c \"{_IMPORT}; print(long_run(nlctl.paper.example_1(phase='integral'), 20_000))\""
@@ -73,7 +73,7 @@ LEMMA = (
     r"the energy that the Nussbaum term has given and taken; it grows with \(t\). For a constant "
     r"gain or a \(\zeta\) that never falls, line (b) turns it into a time before which \(N\) "
     r"cannot change its sign. A bound for all time needs another law: with the sign of the gain "
-    r"known, analysis.lyapunov.certify proves one, shown with each example below.",
+    r"known, nlctl.analysis.lyapunov.certify proves one, shown with each example below.",
 )
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "

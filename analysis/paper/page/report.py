@@ -42,26 +42,26 @@ def paper_report(
     rivals: pd.DataFrame | None = None,
     sections: Sequence[Section] | None = None,
 ) -> Report:
-    """Compose the reproduction report from the runs of `analysis.paper.CASES`.
+    """Compose the reproduction report from the runs of `nlctl.analysis.paper.CASES`.
 
     Parameters
     ----------
     runs : mapping
-        Result of `analysis.paper.run_all`.
+        Result of `nlctl.analysis.paper.run_all`.
     proofs : mapping, optional
-        What `analysis.paper.page.proof.evidence` found, by number of the example.
+        What `nlctl.analysis.paper.page.proof.evidence` found, by number of the example.
     far : mapping, optional
-        Runs far beyond 20 s, of `analysis.paper.evidence.far_runs_in_background`.
+        Runs far beyond 20 s, of `nlctl.analysis.paper.evidence.far_runs_in_background`.
     burst : Burst, optional
-        Example 2 beyond its run, of `analysis.paper.burst.through_the_burst`.
+        Example 2 beyond its run, of `nlctl.analysis.paper.burst.through_the_burst`.
     studies : sequence of Section, optional
-        The part on robustness, see `analysis.studies.page.report.study_part`.
+        The part on robustness, see `nlctl.analysis.studies.page.report.study_part`.
     numerics : pandas.DataFrame, optional
-        Result of `analysis.paper.numerics`.
+        Result of `nlctl.analysis.paper.numerics`.
     sampling : pandas.DataFrame, optional
-        Result of `analysis.paper.sampling_limits.checked_record`.
+        Result of `nlctl.analysis.paper.sampling_limits.checked_record`.
     rivals : pandas.DataFrame, optional
-        Result of `analysis.paper.limits.rivals.checked_rivals`.
+        Result of `nlctl.analysis.paper.limits.rivals.checked_rivals`.
     sections : sequence of Section, optional
         What `paper_sections` makes of the same; by default it is made here.
 

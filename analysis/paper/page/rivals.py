@@ -22,7 +22,7 @@ def rivals_section(record: pd.DataFrame) -> Section:
     Parameters
     ----------
     record : pandas.DataFrame
-        Of `analysis.paper.limits.rivals.checked_rivals`.
+        Of `nlctl.analysis.paper.limits.rivals.checked_rivals`.
     """
     return Section(
         key="rivals",
@@ -48,7 +48,7 @@ def rivals_section(record: pd.DataFrame) -> Section:
                 text="These are medians of a kept record. The studies behind it, with all pairs, "
                 "differences and intervals, are run by nlctl run reports/rivals-1.toml and "
                 "reports/rivals-2.toml; the command that makes the record again:",
-                code="python -m analysis.paper.limits.rivals",
+                code="python -m nlctl.analysis.paper.limits.rivals",
             ),
         ],
     )

@@ -25,7 +25,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
     Parameters
     ----------
     record : pandas.DataFrame
-        Of `analysis.paper.sampling_limits.checked_record`.
+        Of `nlctl.analysis.paper.sampling_limits.checked_record`.
     """
     found = spec_ends(record)
     return Section(
@@ -44,7 +44,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
             Paragraph(
                 text="These are runs of a kept record, 13 to 21 for each entry of the table; two "
                 "of them are run again for this page and agree to 1e-3. The command that makes all "
-                "of them again: python -m analysis.paper.sampling_limits"
+                "of them again: python -m nlctl.analysis.paper.sampling_limits"
             ),
         ],
     )

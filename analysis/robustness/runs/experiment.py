@@ -18,7 +18,7 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
-from nlctl.native.integrate.driver import Settings
+from nlctl.native.settings import Settings
 from nlctl.params import as_numbers, checked_times
 from nlctl.responses.arguments import input_array
 
@@ -99,7 +99,7 @@ class Experiment:
         for metric in self.metrics:
             if not (hasattr(metric, "key") and hasattr(metric, "signals")):
                 raise ParameterError(
-                    f"{who} needs metrics such as analysis.metrics.Metric, got {metric!r}"
+                    f"{who} needs metrics such as nlctl.analysis.metrics.Metric, got {metric!r}"
                 )
         Settings(rtol=self.rtol, atol=self.atol, max_steps=self.max_steps, method=self.method)
         given = as_numbers(self.inputs)
@@ -176,7 +176,7 @@ def prepare(experiment: Experiment) -> Prepared:
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, evaluate, grid, in_band,
     ...     prepare, rows,
     ... )

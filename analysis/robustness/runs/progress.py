@@ -41,7 +41,7 @@ class Progress:
     --------
     What `sweep` calls its argument `progress` with, here after 300 of 1000 rows:
 
-    >>> from analysis.robustness import Progress
+    >>> from nlctl.analysis.robustness import Progress
     >>> now = Progress(done=300, total=1000, runs=300, violations=0, rate=100.0, is_iid=True)
     >>> now.remaining  # 700 rows at 100 a second
     7.0

@@ -55,11 +55,11 @@ class StoreError(UsageError):
 
     Examples
     --------
-    >>> from analysis.robustness import load
+    >>> from nlctl.analysis.robustness import load
     >>> load("no/such/folder")
     Traceback (most recent call last):
         ...
-    analysis...StoreError: 'no/such/folder/study.json' is not a study of a sweep: ...
+    nlctl.analysis...StoreError: 'no/such/folder/study.json' is not a study of a sweep: ...
     """
 
 

@@ -136,7 +136,7 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     --------
     >>> import tempfile
     >>> import nlctl
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, grid, in_band, load, prepare, sweep
     ... )
     >>> space = Space(quantities=(Uncertain(name="valve.limit", bounds=(1.0, 3.0), nominal=2.0),))
@@ -222,7 +222,7 @@ def sweep(
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, independent,
     ...     prepare, sweep, until_decided,
     ... )

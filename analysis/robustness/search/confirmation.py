@@ -112,7 +112,7 @@ def confirm(
     --------
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, confirm, in_band, prepare
     ... )
     >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.05, 0.5)),))

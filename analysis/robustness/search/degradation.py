@@ -122,7 +122,7 @@ def degradation_curve(
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, degradation_curve
+    >>> from nlctl.analysis.robustness import Space, Uncertain, degradation_curve
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(-1.0, 1.0), nominal=0.0),))
     >>> def margin(table):
     ...     return table.assign(spec=1.5 - table["a"].abs())

@@ -121,7 +121,7 @@ def failure_map(
     --------
     The margin 1 - a^2 - b^2 is 0 on a circle; cells end at 1.5 / (8 * 2^4):
 
-    >>> from analysis.robustness import Space, Uncertain, boundary, failure_map
+    >>> from nlctl.analysis.robustness import Space, Uncertain, boundary, failure_map
     >>> box = (Uncertain(name="a", bounds=(0.0, 1.5)), Uncertain(name="b", bounds=(0.0, 1.5)))
     >>> def margin(table):
     ...     return table.assign(spec=1 - table["a"] ** 2 - table["b"] ** 2)

@@ -69,7 +69,7 @@ def largest_scale(
 
     >>> import numpy as np
     >>> import nlctl
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, eventually, in_band, largest_scale,
     ...     prepare,
     ... )

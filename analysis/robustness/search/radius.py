@@ -184,7 +184,7 @@ def robustness_radius(
     --------
     The margin a + b - 1 is 0 where both are 0.5, half way from 1 to the ends of a box of size 1:
 
-    >>> from analysis.robustness import Space, Uncertain, robustness_radius
+    >>> from nlctl.analysis.robustness import Space, Uncertain, robustness_radius
     >>> a = Uncertain(name="a", bounds=(0.0, 2.0), nominal=1.0)
     >>> b = Uncertain(name="b", bounds=(0.0, 2.0), nominal=1.0)
     >>> def margin(table):

@@ -117,7 +117,7 @@ def shrink(
     --------
     Of two deviations one suffices, and 1 - a > 0.5 is needed of it:
 
-    >>> from analysis.robustness import Space, Uncertain, shrink
+    >>> from nlctl.analysis.robustness import Space, Uncertain, shrink
     >>> a = Uncertain(name="a", bounds=(0.0, 2.0), nominal=1.0)
     >>> b = Uncertain(name="b", bounds=(0.0, 2.0), nominal=1.0)
     >>> def margin(table):

@@ -146,7 +146,7 @@ def worst_case(
     --------
     The margin a + b - 1.5 is lowest in the corner (0.5, 0.5):
 
-    >>> from analysis.robustness import Space, Uncertain, worst_case
+    >>> from nlctl.analysis.robustness import Space, Uncertain, worst_case
     >>> a = Uncertain(name="a", bounds=(0.5, 1.0), nominal=1.0)
     >>> b = Uncertain(name="b", bounds=(0.5, 1.0), nominal=1.0)
     >>> def margin(table):

@@ -100,7 +100,7 @@ def crossed(design: Design, choice: Choice) -> pd.DataFrame:
 
     Examples
     --------
-    >>> from analysis.robustness import Choice, Space, Uncertain, crossed, grid
+    >>> from nlctl.analysis.robustness import Choice, Space, Uncertain, crossed, grid
     >>> import nlctl
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> law = Choice(name="law", options={"one": nlctl.Gain(k=1.0), "two": nlctl.Gain(k=2.0)})
@@ -163,7 +163,8 @@ def compare(
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.robustness import Choice, Space, Uncertain, compare, crossed, independent
+    >>> from nlctl.analysis.robustness import Choice, Space, Uncertain
+    >>> from nlctl.analysis.robustness import compare, crossed, independent
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> design = independent(space, 5, entropy=1)
     >>> law = Choice(name="law", options={"one": nlctl.Gain(k=1.0), "two": nlctl.Gain(k=2.0)})

@@ -47,12 +47,12 @@ class NoGuaranteeError(UsageError):
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, grid, violation_probability
+    >>> from nlctl.analysis.robustness import Space, Uncertain, grid, violation_probability
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> violation_probability(grid(space, 3), [1.0, 1.0, 1.0])
     Traceback (most recent call last):
         ...
-    analysis...NoGuaranteeError: no guarantee from a design of kind 'grid': its rows were chosen ...
+    nlctl.analysis...NoGuaranteeError: no guarantee from a design of kind 'grid': its rows ...
     """
 
 
@@ -320,7 +320,7 @@ def violation_probability(
     --------
     No violation in 459 runs bounds its probability by 1 % with confidence 99 %:
 
-    >>> from analysis.robustness import Space, Uncertain, independent, violation_probability
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, violation_probability
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> found = violation_probability(independent(space, 459, entropy=1), [1.0] * 459)
     >>> print(found.violations, round(found.upper, 5), round(1 - 0.01 ** (1 / 459), 5))

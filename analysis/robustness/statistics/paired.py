@@ -79,7 +79,7 @@ def differences(
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, differences, independent
+    >>> from nlctl.analysis.robustness import Space, Uncertain, differences, independent
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> errors = {"PID": [3.0, 4.0, 5.0, 6.0], "paper": [1.0, 2.0, 3.0, 4.0]}
     >>> found = differences(independent(space, 4, entropy=1), errors)
@@ -145,7 +145,7 @@ def wins(
     --------
     A tie counts for neither, and a run that diverged loses:
 
-    >>> from analysis.robustness import Space, Uncertain, independent, wins
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, wins
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> errors = {"PID": [3.0, 2.0, 5.0, float("nan")], "paper": [1.0, 2.0, 9.0, 4.0]}
     >>> count = wins(independent(space, 4, entropy=1), errors)
@@ -193,7 +193,7 @@ def mcnemar(design: Design, margins: Mapping[str, Margins]) -> pd.DataFrame:
     --------
     Of five rows in which only one of them violates, all are the PID's: 2 / 2^5.
 
-    >>> from analysis.robustness import Space, Uncertain, independent, mcnemar
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, mcnemar
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> found = mcnemar(
     ...     independent(space, 5, entropy=1), {"PID": [-1.0] * 5, "paper": [1.0] * 5}

@@ -58,7 +58,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     --------
     A run that failed counts as the least of the others, and at most as -1:
 
-    >>> from analysis.robustness import censored, unfinished_margin
+    >>> from nlctl.analysis.robustness import censored, unfinished_margin
     >>> values, failed, least = censored([0.5, -0.2, unfinished_margin(1.0, 10.0)])
     >>> print(values, failed, least)
     [ 0.5 -0.2 -1. ] 1 -1.0
@@ -161,7 +161,7 @@ def elementary_effects(
     --------
     Of a + 3 b the effects are 1 and 3, wherever they are taken:
 
-    >>> from analysis.robustness import Space, Uncertain, elementary_effects, morris, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, elementary_effects, morris, rows
     >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(0.0, 1.0)))
     >>> design = morris(Space(quantities=box), 4, entropy=1)
     >>> table = rows(design, range(design.size))
@@ -270,7 +270,7 @@ def sobol_indices(
     --------
     Of a + 3 b, a and b uniform, b has nine tenths of the variance:
 
-    >>> from analysis.robustness import Space, Uncertain, rows, saltelli, sobol_indices
+    >>> from nlctl.analysis.robustness import Space, Uncertain, rows, saltelli, sobol_indices
     >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(0.0, 1.0)))
     >>> design = saltelli(Space(quantities=box), 256, entropy=1)
     >>> table = rows(design, range(design.size))
@@ -344,7 +344,7 @@ def regional(design: Design, margins: Margins) -> pd.DataFrame:
     --------
     What decides about failing has the statistic 1:
 
-    >>> from analysis.robustness import Space, Uncertain, independent, regional, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, regional, rows
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(-1.0, 1.0)),))
     >>> design = independent(space, 100, entropy=1)
     >>> print(regional(design, rows(design, range(100))["a"])["statistic"].tolist())

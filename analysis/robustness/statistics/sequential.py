@@ -89,7 +89,7 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
     After one run without a violation the evidence is B(1/2, 3/2) / B(1/2, 1/2) / (1 - p), 1/2 over
     1 - p, which is 100 at p = 0.995:
 
-    >>> from analysis.robustness import sequence_bounds
+    >>> from nlctl.analysis.robustness import sequence_bounds
     >>> lower, upper = sequence_bounds(0, 1, confidence=0.99)
     >>> lower, round(upper, 6)
     (0.0, 0.995)
@@ -176,7 +176,7 @@ def confidence_sequence(
     --------
     It is wider than the bounds for a number of runs that was fixed in advance:
 
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Space, Uncertain, confidence_sequence, independent, violation_probability
     ... )
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
@@ -242,7 +242,7 @@ def decide(
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, decide, independent
+    >>> from nlctl.analysis.robustness import Space, Uncertain, decide, independent
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> test = decide(independent(space, 1000, entropy=1), [1.0] * 1000, threshold=0.05)
     >>> print(test.decision, test.statement.violations, test.statement.runs < 1000)

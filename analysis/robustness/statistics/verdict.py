@@ -72,7 +72,7 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
 
     Examples
     --------
-    >>> from analysis.robustness import (
+    >>> from nlctl.analysis.robustness import (
     ...     Space, Uncertain, bound_verdict, independent, violation_probability
     ... )
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
@@ -110,7 +110,7 @@ def test_verdict(test: SequentialTest) -> Verdict:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, decide, independent, test_verdict
+    >>> from nlctl.analysis.robustness import Space, Uncertain, decide, independent, test_verdict
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> test = decide(independent(space, 1000, entropy=1), [1.0] * 1000, threshold=0.05)
     >>> test_verdict(test).answer

@@ -9,7 +9,7 @@
 (Donzé, Maler: Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010).
 rho > 0 holds, rho < 0 fails.  Signals are connected by lines between samples, through a curve's
 extreme where samples support one; with the breaks of a run known, by curves between them (see
-`analysis.metrics.curves`).  On these lines the margins are exact, sliding windows included.
+`nlctl.analysis.metrics.curves`).  On these lines the margins are exact, sliding windows included.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def in_band(
     The margin counts in multiples of the bound:
 
     >>> import numpy as np
-    >>> from analysis.robustness import Requirement, in_band, margin
+    >>> from nlctl.analysis.robustness import Requirement, in_band, margin
     >>> band = Requirement(key="band", formula=in_band("e", lower=-0.2, upper=0.2), until=0.0)
     >>> margin(band, np.zeros(1), {"e": np.array([0.1])})
     0.5
@@ -233,7 +233,7 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     The error stays within 0.1 from 1 s on:
 
     >>> import numpy as np
-    >>> from analysis.robustness import Requirement, always, in_band, margin
+    >>> from nlctl.analysis.robustness import Requirement, always, in_band, margin
     >>> small = always(in_band("e", lower=-0.1, upper=0.1), start=1.0)
     >>> tracks = Requirement(key="tracks", formula=small, until=5.0)
     >>> times = np.linspace(0.0, 5.0, 501)
@@ -270,7 +270,7 @@ def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventu
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.robustness import Requirement, eventually, in_band, margin
+    >>> from nlctl.analysis.robustness import Requirement, eventually, in_band, margin
     >>> rises = Requirement(key="rises", formula=eventually(in_band("y", lower=0.9)), until=5.0)
     >>> times = np.linspace(0.0, 5.0, 501)
     >>> margin(rises, times, {"y": np.minimum(times, 1.8)})  # (1.8 - 0.9) / 0.9

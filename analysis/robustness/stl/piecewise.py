@@ -65,9 +65,9 @@ def with_vertices(
 ) -> Trace:
     """Return a signal between samples: lines, through the extremes that samples support.
 
-    Peaks between samples are then seen as `analysis.metrics.highest` sees them.  With breaks it is
-    the path of `analysis.metrics.curves`: curves between them, and jumps, each `apart` (s) before
-    and after its break.
+    Peaks between samples are then seen as `nlctl.analysis.metrics.highest` sees them.  With breaks
+    it is the path of `nlctl.analysis.metrics.curves`: curves between them, and jumps, each `apart`
+    (s) before and after its break.
     """
     if breaks.size:
         return Trace(*_path(t, y, breaks, apart), jump=3 * apart)
@@ -87,7 +87,7 @@ def _vertices(
 def _path(
     t: np.ndarray, y: np.ndarray, breaks: np.ndarray, apart: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points of a path through samples, see `analysis.metrics.curves`."""
+    """Return the points of a path through samples, see `nlctl.analysis.metrics.curves`."""
     return path(t, y, breaks, apart)
 
 

@@ -159,7 +159,7 @@ def unfinished_margin(time: float, until: float) -> float:
     --------
     The earlier a run ended, the lower it counts, here as -1e6 (2 - 1/4) and -1e6 (2 - 3/4):
 
-    >>> from analysis.robustness import unfinished_margin
+    >>> from nlctl.analysis.robustness import unfinished_margin
     >>> unfinished_margin(5.0, 20.0), unfinished_margin(15.0, 20.0)
     (-1750000.0, -1250000.0)
     """
@@ -209,7 +209,7 @@ def margin(
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.robustness import Requirement, always, in_band, margin
+    >>> from nlctl.analysis.robustness import Requirement, always, in_band, margin
     >>> low = Requirement(key="low", formula=always(in_band("u", upper=10.0)), until=1.0)
     >>> times = np.linspace(0.0, 1.0, 11)
     >>> margin(low, times, {"u": 12.0 * times})  # 2 beyond the bound of 10
@@ -296,7 +296,7 @@ def margins(
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.robustness import Requirement, Spec, in_band, margins
+    >>> from nlctl.analysis.robustness import Requirement, Spec, in_band, margins
     >>> low = Requirement(key="low", formula=in_band("u", upper=10.0), until=0.0)
     >>> high = Requirement(key="high", formula=in_band("u", lower=-10.0), until=0.0)
     >>> margins(Spec(requirements=(low, high)), np.zeros(1), {"u": np.array([5.0])})

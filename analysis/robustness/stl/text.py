@@ -17,7 +17,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 
-from analysis.robustness.stl.formula import (
+from nlctl.errors import ParameterError
+
+from .formula import (
     And,
     Formula,
     always,
@@ -26,7 +28,6 @@ from analysis.robustness.stl.formula import (
     in_band,
     looks_ahead,
 )
-from nlctl.errors import ParameterError
 
 __all__ = ["parse_formula"]
 

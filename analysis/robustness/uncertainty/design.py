@@ -112,7 +112,7 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
     Examples
     --------
     >>> import numpy as np
-    >>> from analysis.robustness import Space, Uncertain, independent, row_seed
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, row_seed
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> once, again = (row_seed(independent(space, size, entropy=1), 2) for size in (3, 9))
     >>> np.random.default_rng(once).random() == np.random.default_rng(again).random()
@@ -140,7 +140,7 @@ def seed_number(design: Design, row: int) -> int:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, independent, seed_number
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, seed_number
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> design = independent(space, 3, entropy=1)
     >>> len({seed_number(design, row) for row in range(3)})
@@ -172,7 +172,7 @@ def rows(design: Design, numbers: range) -> pd.DataFrame:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, grid, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, grid, rows
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> rows(grid(space, 5), range(2, 4))["a"].to_dict()
     {2: 0.5, 3: 0.75}
@@ -231,7 +231,7 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
     --------
     Rows follow from the entropy and their numbers: a longer design begins with the same rows.
 
-    >>> from analysis.robustness import Space, Uncertain, independent, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, independent, rows
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> short, long = independent(space, 3, entropy=1), independent(space, 5, entropy=1)
     >>> bool((rows(short, range(3)) == rows(long, range(3))).all(axis=None)), short.is_iid
@@ -299,7 +299,7 @@ def from_table(
     Examples
     --------
     >>> import pandas as pd
-    >>> from analysis.robustness import Space, Uncertain, from_table
+    >>> from nlctl.analysis.robustness import Space, Uncertain, from_table
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> design = from_table(space, pd.DataFrame({"a": [0.1, 0.9]}))
     >>> design.size, design.is_iid
@@ -382,7 +382,7 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     --------
     Of 2^k rows each half of a box holds half:
 
-    >>> from analysis.robustness import Space, Uncertain, rows, sobol
+    >>> from nlctl.analysis.robustness import Space, Uncertain, rows, sobol
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> drawn = rows(sobol(space, 8, entropy=1), range(8))
     >>> int((drawn["a"] < 0.5).sum())
@@ -432,7 +432,7 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, latin_hypercube, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, latin_hypercube, rows
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 4.0)),))
     >>> drawn = rows(latin_hypercube(space, 4, entropy=1), range(4))
     >>> sorted(int(a) for a in drawn["a"])  # one in each quarter

@@ -48,7 +48,7 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, grid, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, grid, rows
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
     >>> rows(grid(space, 3), range(3))["a"].tolist()
     [0.0, 0.5, 1.0]
@@ -89,7 +89,7 @@ def corners(space: Space, entropy: int | None = None) -> Design:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, corners, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, corners, rows
     >>> box = (Uncertain(name="a", bounds=(0.0, 1.0)), Uncertain(name="b", bounds=(2.0, 3.0)))
     >>> rows(corners(Space(quantities=box)), range(4)).values.tolist()
     [[0.0, 2.0], [0.0, 3.0], [1.0, 2.0], [1.0, 3.0]]
@@ -142,7 +142,7 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, one_at_a_time, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, one_at_a_time, rows
     >>> a = Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5)
     >>> b = Uncertain(name="b", bounds=(2.0, 3.0), nominal=2.5)
     >>> rows(one_at_a_time(Space(quantities=(a, b))), range(5)).values.tolist()

@@ -26,11 +26,11 @@ class SpaceError(UsageError):
 
     Examples
     --------
-    >>> from analysis.robustness import Uncertain
+    >>> from nlctl.analysis.robustness import Uncertain
     >>> Uncertain(name="plant.m")
     Traceback (most recent call last):
         ...
-    analysis...SpaceError: 'plant.m' needs a law (scipy.stats) or bounds, got neither
+    nlctl.analysis...SpaceError: 'plant.m' needs a law (scipy.stats) or bounds, got neither
     """
 
 
@@ -65,7 +65,7 @@ class Uncertain:
     A law of scipy.stats, and the box that it is searched in:
 
     >>> from scipy import stats
-    >>> from analysis.robustness import Uncertain
+    >>> from nlctl.analysis.robustness import Uncertain
     >>> mass = Uncertain(name="plant.m", law=stats.norm(2.0, 0.1), bounds=(1.7, 2.3))
     >>> print(mass.law.mean(), mass.box)
     2.0 (1.7, 2.3)
@@ -161,7 +161,7 @@ class Choice:
     Examples
     --------
     >>> import nlctl
-    >>> from analysis.robustness import Choice
+    >>> from nlctl.analysis.robustness import Choice
     >>> bodies = {"dead zone": nlctl.DeadZone(), "gain": nlctl.Gain()}
     >>> Choice(name="actuator", options=bodies).nominal
     'dead zone'

@@ -53,7 +53,7 @@ class Space:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, nominal
+    >>> from nlctl.analysis.robustness import Space, Uncertain, nominal
     >>> slope = Uncertain(name="actuator.slope_r", bounds=(0.8, 1.2), nominal=1.0)
     >>> point = Uncertain(name="actuator.b_r", bounds=(0.4, 0.7), nominal=0.5)
     >>> nominal(Space(quantities=(slope, point)))
@@ -152,7 +152,7 @@ def scaled(space: Space, factor: float) -> Space:
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, corners, rows, scaled
+    >>> from nlctl.analysis.robustness import Space, Uncertain, corners, rows, scaled
     >>> space = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))
     >>> rows(corners(scaled(space, 2.0)), range(2))["a"].tolist()
     [-0.5, 1.5]
@@ -258,7 +258,7 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
 
     Examples
     --------
-    >>> from analysis.robustness import Space, Uncertain, arguments, grid, rows
+    >>> from nlctl.analysis.robustness import Space, Uncertain, arguments, grid, rows
     >>> start = Uncertain(name="plant.x1(0)", bounds=(0.0, 1.0))
     >>> space = Space(quantities=(Uncertain(name="law.k", bounds=(1.0, 2.0)), start))
     >>> given = arguments(space, rows(grid(space, {"law.k": 2, "plant.x1(0)": 1}), range(2)))

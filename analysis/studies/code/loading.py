@@ -19,6 +19,7 @@ from typing import Any
 import cloudpickle
 
 from nlctl.errors import ParameterError
+from nlctl.host.former_name import FORMER, is_former
 
 __all__ = ["Admits", "load_file", "loaded_with"]
 
@@ -166,6 +167,8 @@ def _neighbour(name: str, folder: Path) -> Path | None:
     try:
         spec = importlib.util.find_spec(name)
     except (ImportError, ValueError):
+        spec = None
+    if name == FORMER and is_former(spec):  # it hides no file of a user's
         spec = None
     same = spec is not None and spec.origin is not None and Path(spec.origin).resolve() in found
     return found[0] if spec is None or same else None

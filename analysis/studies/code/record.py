@@ -16,8 +16,9 @@ from typing import Any
 
 import platformdirs
 
-from analysis.json_values import as_json
 from nlctl.host.files import replace_file
+
+from ...json_values import as_json
 
 __all__ = ["record_file", "remember", "remembered", "statement", "study_digest"]
 

@@ -35,6 +35,7 @@ from urllib.parse import unquote, urlparse
 import control as ct
 
 from nlctl.errors import ParameterError
+from nlctl.host.former_name import present_name
 
 from ..file.errors import KeyPath, Problem
 from ..file.schema import Study
@@ -57,14 +58,18 @@ Reach = Literal["nlctl", "study", "all"]
 """What may run unasked: nlctl's own code, the study's folder and packages as well, or anything."""
 
 MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
-_OURS = ("nlctl", "analysis")
+_ABOUT_LOOPS = "nlctl.analysis"  # and not of this one
 MADE_OF = tuple(
     f"nlctl.{room}"
     for room in ("actuators", "blocks", "controllers", "delays", "diagrams", "faults", "functions")
 ) + (
     *(f"nlctl.{room}" for room in ("paper", "plants", "references", "sampling", "sliding")),
-    *(f"analysis.paper.{part}" for part in ("controllers", "loops", "rivals")),
-    *("analysis.metrics", "analysis.lyapunov.nussbaum.forecast", "analysis.studies.kinds"),
+    *(f"nlctl.analysis.paper.{part}" for part in ("controllers", "loops", "rivals")),
+    *(
+        "nlctl.analysis.metrics",
+        "nlctl.analysis.lyapunov.nussbaum.forecast",
+        "nlctl.analysis.studies.kinds",
+    ),
 )
 SYSTEMS = tuple(  # of python-control: not what draws, and what changes the settings of a process
     f"control.{room}"
@@ -120,8 +125,9 @@ class Grant:
 
     def admits_module(self, name: str) -> str:
         """Return why a module may not be imported; nothing if it may, or if there is none."""
-        if name.partition(".")[0] in _OURS:
-            fits = name in _OURS or _is_in(name, MADE_OF)
+        name = present_name(name)
+        if name.partition(".")[0] == "nlctl":
+            fits = name in ("nlctl", _ABOUT_LOOPS) or _is_in(name, MADE_OF)
             return "" if fits or self.reach == "all" else f"'{name}' makes nothing of a loop"
         try:
             places = _module_places(name)
@@ -256,7 +262,7 @@ def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
         if source.endswith(".py"):
             run = loaded_with(folder / source)
             contents = {os.path.relpath(path, home): content for path, content in run.items()}
-        elif source.partition(".")[0] in _OURS:
+        elif present_name(source).partition(".")[0] == "nlctl":
             continue
         else:
             contents = {f"module {source}": _source(_module_places(source)[0]).read_bytes()}
@@ -415,8 +421,8 @@ def _uses_makers(thing: Any, seen: set[int]) -> bool:
     """Whether a function, or what it reaches, reads something of control or nlctl."""
     thing = _plain(thing)
     if isinstance(thing, ModuleType):
-        return thing.__name__.partition(".")[0] in MAKERS
-    if (getattr(thing, "__module__", None) or "").partition(".")[0] in MAKERS:
+        return _is_maker(thing.__name__)
+    if _is_maker(getattr(thing, "__module__", None) or ""):
         return True
     if id(thing) in seen:
         return False
@@ -431,6 +437,10 @@ def _uses_makers(thing: Any, seen: set[int]) -> bool:
     reached += [cell.cell_contents for cell in thing.__closure__ or () if _is_filled(cell)]
     imported = {name.partition(".")[0] for name in names}  # inside of the function
     return bool(imported & set(MAKERS)) or any(_uses_makers(part, seen) for part in reached)
+
+
+def _is_maker(module: str) -> bool:
+    return module.partition(".")[0] in MAKERS and not _is_in(module, [_ABOUT_LOOPS])
 
 
 def _names(code: CodeType) -> set[str]:

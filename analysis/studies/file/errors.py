@@ -96,7 +96,7 @@ class StudyError(UsageError):
 
     Examples
     --------
-    >>> from analysis.studies import read_study, shipped
+    >>> from nlctl.analysis.studies import read_study, shipped
     >>> try:
     ...     read_study(shipped("example-1-quick"), ["runs.sise=10", "time.end=-1"])
     ... except StudyError as error:

@@ -2,25 +2,50 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field, create_model
 
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.rule import Grant, untrusted
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind
+from ..kind import Ground, Kind, tagged
 from ..kinds import KINDS
+from .asked import Asked
 from .errors import KeyPath, Problem
 from .resolve import named_kind
-from .schema import Study, study_model
+from .schema import Study
 
 __all__ = ["STAND_IN", "model_of", "own_kinds", "stand_ins"]
 
 STAND_IN = "gone"
 """Name of the kinds that stand in for those that are not known."""
+
+
+@functools.cache
+def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
+    """Return the shape of study files that may ask for these kinds of analysis.
+
+    Parameters
+    ----------
+    kinds : tuple of (str, Kind)
+        What a file calls each of them, and the kind.
+    """
+    schemas: Any = functools.reduce(operator.or_, (tagged(kind, tag) for tag, kind in kinds))
+    one: Any = Annotated[schemas, Field(discriminator="kind")]
+    many: Any = tuple[one, ...]
+    about = Study.model_fields["analysis"].description
+    return create_model(
+        "Study",
+        __base__=Study,
+        __doc__="A study file.",
+        __module__=Study.__module__,
+        analysis=(many, Field((), description=about)),
+    )
 
 
 def model_of(own: Mapping[str, Kind]) -> type[Study]:

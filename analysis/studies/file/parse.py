@@ -12,10 +12,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from analysis.robustness import Experiment
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
+from ...robustness import Experiment
 from ..code.record import study_digest
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
 from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
@@ -65,10 +65,10 @@ class StudyFile:
 
 @as_annotated
 def read_study(
-    path: Path,
+    path: str | Path,
     settings: Sequence[str] = (),
     *,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     trust: bool = False,
     received: bool = False,
 ) -> StudyFile:
@@ -78,12 +78,12 @@ def read_study(
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The study file, in TOML.
     settings : sequence of str, optional
         ``key=value`` that replace what stands there: ``runs.size=100``,
         ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.
-    folder : Path, optional
+    folder : str or Path, optional
         What paths in the study are relative to; by default the file's folder.
     trust : bool, optional
         Whether any code that it names may be run.  What was trusted once need not be again, as
@@ -108,15 +108,16 @@ def read_study(
 
     Examples
     --------
-    >>> from analysis.studies import read_study, shipped
+    >>> from nlctl.analysis.studies import read_study, shipped
     >>> file = read_study(shipped("example-1-quick"), ["runs.size=10"])
     >>> file.study.runs.size, file.experiment.space.names[0]
     (10, 'actuator.b_r')
     >>> file.experiment.timepts.size  # 20 s in steps of 0.01 s
     2001
     """
+    path = Path(path)
     content = path.read_bytes()
-    folder = path.parent if folder is None else folder
+    folder = path.parent if folder is None else Path(folder)
     try:
         text = study_text(content)
         data = read_toml(text)

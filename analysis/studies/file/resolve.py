@@ -10,13 +10,14 @@ from typing import Any
 
 from scipy import stats
 
-from analysis.catalogue import named_block
-from analysis.robustness import Uncertain
-from analysis.robustness.uncertainty.binding import check_keyword
 from nlctl.errors import ParameterError, UnknownNameError, UsageError
+from nlctl.host.former_name import present_name, warn_of_it
 from nlctl.names import unknown
 from nlctl.paper import named_example
 
+from ...catalogue import named_block
+from ...robustness import Uncertain
+from ...robustness.uncertainty.binding import check_keyword
 from ..code.loading import Admits, load_file
 from ..code.rule import Grant, check_defined, check_function, check_loop_function, check_place
 from ..kind import Kind
@@ -103,7 +104,8 @@ def named_kind(name: str, grant: Grant) -> Kind:
     found = named(name, grant.folder, grant.refuses)
     if not isinstance(found, Kind):
         raise ParameterError(
-            f"a kind of analysis is an analysis.studies.Kind, '{name}' is a {type(found).__name__}"
+            "a kind of analysis is an nlctl.analysis.studies.Kind, "
+            f"'{name}' is a {type(found).__name__}"
         )
     return found
 
@@ -143,8 +145,11 @@ def _place(name: str, folder: Path, admits: Admits | None = None) -> tuple[Any, 
 
 
 def _from_module(name: str) -> Any:
+    present = present_name(name)
+    if present != name:
+        warn_of_it()
     try:
-        return importlib.import_module(name)
+        return importlib.import_module(present)
     except ModuleNotFoundError as error:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
             raise  # it exists, and imports something that does not

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
-import operator
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, create_model
+from pydantic import BeforeValidator, Field, SerializeAsAny
 
-from ..kind import Asked, Kind, tagged
+from .asked import Asked
 from .field_types import Number, Pair, Size, Strict, Whole
 
 __all__ = [
@@ -25,7 +23,6 @@ __all__ = [
     "Study",
     "Times",
     "keyed",
-    "study_model",
 ]
 
 RESERVED = {"rows"}
@@ -139,7 +136,7 @@ class Faulty(Strict):
 
 
 class Study(Strict):
-    """A study file; `study_model` adds what its analyses look like.
+    """A study file; `own_kinds.study_model` adds what its analyses look like.
 
     Examples
     --------
@@ -168,28 +165,6 @@ class Study(Strict):
     solver: SolverTable = SolverTable()  # type: ignore[call-arg]
     runs: Rows | None = Field(None, description="The main table.")
     analysis: tuple[SerializeAsAny[Asked], ...] = Field((), description="What is asked.")
-
-
-@functools.cache
-def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
-    """Return the shape of study files that may ask for these kinds of analysis.
-
-    Parameters
-    ----------
-    kinds : tuple of (str, Kind)
-        What a file calls each of them, and the kind.
-    """
-    schemas: Any = functools.reduce(operator.or_, (tagged(kind, tag) for tag, kind in kinds))
-    one: Any = Annotated[schemas, Field(discriminator="kind")]
-    many: Any = tuple[one, ...]
-    about = Study.model_fields["analysis"].description
-    return create_model(
-        "Study",
-        __base__=Study,
-        __doc__="A study file.",
-        __module__=__name__,
-        analysis=(many, Field((), description=about)),
-    )
 
 
 def keyed(study: Study) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def shipped(name: str) -> Path:
 
     Examples
     --------
-    >>> from analysis.studies import shipped
+    >>> from nlctl.analysis.studies import shipped
     >>> shipped("example-1-quick").name
     'example-1-quick.toml'
     >>> shipped("example-1-quik")

@@ -11,17 +11,17 @@ from typing import Any, TypeVar
 
 import control as ct
 
-from analysis.metrics import Metric
-from analysis.robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
-from analysis.robustness.search.largest_scale import refusal_of
-from analysis.robustness.statistics.guarantee import check_iid
-from analysis.robustness.uncertainty.binding import check_keyword
-from analysis.robustness.uncertainty.space import combinations
 from nlctl.errors import ParameterError, UsageError
 from nlctl.faults import with_faults
 from nlctl.names import unknown
 from nlctl.upstream.control_internals import is_system
 
+from ...metrics import Metric
+from ...robustness import Choice, Design, Experiment, Requirement, Space, Uncertain, resolved
+from ...robustness.search.largest_scale import refusal_of
+from ...robustness.statistics.guarantee import check_iid
+from ...robustness.uncertainty.binding import check_keyword
+from ...robustness.uncertainty.space import combinations
 from ..build import (
     SIGNALS,
     choice,
@@ -35,7 +35,8 @@ from ..build import (
     size_mistakes,
     times,
 )
-from ..kind import Asked, Setup
+from ..kind import Setup, kind_of
+from .asked import Asked
 from .errors import KeyPath, Problem
 from .resolve import check_complete, loop_function, option, uncertain
 from .schema import RESERVED, Faulty, Study
@@ -112,8 +113,8 @@ def checked_experiment(
             _check_designs(study, space, large, notes)
         setup = Setup(study=study, folder=folder, experiment=made)
         for i, asked in _comparable(study, folder, notes):
-            if asked.definition.check is not None:
-                notes.attempt(("analysis", i), asked.definition.check, asked, setup)
+            if (check := kind_of(asked).check) is not None:
+                notes.attempt(("analysis", i), check, asked, setup)
     return made, _unique(notes.problems)
 
 
@@ -150,7 +151,7 @@ def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, As
         return []
     before = len(notes.problems)
     for i, asked in enumerate(study.analysis):
-        for key in asked.definition.keywords:
+        for key in kind_of(asked).keywords:
             notes.attempt(("analysis", i, key), check_keyword, function, getattr(asked, key))
     lost = {problem.place[1] for problem in notes.problems[before:]}
     return [(i, asked) for i, asked in enumerate(study.analysis) if i not in lost]
@@ -268,14 +269,14 @@ def _check_analyses(
         if asked.key in seen:
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
-        if asked.definition.needs_rows and study.runs is None and "runs" not in known:
+        if kind_of(asked).needs_rows and study.runs is None and "runs" not in known:
             notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
         certain = known["spec"] and metrics is not None
-        named = _named(asked, asked.definition.columns) if certain else []
+        named = _named(asked, kind_of(asked).columns) if certain else []
         for key, name in named:
             if name not in columns:
                 notes.add(("analysis", i, key), str(unknown("column", name, columns)))
-        for key, name in _named(asked, asked.definition.quantities):
+        for key, name in _named(asked, kind_of(asked).quantities):
             if known["space"] and name not in known["space"]:
                 notes.add(("analysis", i, key), str(unknown("quantity", name, known["space"])))
 
@@ -284,9 +285,9 @@ def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:
     """Refuse numbers of runs that no machine can make; return where they are asked for."""
     wide, options = len(study.space), math.prod(len(c.options) for c in study.choices.values())
     counts: dict[KeyPath, int] = {
-        ("analysis", i): asked.definition.largest(asked, wide)
+        ("analysis", i): largest(asked, wide)
         for i, asked in enumerate(study.analysis)
-        if asked.definition.largest is not None
+        if (largest := kind_of(asked).largest) is not None
     }
     if study.runs is not None:
         counts["runs",] = study.runs.size or 1
@@ -312,11 +313,11 @@ def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Note
         if not mistakes:
             notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
-        if asked.definition.is_statement and study.runs is not None:
+        if kind_of(asked).is_statement and study.runs is not None:
             kind = study.runs.design
             made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
             notes.attempt(("analysis", i), check_iid, made)
-        design = asked.definition.design
+        design = kind_of(asked).design
         if design is not None and ("analysis", i) not in large:
             notes.attempt(("analysis", i), design, asked, space, study.study.seed)
 

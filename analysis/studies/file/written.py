@@ -32,7 +32,7 @@ def to_toml(study: Study) -> str:
 
     Examples
     --------
-    >>> from analysis.studies import from_toml, shipped, to_toml
+    >>> from nlctl.analysis.studies import from_toml, shipped, to_toml
     >>> study = from_toml(shipped("example-1-quick").read_text(encoding="utf-8"))
     >>> text = to_toml(study)
     >>> from_toml(text) == study
@@ -68,7 +68,7 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
 
     Examples
     --------
-    >>> from analysis.studies import from_toml
+    >>> from nlctl.analysis.studies import from_toml
     >>> study = from_toml('''
     ... loop = "example-1"
     ... study = { title = "Does it track?", seed = 1 }

@@ -10,7 +10,14 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from analysis.robustness import (
+from nlctl.errors import ParameterError
+from nlctl.names import unknown
+from nlctl.wording import counted
+
+from ... import figures as figures
+from ...figures.labels import plain
+from ...report.document import Figure
+from ...robustness import (
     Choice,
     Experiment,
     Space,
@@ -20,22 +27,16 @@ from analysis.robustness import (
     independent,
     prepare,
 )
-from analysis.robustness.statistics.comparison import Comparison, compare, crossed
-from analysis.robustness.statistics.paired import TRUSTED_ROWS
-from analysis.robustness.statistics.verdict import better_verdict
-from nlctl.errors import ParameterError
-from nlctl.names import unknown
-from nlctl.wording import counted
-
-from ... import figures as figures
-from ...figures.labels import plain
-from ...report.document import Figure
+from ...robustness.statistics.comparison import Comparison, compare, crossed
+from ...robustness.statistics.paired import TRUSTED_ROWS
+from ...robustness.statistics.verdict import better_verdict
 from ..build import choice, inputs_of, metrics_of
+from ..file.asked import Asked
 from ..file.field_types import Confidence, Names, Whole
 from ..file.resolve import option
 from ..file.schema import Choices
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import CLOPPER, HOLM

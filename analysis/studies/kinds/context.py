@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.robustness import Violation
-from analysis.robustness.runs.sweep import Sweep
-from analysis.robustness.statistics.sensitivity import censored
 from nlctl.errors import ParameterError
 from nlctl.native import Status
 from nlctl.wording import some_of
 
+from ...robustness import Violation
+from ...robustness.runs.sweep import Sweep
+from ...robustness.statistics.sensitivity import censored
 from ..kind import Ground, column
 
 __all__ = [

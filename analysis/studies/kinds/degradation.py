@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, model_validator
 
-from analysis.robustness import bound_verdict, independent
-from analysis.robustness.search.degradation import degradation_curve
-from analysis.robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Table
+from ...robustness import bound_verdict, independent
+from ...robustness.search.degradation import degradation_curve
+from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
+from ..file.asked import Varied
 from ..file.field_types import Confidence, Flag, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.text import margin_text
 from .context import CLOPPER

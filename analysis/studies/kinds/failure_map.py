@@ -10,16 +10,17 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from analysis.robustness import Space
-from analysis.robustness.search.failure_map import boundary, failure_map
-from analysis.robustness.stl.spec import violates
 from nlctl.wording import counted, some_of
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph
+from ...robustness import Space
+from ...robustness.search.failure_map import boundary, failure_map
+from ...robustness.stl.spec import violates
+from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page.rows import known
 
 if TYPE_CHECKING:

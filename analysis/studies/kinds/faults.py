@@ -14,11 +14,6 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from analysis.robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
-from analysis.robustness.runs.experiment import by_diagram, simulate_rows
-from analysis.robustness.stl.spec import Requirement, violates
-from analysis.robustness.stl.text import parse_formula
-from analysis.robustness.stl.violation_time import ViolationTime, violation_time
 from nlctl.errors import ParameterError
 from nlctl.faults import NEVER, Fault, with_faults
 from nlctl.names import unknown
@@ -27,10 +22,16 @@ from nlctl.wording import some_of
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
+from ...robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
+from ...robustness.runs.experiment import by_diagram, simulate_rows
+from ...robustness.stl.spec import Requirement, violates
+from ...robustness.stl.text import parse_formula
+from ...robustness.stl.violation_time import ViolationTime, violation_time
 from ..build import faults_of
+from ..file.asked import Asked
 from ..file.field_types import Flag, Names, Size
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_text
 

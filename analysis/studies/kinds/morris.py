@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from analysis.robustness import Design, Space, elementary_effects, morris
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
+from ...robustness import Design, Space, elementary_effects, morris
+from ..file.asked import Asked
 from ..file.field_types import Whole
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, made
+from ..kind import Ground, Kind, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import response

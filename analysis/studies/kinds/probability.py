@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
-from analysis.robustness import bound_verdict, violation_probability
-from analysis.robustness.statistics.guarantee import rounded_down, rounded_up
 from nlctl.wording import counted
 
+from ...robustness import bound_verdict, violation_probability
+from ...robustness.statistics.guarantee import rounded_down, rounded_up
+from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, made
+from ..kind import Ground, Kind, made
 from ..page.running import running_items
 from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
 

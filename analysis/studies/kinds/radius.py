@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field
 
-from analysis.robustness.search.largest_scale import largest_scale
-from analysis.robustness.search.radius import robustness_radius
-
 from ... import figures as figures
 from ...report.document import Figure
+from ...robustness.search.largest_scale import largest_scale
+from ...robustness.search.radius import robustness_radius
+from ..file.asked import Varied
 from ..file.field_types import Confidence, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.robustness import regional
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure
+from ...robustness import regional
+from ..file.asked import Asked
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, made
+from ..kind import Ground, Kind, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import HOLM

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from analysis.robustness import Design, decide, test_verdict
-from analysis.robustness.runs.progress import Progress, until_decided
-from analysis.robustness.statistics.guarantee import rounded_down, rounded_up
 from nlctl.wording import counted
 
+from ...robustness import Design, decide, test_verdict
+from ...robustness.runs.progress import Progress, until_decided
+from ...robustness.statistics.guarantee import rounded_down, rounded_up
+from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Asked, Ground, Kind, made
+from ..kind import Ground, Kind, made
 from ..page.running import running_items
 from .context import HOWARD, ROBBINS, statement_numbers
 

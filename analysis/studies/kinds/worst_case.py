@@ -10,18 +10,19 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from analysis.robustness import nominal
-from analysis.robustness.search.confirmation import confirm
-from analysis.robustness.search.evaluation import margins_of
-from analysis.robustness.search.shrink import shrink
-from analysis.robustness.search.worst_case import worst_case
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, Paragraph, Table
+from ...robustness import nominal
+from ...robustness.search.confirmation import confirm
+from ...robustness.search.evaluation import margins_of
+from ...robustness.search.shrink import shrink
+from ...robustness.search.worst_case import worst_case
+from ..file.asked import Varied
 from ..file.field_types import Flag, Number, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, Varied, made
+from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.rows import status_text

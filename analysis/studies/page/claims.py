@@ -8,12 +8,13 @@ from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid
+from ..kind import kind_of
 from .text import without_assumptions
 
 if TYPE_CHECKING:
-    from analysis.studies.finding import Finding
-    from analysis.studies.kind import Asked
-    from analysis.studies.result import Result
+    from ..file.asked import Asked
+    from ..finding import Finding
+    from ..result import Result
 
 __all__ = ["claims", "refusal", "verdict"]
 
@@ -33,7 +34,7 @@ def verdict(result: Result) -> str:
         if these and result.complete:
             told.append(f"{answer.capitalize()}: {'; '.join(claimed)}.")
     asked = result.asked
-    statements = [f.sentence for f in result.findings if asked[f.key].definition.is_statement]
+    statements = [f.sentence for f in result.findings if kind_of(asked[f.key]).is_statement]
     if statements:
         told.append(statements[0])
     elif refused := refusal(result):
@@ -78,9 +79,10 @@ def _measured(finding: Finding, asked: Asked) -> dict[str, str]:
     """Return what was measured of a claim, its limit, and the margin between the two."""
     if not finding.is_answered:
         return {"measured": finding.sentence, "limit": "an answer"}
-    if asked.definition.measured is None:
+    measured = kind_of(asked).measured
+    if measured is None:
         told = {"measured": without_assumptions(finding.sentence), "limit": ""}
     else:
-        told = dict(asked.definition.measured(finding, asked))
+        told = dict(measured(finding, asked))
     needs = f"; needs {finding.needs}" if finding.needs else ""
     return told | {"measured": told["measured"] + needs}

@@ -25,7 +25,7 @@ from ...robustness.runs.experiment import Prepared
 from . import text as text
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Result
+    from ..result import Result
 
 __all__ = [
     "Published",
@@ -37,7 +37,6 @@ __all__ = [
     "parameter_tables",
 ]
 
-_OWN = ("nlctl", "analysis")  # packages whose source comes with nlctl and is not printed
 _LONGEST = 60  # characters of a value
 
 
@@ -105,7 +104,7 @@ def loop_of(prepared: Prepared) -> StudyLoop:
         diagram=found.diagram,
         maker=found.maker,
         file=path.name,
-        source="" if module.partition(".")[0] in _OWN else content.decode(errors="replace"),
+        source=content.decode(errors="replace") if module.partition(".")[0] != "nlctl" else "",
         sha256=hashlib.sha256(content).hexdigest(),
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from nlctl.errors import UsageError
 
 from ...robustness import Prepared
+from ..kind import kind_of
 from ..result import Result
 from ..run import reopened
 from ..sealed import RunFolderError, as_written
@@ -24,7 +25,7 @@ def loop_again(
     ----------
     result : Result
     trust : bool, optional
-        As in `analysis.studies.read_study`.
+        As in `nlctl.analysis.studies.read_study`.
     tell : callable
         Takes a sentence on what the page will lack, or on versions that differ.
 
@@ -56,7 +57,7 @@ def rows_again(
         told = [
             look(f)
             for f in result.findings
-            if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
+            if (look := kind_of(result.asked[f.key]).witness) is not None and f.is_answered
         ]
     witness = min(told, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

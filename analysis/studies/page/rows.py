@@ -22,8 +22,7 @@ from .histories import Histories
 from .text import margin_text
 
 if TYPE_CHECKING:
-    from analysis.studies.result import Result
-
+    from ..result import Result
     from .loop import Published
 
 __all__ = [

@@ -41,7 +41,7 @@ def running_items(
     Parameters
     ----------
     finding, result, asked, key
-        As in `analysis.studies.kind.Kind.items`.
+        As in `nlctl.analysis.studies.kind.Kind.items`.
     decides : str
         What the verdict rests on, the end of the caption.
     fixed : (float, float), optional

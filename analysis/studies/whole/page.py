@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from analysis.robustness.runs.store import locked
-
+from ...robustness.runs.store import locked
 from ..sealed import RunFolderError, file_digest, write_json
 from .contents import CONTENTS, check_whole, sealed_record
 

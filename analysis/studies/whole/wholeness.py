@@ -70,14 +70,14 @@ class Wholeness:
 
 
 @as_annotated
-def verify(folder: Path) -> Wholeness:
+def verify(folder: str | Path) -> Wholeness:
     """Hold every file of a run folder against the record that its run has sealed.
 
     Nothing is imported, run or drawn.
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Where `run` has kept its results.
 
     Returns
@@ -97,7 +97,7 @@ def verify(folder: Path) -> Wholeness:
     >>> import shutil
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from analysis.studies import read_study, run, verify
+    >>> from nlctl.analysis.studies import read_study, run, verify
     >>> text = '''
     ... loop = "nlctl:block"
     ... options = { spec = { block = "Lag" }, name = "lag" }
@@ -120,6 +120,7 @@ def verify(folder: Path) -> Wholeness:
     >>> after.is_whole, [text[-36:] for text in after.problems]
     (False, ["probability/finding.json' is missing"])
     """
+    folder = Path(folder)
     content = sealed_record(folder)
     known = {CONTENTS, *content["files"], *PAGE_FILES}
     every = (path for path in folder.rglob("*") if is_part(path))

@@ -13,11 +13,11 @@ from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
 from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
 from ..audit import block_outputs
-from ..codegen.program import count_switching_functions, memory
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
+from ..diagram.program import count_switching_functions, memory
+from ..equations.relays import relay_places
 from ..happened import row_labels
-from ..sliding.reading import relay_places
 from .steps import Jump
 
 __all__ = ["chattering_words"]

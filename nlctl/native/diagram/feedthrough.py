@@ -9,8 +9,8 @@ import numpy as np
 
 from ...blocks import Block
 from ...expressions.graph import Ambiguous
-from ..codegen.trace import dependence
-from ..parameters import slots_of
+from .parameters import slots_of
+from .trace import dependence
 
 
 def feedthrough(system: Any) -> np.ndarray:

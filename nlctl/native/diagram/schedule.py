@@ -20,11 +20,12 @@ from ...blocks import within
 from ...delays.lines import delayed_blocks, is_delayed
 from ...diagrams import places, samplings
 from ...responses.watched import Watched
-from ...sampling.system import Happening, Sampled
+from ...sampling.system import Happening
 from ...sliding.blocks import slides, sliding_blocks
-from ..thirdparty.captured import Captured, noted
-from ..thirdparty.checks import check_functions
+from ..purity.captured import Captured, noted
+from .checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
+from .nodes import Node
 from .tearing import first_loop, tear
 from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
@@ -32,46 +33,10 @@ __all__ = [
     "AlgebraicLoop",
     "AlgebraicLoopError",
     "Combination",
-    "Node",
     "Schedule",
     "Signal",
     "schedule",
 ]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Node:
-    """One block of the schedule.
-
-    Attributes
-    ----------
-    path : str
-        Names of the diagrams around it and its own, separated by dots.
-    system : control.InputOutputSystem
-    state_offset : int
-        Where its states begin in the diagram's state vector.
-    inputs : tuple of mappings
-        For every input the linear combination of signals that feeds it.
-    direct : ndarray of bool, shape (noutputs, ninputs)
-        Which outputs depend on which inputs at the same instant.
-    unbound : tuple of str
-        Names in its functions that have no value on one of the ways: only traced are these right.
-    sampled : Sampled or None
-        What samples the block, whose states are the first ones of this.
-    """
-
-    path: str
-    system: Any
-    state_offset: int
-    inputs: tuple[Combination, ...]
-    direct: np.ndarray
-    unbound: tuple[str, ...] = ()
-    sampled: Sampled | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of its states."""
-        return (self.sampled or self.system).nstates or 0
 
 
 @dataclass(frozen=True, kw_only=True)

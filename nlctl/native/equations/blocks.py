@@ -11,15 +11,16 @@ import numpy as np
 
 from ...expressions.arrays import Tracer, as_array, scalar
 from ...expressions.graph import Expr, Graph
+from ...responses.watched import watches_nan
 from ...sampling.system import Happening
-from ..codegen.calls import Call
-from ..codegen.program import count_guards, count_switching_functions, memory
 from ..codegen.solver import Solver
+from ..diagram.parameters import length
+from ..diagram.program import count_guards, count_switching_functions, memory
 from ..diagram.schedule import Schedule, during
-from ..parameters import length
-from ..sliding.reading import with_sliding
+from ..opaque.calls import Call
 from .located import Conditions, found_conditions
 from .reader import Reader
+from .relays import with_sliding
 from .watched import watched_conditions
 
 
@@ -99,12 +100,16 @@ def equations(
         rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
         y = reader.wired(schedule.outputs)
         declared, committed = _events(reader)
-        found = _conditions(schedule.system, reader, rates, [each for _, each in declared], y)
-        found = replace(found, located=(*found.located, *watched_conditions(reader, schedule)))
+        guards, watched = _guards(reader), watched_conditions(reader, schedule)
+        found = _conditions(
+            schedule.system, reader, rates, y, (declared, guards, committed, watched)
+        )
+        found = replace(found, located=(*found.located, *watched))
+        falls = [(row + found.rows, guard) for row, guard in guards.values()]
         results = {
             "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
-            "g": declared + _located(reader, found) + _guards(reader, found.rows),
-            "m": committed,
+            "g": declared + _located(reader, found) + falls,
+            "m": list(committed.values()),
             "y": [(0, y)],
         }
         if any(count_guards(node) for node in reader.blocks):
@@ -122,14 +127,22 @@ def equations(
 
 
 def _conditions(
-    system: Any, reader: Reader, rates: Sequence[Tracer], declared: Sequence[Tracer], y: Tracer
+    system: Any, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: Any
 ) -> Conditions:
-    """Return what a diagram in continuous time switches at without saying so."""
+    """Return what a diagram in continuous time switches at without saying so.
+
+    Also what moves nothing but an event function: a guard, a memory, a function of the run.
+    """
     if not ct.isctime(system):
         return Conditions()
-    arriving = y[system.noutputs or 0 :]
-    roots = [e for array in (*rates, arriving) for e, _ in array.pieces()]
-    return found_conditions(reader, rates, declared, roots)
+    declared, guards, committed, watched = events
+    own = {i: [guard] for i, (_, guard) in guards.items()}
+    for i, (_, array) in committed.items():
+        own[i] = [*own.get(i, []), array]
+    arriving = [e for e, _ in y[system.noutputs or 0 :].pieces()]
+    signs = [array for _, array in declared]
+    given = [each.function for each in watched if not watches_nan(each.what)]
+    return found_conditions(reader, rates, signs, own, [*arriving, *given])
 
 
 def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
@@ -148,13 +161,13 @@ def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
     return made
 
 
-def _guards(reader: Reader, located: int) -> list[tuple[int, Tracer]]:
-    """Return the guards of all blocks with their rows, behind so many of conditions."""
-    row = located + sum(count_switching_functions(node) for node in reader.blocks)
-    made = []
+def _guards(reader: Reader) -> dict[int, tuple[int, Tracer]]:
+    """Return the guards of blocks, by their places, with their rows but for those of conditions."""
+    row = sum(count_switching_functions(node) for node in reader.blocks)
+    made = {}
     for i, node in enumerate(reader.blocks):
         if count_guards(node):
-            made.append((row, reader.guards(i)))
+            made[i] = (row, reader.guards(i))
             row += count_guards(node)
     return made
 
@@ -180,14 +193,14 @@ def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     return found
 
 
-def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], list[tuple[int, Tracer]]]:
-    """Return switching functions of all blocks, and what memories are committed to."""
+def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], dict[int, tuple[int, Tracer]]]:
+    """Return switching functions of all blocks, and by their places what memories become."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
-    at, behind, declared, committed = 0, 0, [], []
+    at, behind, declared, committed = 0, 0, [], {}
     for i, (own, kept) in enumerate(counts):
         if own or kept:
             events = reader.events(i)
             declared.append((at, events[:own]))
-            committed.append((behind, events[own:]))
+            committed[i] = (behind, events[own:])
             at, behind = at + own, behind + kept
     return declared, committed

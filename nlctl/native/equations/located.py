@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,8 +11,8 @@ from ...expressions.arrays import Tracer
 from ...expressions.conditions import conditions, switching_function
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
-from ..codegen.program import count_switching_functions, memory
-from ..diagram.schedule import Node
+from ..diagram.nodes import Node
+from ..diagram.program import count_switching_functions, memory
 
 if TYPE_CHECKING:
     from .reader import Reader
@@ -84,7 +84,11 @@ class Conditions:
 
 
 def found_conditions(
-    reader: Reader, rates: Sequence[Tracer], declared: Iterable[Tracer], roots: Iterable[Expr]
+    reader: Reader,
+    rates: Sequence[Tracer],
+    declared: Iterable[Tracer],
+    events: Mapping[int, Sequence[Tracer]],
+    others: Iterable[Expr],
 ) -> Conditions:
     """Return what switches in a diagram whose blocks have been read.
 
@@ -95,16 +99,21 @@ def found_conditions(
         The derivatives of each block's states.
     declared : iterable of Tracer
         Switching functions that the blocks declare.
-    roots : iterable of Expr
-        What is integrated, and what arrives at delays.
+    events : mapping
+        Guards of blocks, and what their memories become, by their places.
+    others : iterable of Expr
+        What arrives at delays, and event functions of the run.
     """
+    declared, others = tuple(declared), tuple(others)
+    arrays = [*rates, *declared, *(array for own in events.values() for array in own)]
+    roots = [*others, *_pieces(arrays)]
     nodes = needed([*roots, *(e for found in reader.fixed_points.values() for e in found)])
     timed, wanted = _of_time(nodes), set(nodes)
-    known = {_key(e) for array in declared for e, _ in array.pieces()}
+    known = {_key(e) for e in _pieces(declared)}
     found: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
     rows = beyond = 0
-    for condition, node in _undeclared(reader, rates):
+    for condition, node in _undeclared(reader, rates, events, others):
         if condition not in wanted:
             continue
         if condition in timed:
@@ -121,7 +130,8 @@ def found_conditions(
         if rows + size > _MOST:
             beyond += size
             continue
-        found[key] = Located(function=function, block=node.path, what=condition.op, bends=bends)
+        path = "" if node is None else node.path
+        found[key] = Located(function=function, block=path, what=condition.op, bends=bends)
         rows += size
     waves, pulses = _moving(reader.graph, _terms(nodes, timed), timed)
     return Conditions(
@@ -130,20 +140,35 @@ def found_conditions(
     )  # fmt: skip
 
 
-def _undeclared(reader: Reader, rates: Sequence[Tracer]) -> Iterable[tuple[Expr, Node]]:
-    """Yield the conditions of blocks that do not declare theirs, each with its block."""
+def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
+    """Return the expressions that arrays are made of."""
+    return [e for array in arrays for e, _ in array.pieces()]
+
+
+def _undeclared(
+    reader: Reader,
+    rates: Sequence[Tracer],
+    events: Mapping[int, Sequence[Tracer]],
+    others: Sequence[Expr],
+) -> Iterable[tuple[Expr, Node | None]]:
+    """Yield the conditions of blocks that do not declare theirs, each with its block.
+
+    And those of the run's own event functions.
+    """
     for i, node in enumerate(reader.blocks):
         if node.sampled or _declares(node):
             continue
-        given = {expr for expr, _ in reader.wired(node.inputs).pieces()}
-        made = [reader.signals[i], rates[i]]
-        for each in conditions([e for array in made for e, _ in array.pieces()], given):
+        given = set(_pieces([reader.wired(node.inputs)]))
+        made = [reader.signals[i], rates[i], *events.get(i, ())]
+        for each in conditions(_pieces(made), given):
             yield each, node
+    for each in conditions(list(others), set(_pieces(reader.signals.values()))):
+        yield each, None
 
 
-def _remembers(function: Expr, node: Node) -> bool:
+def _remembers(function: Expr, node: Node | None) -> bool:
     """Whether a condition asks for a memory of its own block, which stands aside within a step."""
-    own = set(memory(node))
+    own = set() if node is None else set(memory(node))
     if not own:
         return False
     leaves = (e for e in needed([function]) if e.op == "leaf" and e.data[0] == "x")

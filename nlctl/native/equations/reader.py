@@ -19,14 +19,15 @@ from ...expressions.stage import Stage
 from ...expressions.trace import trace
 from ...sampling.system import Happening, Sampled, oldest, rounded
 from ...wording import counted
-from ..codegen.calls import Call
 from ..codegen.newton import inside, solver
-from ..codegen.program import check_continuous, count_guards, count_switching_functions, memory
 from ..codegen.solver import Solver
-from ..codegen.trace import time, traced_parameters
 from ..diagram.feedthrough import feedthrough
-from ..diagram.schedule import AlgebraicLoop, Combination, Node, Schedule, Signal, signal_name
-from ..machine.called import call_of
+from ..diagram.nodes import Node
+from ..diagram.program import check_continuous, count_guards, count_switching_functions, memory
+from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, signal_name
+from ..diagram.trace import time, traced_parameters
+from ..opaque.called import call_of
+from ..opaque.calls import Call
 
 
 def _labels(blocks: Sequence[Node]) -> list[str]:

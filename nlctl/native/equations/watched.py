@@ -10,8 +10,8 @@ from ...expressions.arrays import leaf_vector
 from ...expressions.graph import Ambiguous, Untraceable
 from ...expressions.trace import trace
 from ...wording import counted
-from ..codegen.trace import time
 from ..diagram.schedule import Schedule
+from ..diagram.trace import time
 from .located import Located
 
 if TYPE_CHECKING:

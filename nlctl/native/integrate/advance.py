@@ -16,7 +16,7 @@ from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
-from .events.functions import begins, has_events
+from .events.functions import begin_next, has_events
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -173,7 +173,7 @@ def _take(task, w, done):
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
-        begins(w, j)
+        begin_next(w, j)
 
 
 @numba.njit(**INNER)
@@ -208,14 +208,31 @@ def _chosen(task, lanes, w):
     return running
 
 
+@numba.njit(**INNER)
+def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
+    """Let happen what is due at the ends of accepted steps, and begin again behind that."""
+    memories = task.rows.memory.size > 0
+    again = memories and any_passed
+    if task.lines.delays.shape[0]:
+        again |= keep(task, lanes, w, done, passed)
+    elif not memories:
+        passed[:] = False
+    again |= _happens(task, lanes, w, passed, sampled)
+    if again:
+        restart(rhs, task, lanes, w, passed)
+    if task.rows.guarded < task.rows.switching:
+        for j in range(lanes.size):
+            done[j] |= passed[j]
+        fall(rhs, task, lanes, w, done)
+
+
 def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
     before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
     """
-    rows = task.rows
-    lanes = w.lanes
+    lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
     for _ in range(rounds):
@@ -229,7 +246,7 @@ def advance(rhs, point, along, task, w, rounds):
         _attempt(rhs, point, along, task, lanes, w)
         if task.lines.delays.shape[0]:
             look_within(task, lanes, w)
-        if task.rows.memory.size:
+        if rows.memory.size:
             _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
@@ -239,23 +256,41 @@ def advance(rhs, point, along, task, w, rounds):
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        again = rows.memory.size > 0 and any_passed
-        if task.lines.delays.shape[0]:
-            again |= keep(task, lanes, w, done, passed)
-        elif not rows.memory.size:
-            passed[:] = False
-        again |= _happens(task, lanes, w, passed, sampled)
-        if again:
-            restart(rhs, task, lanes, w, passed)
-        if rows.guarded < rows.switching:
-            for j in range(lanes.size):
-                done[j] |= passed[j]
-            fall(rhs, task, lanes, w, done)
         if rows.ways.size:
+            _see(task, lanes, w)
+        _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
+        if rows.ways.size:
+            _note_jumps(task, lanes, w, done)
             _look_at_inputs(task, lanes, w)
         if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):
             lanes[0].status = METHOD
             return
+
+
+@numba.njit(**INNER)
+def _see(task, lanes, w):
+    """Keep what the functions that the run watches are, before anything jumps."""
+    for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
+        for j in range(lanes.size):
+            w.events.before_jump[i, j] = w.events.g_start[i, j]
+
+
+@numba.njit(**INNER)
+def _note_jumps(task, lanes, w, done):
+    """Note the functions that the run watches whose signs have jumped at the ends of steps.
+
+    With a condition of t alone, a sample, or a state behind a guard's fall.  One that has jumped to
+    0 is noted where it leaves that for the other side.
+    """
+    events = w.events
+    for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
+        for j in range(lanes.size):
+            before, now = events.before_jump[i, j], events.g_start[i, j]
+            if not done[j] or before == now:
+                continue
+            if before * now < 0.0 and _counts(task, lanes[j], i, now):
+                note(task, lanes[j], w, i, now > 0.0, j)
+            events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
 
 
 @numba.njit(**INNER)

@@ -13,7 +13,7 @@ from .state import INNER
 DEGREE = 5  # of the polynomials that delayed signals are kept as
 
 
-class Lines(NamedTuple):
+class DelayLines(NamedTuple):
     """The transport delays of a diagram, one line for each signal that is delayed."""
 
     delays: Reals2  # (lines, lanes) in s, without what varies in time
@@ -27,7 +27,7 @@ class Lines(NamedTuple):
     table: Places2
 
 
-class Past(NamedTuple):
+class KeptSignals(NamedTuple):
     """What a run keeps of the signals that are delayed."""
 
     powers: Reals4  # polynomials of the lines' signals: (steps, lines, powers, lanes)
@@ -48,10 +48,10 @@ class Past(NamedTuple):
     table: Places2
 
 
-def new_past(times: int, outputs: int, lines: int, lanes: int) -> Past:
+def new_past(times: int, outputs: int, lines: int, lanes: int) -> KeptSignals:
     """Return the arrays for delayed signals; there is no place for a step yet."""
     return arrays_of(
-        Past,
+        KeptSignals,
         powers=(0, lines, DEGREE + 1, lanes),
         **dict.fromkeys(("t", "h"), (0, lanes)),
         level=(0, lines, lanes),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from numbers import Real
 from typing import Any
 
 import control as ct
@@ -13,98 +12,37 @@ import numpy as np
 
 from ...delays.variation import Variation
 from ...errors import ParameterError
-from ...names import unknown
 from ...responses.watched import Watched
 from ...sampling.clock import Instants
-from ..chattering.detection import Jump, asked, jump_of, new_paces, probe_of, snapshot
-from ..codegen.along import Along, derivatives
-from ..codegen.program import Program, instants_of
+from ..along import derivatives
+from ..chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from ..compiled import Compiled
+from ..diagram.program import Program, instants_of
 from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
+from ..integrators import integrators
 from ..machine.evaluations import Machine, machine
-from ..machine.integrators import integrators
+from ..run import Run
+from ..settings import METHODS, Settings
 from ..taylor.method import with_taylor
 from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
-from .events.functions import Rows
+from .events.functions import EventRows
 from .log import log_room
-from .memory import replaced, with_table
-from .methods import EXPLICIT_PAIRS
+from .memory import with_fields, with_table
 from .methods.lu import WHOLE
 from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
 from .methods.tableau import Tableau, pair_of
-from .methods.taylor import OTHER_METHOD, STAGES
-from .methods.tsit5 import TSIT5
+from .methods.taylor import OTHER_METHOD, SLOPES
 from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
-from .samples import Clocks, Timed
-from .state import AUTO, DERIVATIVES, EXPLICIT, IMPLICIT, RUNNING, TAYLOR, Status
+from .samples import Ticks, Timed
+from .state import DERIVATIVES, EXPLICIT, RUNNING, Status
 from .workspace import Task, new_work
 
-METHODS = {
-    "auto": AUTO,
-    **dict.fromkeys(EXPLICIT_PAIRS, EXPLICIT),
-    "rodas5p": IMPLICIT,
-    "taylor": TAYLOR,
-}
 _NOTED = 1000  # events of a run for which there is room from the beginning
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    rtol, atol : float
-        Tolerances; the error of a step is weighed with atol + rtol |x|.
-    max_steps : int
-        Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
-        Explicit pair of orders 5(4), stiff method of orders 5(4), or whichever is faster;
-        Taylor's method, of an order that follows from rtol, for equations that can be written as
-        expressions and have no memories; an explicit pair of your own as its tableau.
-    step : float
-        Fixed step (s) instead of error control; 0 for error control.
-    max_step : float
-        Longest step (s), under error control too.
-    """
-
-    rtol: float = 1e-8
-    atol: float = 1e-10
-    max_steps: int = 10_000_000_000
-    method: str | Tableau = "auto"
-    step: float = 0.0
-    max_step: float = np.inf
-
-    @property
-    def pair(self) -> Tableau:
-        """The explicit pair that is used, alone or in turn with the stiff method."""
-        return (
-            self.method
-            if isinstance(self.method, Tableau)
-            else EXPLICIT_PAIRS.get(self.method, TSIT5)
-        )
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.method, Tableau) and self.method not in METHODS:
-            raise unknown("method", str(self.method), METHODS, "of a compiled diagram")
-        for name in ("rtol", "atol", "step", "max_steps", "max_step"):
-            if not isinstance(getattr(self, name), Real):
-                raise ParameterError(f"{name} must be one number, got {getattr(self, name)!r}")
-        for name, most in (("rtol", 1), ("atol", np.inf)):
-            if not 0 < getattr(self, name) < most:
-                rule = "> 0 and < 1" if most == 1 else "> 0"
-                raise ParameterError(f"{name} must be {rule}, got {getattr(self, name)!r}")
-        if not 0 <= self.step < np.inf:
-            raise ParameterError(f"step must be > 0, or 0 for error control, got {self.step!r}")
-        if not self.max_step > 0:
-            raise ParameterError(f"max_step must be > 0, got {self.max_step!r}")
-        if self.max_steps < 1:
-            raise ParameterError(f"max_steps must be >= 1, got {self.max_steps!r}")
 
 
 def trajectory(
@@ -160,36 +98,6 @@ def _sampled(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """Members that are integrated in a batch, and all arrays that this needs.
-
-    Attributes
-    ----------
-    machine : Machine
-    task, work : Task, Work
-        See `workspace`.
-    along : Along or None
-        Exact derivatives, if the stiff method has asked for them and there are any.
-    jumps : mapping
-        Of members that chatter, by their lanes: where.
-    series : Task or None
-        With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
-    """
-
-    machine: Machine
-    task: Any
-    work: Any
-    along: Along | None = None
-    jumps: Mapping[int, Jump] = field(default_factory=dict)
-    series: Any = None
-
-    @property
-    def lanes(self) -> np.ndarray:
-        """One record per member, see `state`."""
-        return self.work.lanes
-
-
 def begin(run: Run) -> None:
     """Commit the memories and propose first steps."""
     rhs, _ = run.machine.entries
@@ -243,7 +151,7 @@ def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:
         along.elimination if along else WHOLE,
     )
     run.lanes["status"] = RUNNING
-    return replace(run, task=replaced(run.task, stiff=stiff), along=along)
+    return replace(run, task=with_fields(run.task, stiff=stiff), along=along)
 
 
 def finish(run: Run) -> np.ndarray:
@@ -264,8 +172,7 @@ def prepared(
 ) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
-    method = _method(compiled, settings)
-    terms = ()
+    method, terms = _method(compiled, settings), ()
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     c = np.zeros((code.rows, count))
@@ -277,10 +184,7 @@ def prepared(
         outputs=compiled.system.noutputs or 0,
         p=c,
         alone=int(count == 1),
-        rtol=float(settings.rtol),
-        atol=float(settings.atol),
-        fixed=float(settings.step),
-        max_steps=int(settings.max_steps),
+        **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         pair=pair_of(settings.pair),
         stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
@@ -288,7 +192,7 @@ def prepared(
         rows=_rows(program, code, read.watched),
         timed=with_table(
             Timed,
-            **ahead(code.lowered, p, times, settings.max_step),
+            **ahead(code.lowered.timed, p, times, settings.max_step),
             opaque=int(bool(code.lowered.calls)),
         ),
         clocks=_clocks(compiled, code, due),
@@ -300,7 +204,7 @@ def prepared(
     work = new_work(
         x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
         code.lowered.rows["s"], len(program.guards), len(read.lines),
-        STAGES if terms else settings.pair.stages, terms or (1, 0),
+        SLOPES if terms else settings.pair.stages, terms or (1, 0),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     work.lanes["stiff"] = method == "rodas5p"
@@ -308,12 +212,20 @@ def prepared(
     return Run(machine=code, task=task, work=work)
 
 
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Rows:
+def _bounds(settings: Settings) -> dict[str, Any]:
+    """Return what errors and numbers of steps are bounded by."""
+    return {
+        "rtol": float(settings.rtol), "atol": float(settings.atol),
+        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
+    }  # fmt: skip
+
+
+def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
     """Return how many rows are whose: declared, located, memories."""
     located = code.lowered.rows["g"]
     bending = code.lowered.conditions.bending
     return with_table(
-        Rows,
+        EventRows,
         bending=program.switching,
         declared=program.switching + bending,
         guarded=located - len(program.guards),
@@ -337,7 +249,7 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
     return "tsit5"
 
 
-def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:
+def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Ticks:
     """Return when something happens to sampled blocks of each lane, and what."""
     sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
     ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
@@ -352,7 +264,7 @@ def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Clocks:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
     return with_table(
-        Clocks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
         states=np.array(sampled, dtype=np.int64),
     )  # fmt: skip
 

@@ -18,7 +18,7 @@ from .memory import Places2, Reals1, Reals2, with_table
 from .state import INNER
 
 
-class Ahead(NamedTuple):
+class Scratch(NamedTuple):
     """For evaluations besides a step's own, with their results."""
 
     x: Reals2  # (states, lanes)
@@ -31,11 +31,11 @@ class Ahead(NamedTuple):
     table: Places2
 
 
-def new_ahead(n: int, rows: int, memories: int, lanes: int) -> Ahead:
+def new_ahead(n: int, rows: int, memories: int, lanes: int) -> Scratch:
     """Return the arrays for n states, so many rows of g, and of m."""
     x, dx = np.zeros((n, lanes)), np.zeros((n, lanes))
     return with_table(
-        Ahead, x=x, dx=dx, g=np.zeros((rows, lanes)), m=np.zeros((memories, lanes)),
+        Scratch, x=x, dx=dx, g=np.zeros((rows, lanes)), m=np.zeros((memories, lanes)),
         x_flat=x.reshape(-1), dx_flat=dx.reshape(-1), begin=np.zeros(lanes),
     )  # fmt: skip
 

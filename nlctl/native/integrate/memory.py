@@ -30,8 +30,14 @@ _LINE = 8  # floats in a line of the cache
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
 
-Reals1, Reals2, Reals3, Reals4 = (Annotated[np.ndarray, np.float64, n] for n in range(1, 5))
-Places1, Places2, Places3 = (Annotated[np.ndarray, np.int64, n] for n in range(1, 4))
+# arrays in a record: their data type and dimensions
+Reals1 = Annotated[np.ndarray, np.float64, 1]
+Reals2 = Annotated[np.ndarray, np.float64, 2]
+Reals3 = Annotated[np.ndarray, np.float64, 3]
+Reals4 = Annotated[np.ndarray, np.float64, 4]
+Places1 = Annotated[np.ndarray, np.int64, 1]
+Places2 = Annotated[np.ndarray, np.int64, 2]
+Places3 = Annotated[np.ndarray, np.int64, 3]
 Unsigned1 = Annotated[np.ndarray, np.uint64, 1]
 
 
@@ -123,7 +129,7 @@ def _row(record: Any, name: str, value: Any) -> list[int]:
     return row + [0] * (_ENTRY - len(row))
 
 
-def replaced(record: Any, **changes: Any) -> Any:
+def with_fields(record: Any, **changes: Any) -> Any:
     """Return a record with other values of some fields."""
     given = {name: getattr(record, name) for name in _named(record)}
     return with_table(type(record), **given | changes)
@@ -136,7 +142,7 @@ def grown(record: Any, names: tuple[str, ...], room: int) -> Any:
         before = getattr(record, name)
         changes[name] = np.zeros((room, *before.shape[1:]), dtype=before.dtype)
         changes[name][: before.shape[0]] = before
-    return replaced(record, **changes)
+    return with_fields(record, **changes)
 
 
 def arrays_of(record: Any, **shapes: tuple[int, ...]) -> Any:

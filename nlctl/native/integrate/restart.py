@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from .evaluate import evaluate
-from .events.functions import begins
+from .events.functions import begin_next
 from .state import INNER
 
 FAR = 1e6
@@ -72,7 +72,7 @@ def restart(rhs, task, lanes, w, chosen):
         _lock(rhs, task, lanes, w, chosen)
     for j in range(lanes.size):
         if chosen[j]:
-            begins(w, j)
+            begin_next(w, j)
 
 
 @numba.njit(**INNER)

@@ -14,7 +14,7 @@ from .memory import Places1, Places2, Reals1, Reals2
 from .state import INNER, RUNNING
 
 
-class Clocks(NamedTuple):
+class Ticks(NamedTuple):
     """When what happens to sampled blocks."""
 
     ticks: Reals2  # (lanes, instants): when something does, then inf

@@ -83,6 +83,7 @@ _FIELDS = [
     ("pace", "f8"),  # how far this method gets with the work of an explicit step (s), see `turns`
     ("other_pace", "f8"),  # and the other one did
     ("from_t", "f8"),  # time from which that is measured
+    ("from_accepted", "i8"),  # steps accepted until then
     ("from_tried", "i8"),  # steps tried until this method's turn
     ("span", "i8"),  # steps of its turn
     ("wait", "i8"),  # explicit steps before Taylor's method is tried again, if it does not pay

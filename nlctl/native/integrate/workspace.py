@@ -10,24 +10,24 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from .delayed import Lines, Past, new_past
-from .evaluate import Ahead, new_ahead
+from .delayed import DelayLines, KeptSignals, new_past
+from .evaluate import Scratch, new_ahead
 from .events.functions import (
+    EventRows,
     Events,
     Inside,
     Memories,
-    Rows,
     new_events,
     new_inside,
     new_memories,
 )
 from .log import Log, new_log
-from .memory import Places2, Reals1, Reals2, Reals3, replaced, type_of, with_table
+from .memory import Places2, Reals1, Reals2, Reals3, type_of, with_fields, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
-from .methods.tableau import Pair
+from .methods.tableau import ExplicitPair
 from .methods.taylor import TaylorArrays, TaylorMethod, new_terms
 from .resets import Guards, Resets, new_guards
-from .samples import Clocks, Timed
+from .samples import Ticks, Timed
 from .state import LANE, new_lanes
 
 
@@ -44,14 +44,14 @@ class Task(NamedTuple):
     fixed: float  # step size, 0 if it is to be chosen
     max_steps: int
     method: int
-    pair: Pair  # the explicit one
+    pair: ExplicitPair  # the explicit one
     stiff: StiffMethod
     taylor: TaylorMethod
-    rows: Rows
+    rows: EventRows
     timed: Timed
-    clocks: Clocks
+    clocks: Ticks
     resets: Resets
-    lines: Lines
+    lines: DelayLines
     table: Places2
 
 
@@ -77,7 +77,7 @@ class Work(NamedTuple):
     rate: Reals1  # estimate of the largest eigenvalue's magnitude (1/s)
     s: Reals2  # next states of sampled blocks, or of those with guards behind a jump
     resume: Reals2  # states at the last time, before a sample that is due there
-    ahead: Ahead
+    ahead: Scratch
     events: Events
     memories: Memories
     inside: Inside
@@ -85,7 +85,7 @@ class Work(NamedTuple):
     taylor: TaylorArrays
     guards: Guards
     log: Log
-    past: Past
+    past: KeptSignals
     table: Places2
 
 
@@ -145,4 +145,4 @@ def with_stages(work: Work, stages: int) -> Work:
     """Return a workspace for a method with so many stages, where the next step begins."""
     k = np.zeros((stages, *work.k.shape[1:]))
     k[0] = work.k[0]
-    return replaced(work, k=k, k_flat=k.reshape(stages, -1))
+    return with_fields(work, k=k, k_flat=k.reshape(stages, -1))

@@ -5,17 +5,15 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...sampling.system import Happening
-from ..codegen.lower import Lowered, lower
 from ..equations.blocks import equations
+from ..lower import Lowered, lower
+from ..reading import Reading
 from .routine import called_back, entry, lowered_code, raise_failures
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
 
 _LOG = logging.getLogger("nlctl")
 ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
@@ -98,7 +96,7 @@ def _entries(functions: tuple[Any, ...]) -> np.ndarray:
 
 
 def machine(
-    compiled: Compiled, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
+    reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> Machine:
     """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
 
@@ -108,12 +106,12 @@ def machine(
     Where an integer that steers an equation has another value, the blocks' functions are read
     once more.  The first member's values decide: `fitting` says for which members they hold.
     """
-    known: list[Machine] = compiled.__dict__.setdefault("_machines", [])
+    known = reading.cache.of(Machine)
     asked = set(happening)
     for made in known:
         if made.width == width and asked <= set(made.meetings) and made.lowered.holds_for(p):
             return made
-    found, schedule, program = compiled.equations, compiled.schedule, compiled.program
+    found, schedule, program = reading.equations, reading.schedule, reading.program
     extra = [what for what in happening if what not in program.meetings]
     meetings = (*program.meetings, *dict.fromkeys(extra))
     if extra or not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
@@ -135,17 +133,15 @@ def machine(
             meetings=meetings,
         )
     )
-    _hint(compiled, known[-1])
+    if len(known) == 1:
+        _hint(reading, known[0])
     return known[-1]
 
 
-def _hint(compiled: Compiled, made: Machine) -> None:
-    """Say once which functions take the time of Python, and at which line that is decided."""
-    if compiled.__dict__.setdefault("_hinted", not made.called_back):
-        return
-    compiled.__dict__["_hinted"] = True
+def _hint(reading: Reading, made: Machine) -> None:
+    """Say which functions take the time of Python, and at which line that is decided."""
     for name in made.called_back:
-        call = compiled.equations.calls[name]
+        call = reading.equations.calls[name]
         _LOG.warning(
             "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
             "than python-control's: %s",
@@ -153,35 +149,35 @@ def _hint(compiled: Compiled, made: Machine) -> None:
         )  # fmt: skip
 
 
-def fitting(compiled: Compiled, p: np.ndarray, width: int) -> np.ndarray:
+def fitting(reading: Reading, p: np.ndarray, width: int) -> np.ndarray:
     """Return for which members the machine code of the first one holds."""
-    made = machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
+    made = machine(reading, np.repeat(p[:, :1], width, axis=1), width)
     return np.array([made.lowered.holds_for(column) for column in p.T], dtype=bool)
 
 
-def evaluations(compiled: Compiled) -> tuple[Callable[..., None], Callable[..., None]]:
+def evaluations(reading: Reading) -> tuple[Callable[..., None], Callable[..., None]]:
     """Return ``rhs(t, x, u, p, dx, g, m)`` and ``out(t, x, u, p, y)`` of flat vectors."""
-    machine(compiled, compiled.parameter_vector()[:, None])
+    machine(reading, reading.parameter_vector()[:, None])
 
     def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: Any, g: Any, m: Any) -> None:
-        code, c = prepared_parameters(compiled, p)
+        code, c = prepared_parameters(reading, p)
         events = np.empty((code.lowered.rows["g"], 1))  # others where integers steer what switches
         code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events, m[:, None])
         g[:] = events[:, 0] if events.shape[0] == g.size else np.nan
 
     def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
-        code, c = prepared_parameters(compiled, p)
+        code, c = prepared_parameters(reading, p)
         code.out(np.array([t]), _column(x), _column(u), c, y[:, None])
 
     return rhs, out
 
 
 def prepared_parameters(
-    compiled: Compiled, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
+    reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> tuple[Machine, np.ndarray]:
     """Return machine code for a parameter vector, and what its functions take of that."""
     each = np.repeat(p[:, None], width, axis=1)
-    code = machine(compiled, each, width, happening)
+    code = machine(reading, each, width, happening)
     c = np.zeros((code.rows, width))
     code.prepare(each, c)
     return code, c

@@ -25,8 +25,8 @@ import numba
 import numpy as np
 
 from ...annotations import unreported
-from ..thirdparty.held import LAID_OUT, OPAQUE, held_by, inherited
-from ..thirdparty.outside import asked_outside, imports_in
+from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
+from ..purity.outside import asked_outside, imports_in
 
 _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
     *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and
@@ -399,7 +399,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
 
 def _is_named(module: str) -> bool:
     """Whether the version of a module stands beside every key."""
-    return module.partition(".")[0] in ("nlctl", "analysis", "control") or _is_library(module)
+    return module.partition(".")[0] in ("nlctl", "control") or _is_library(module)
 
 
 @functools.cache

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ...upstream.numba_internals import is_jit_disabled
-from ..codegen.calls import CALL_FAILED, Call, Native, native_calls, plain_calls
 from ..codegen.interpret import interpreted_function
-from ..codegen.lower import Lowered
 from ..codegen.solver import plain_solver
+from ..lower import Lowered
+from ..opaque.calls import Call
+from .calls import CALL_FAILED, Native, native_calls, plain_calls
 from .finish import Loaded, finished
 
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...errors import ParameterError
-from ..integrate.memory import replaced
+from ..equations.relays import relay_places
+from ..integrate.memory import with_fields
 from ..machine.routine import entry
-from ..sliding.reading import relay_places
+from ..reading import Reading
+from ..settings import Settings
 from .routine import series
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
-    from ..integrate.driver import Settings
 
 LEAST, MOST = 4, 30  # orders
 _COST = 0.35  # of a step of order 1, in explicit ones: measured, 1.4 to 2.4 at 8, 4 to 5 at 15
@@ -36,14 +34,14 @@ def order_for(rtol: float) -> int:
 
 
 def with_taylor(
-    task: Any, compiled: Compiled, p: np.ndarray, settings: Settings
+    task: Any, reading: Reading, p: np.ndarray, settings: Settings
 ) -> tuple[Any, tuple[int, int]]:
     """Return the task with Taylor's method, and the shape of the coefficients.
 
     Parameters
     ----------
     task : Task
-    compiled : Compiled
+    reading : Reading
     p : ndarray
         Parameter vectors, shape (parameters, members).
     settings : Settings
@@ -53,11 +51,11 @@ def with_taylor(
     ParameterError
         If there is what it cannot do.
     """
-    _check(compiled)
-    order, made = order_for(settings.rtol), series(compiled, p, p.shape[1])
+    _check(reading)
+    order, made = order_for(settings.rtol), series(reading, p, p.shape[1])
     found = [entry(function) for function in made.functions]
     plain = any(callable(each) for each in found)
-    taylor = replaced(
+    taylor = with_fields(
         task.taylor,
         highest=order,
         functions=np.array(found, dtype=object if plain else np.int64),
@@ -67,18 +65,18 @@ def with_taylor(
     )
     # the power of the step size in its error; there are no stages at parts of a step
     inside = task.pair.inside * [[0.0], [1.0], [1.0]]
-    pair = replaced(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
-    return replaced(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
+    pair = with_fields(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
+    return with_fields(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
 
 
-def _check(compiled: Compiled) -> None:
+def _check(reading: Reading) -> None:
     """Refuse what has no coefficients, whatever its equations are."""
-    name, schedule = compiled.system.name, compiled.schedule
-    if not compiled.system.nstates:
+    name, schedule = reading.system.name, reading.schedule
+    if not reading.system.nstates:
         raise ParameterError(
             f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
         )
-    memories = [compiled.state_labels[i] for i in compiled.program.memory]
+    memories = [reading.system.state_labels[i] for i in reading.program.memory]
     relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
     for what, found in (("memory", memories), ("an ideal relay", relays)):
         if found:

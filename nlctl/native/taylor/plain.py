@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..codegen.interpret import interpreted_function
-from ..codegen.lower import Lowered
 from ..integrate.methods.taylor import FOLLOWED
+from ..lower import Lowered
 from .folds import SeriesLayout
 from .recurrences import Fold, Recurrences
 from .steps import GROWN

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...errors import ParameterError
 from ...upstream.numba_internals import is_jit_disabled
-from ..codegen.lower import Lowered, planned, stores_of
 from ..codegen.rewrite import rewritten
+from ..diagram.parameters import length
 from ..equations.blocks import equations
 from ..integrate.memory import zeros
+from ..lower import Lowered, planned, stores_of
 from ..machine.finish import finished
 from ..machine.routine import Routine
-from ..parameters import length
+from ..reading import Reading
 from .folds import WIDE, SeriesLayout, taylor_text
 from .plain import plain_series
 from .recurrences import NoSeriesError, Recurrences, recurrences
 from .steps import steps_text
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
 
 _FIRST = ("t", "x", "u", "c", "o", "k")
 _FOLLOWING = ("t", "x", "u", "c", "v", "w", "o", "b", "a", "q", "k")
@@ -65,7 +63,7 @@ class Series:
         return c
 
 
-def series(compiled: Compiled, p: np.ndarray, width: int) -> Series:
+def series(reading: Reading, p: np.ndarray, width: int) -> Series:
     """Return the coefficients of `width` members' solutions, made when they are first needed.
 
     Raises
@@ -74,21 +72,21 @@ def series(compiled: Compiled, p: np.ndarray, width: int) -> Series:
         If the diagram has something without Taylor coefficients.
     """
     with _ONCE:
-        known: list[Series] = compiled.__dict__.setdefault("_series", [])
+        known = reading.cache.of(Series)
         for made in known:
             if made.lowered.lanes == width and made.lowered.holds_for(p):
                 return made
-        known.append(_made(compiled, p, width))
+        known.append(_made(reading, p, width))
         return known[-1]
 
 
-def _made(compiled: Compiled, p: np.ndarray, width: int) -> Series:
-    found = compiled.equations
+def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
+    found = reading.equations
     if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(compiled.schedule, compiled.program.layout, p[:, 0])
-    lowered, wanted = _lowered(compiled, found, width)
+        found = equations(reading.schedule, reading.program.layout, p[:, 0])
+    lowered, wanted = _lowered(reading, found, width)
     layout = _layout(lowered)
-    switching = compiled.program.events + found.conditions.rows
+    switching = reading.program.events + found.conditions.rows
     if is_jit_disabled():
         prepare, *functions = plain_series(lowered, wanted, switching, layout)
     else:
@@ -118,8 +116,8 @@ def _layout(lowered: Lowered) -> SeriesLayout:
     return SeriesLayout(rows=lowered.rows["k"], at=at, lanes=lowered.lanes, size=row)
 
 
-def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recurrences]:
-    program, n, m = compiled.program, compiled.system.nstates or 0, compiled.schedule.ninputs
+def _lowered(reading: Reading, found: Any, width: int) -> tuple[Lowered, Recurrences]:
+    program, n, m = reading.program, reading.system.nstates or 0, reading.schedule.ninputs
     asked = stores_of(found, ("dx", "g"))
     stores, exact, graph = rewritten(found.graph, asked)
     try:
@@ -128,7 +126,7 @@ def _lowered(compiled: Compiled, found: Any, width: int) -> tuple[Lowered, Recur
         )
     except NoSeriesError as error:
         raise ParameterError(
-            f"'{compiled.system.name}' cannot be integrated with method='taylor': {error}; use "
+            f"'{reading.system.name}' cannot be integrated with method='taylor': {error}; use "
             "method='tsit5'"
         ) from error
     parameters = length(program.layout)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
+from ..equations.located import Conditions
 from .breaks import break_points
 from .reach import reach
-
-if TYPE_CHECKING:
-    from ..codegen.lower import Lowered
 
 _KEPT = 256  # parameter vectors
 
@@ -37,13 +35,34 @@ class Ahead:
     reach: np.ndarray
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OfTime:
+    """Functions of time alone in a program.
+
+    Attributes
+    ----------
+    conditions : Conditions
+        What the program switches at.
+    known : dict
+        What has been found of them, by the times of a run and the parameters that they depend on.
+    """
+
+    conditions: Conditions
+    known: dict[tuple[tuple[float, float], bytes], Ahead] = field(default_factory=dict)
+
+    @cached_property
+    def parameters(self) -> np.ndarray:
+        """Places of the parameters that they depend on."""
+        return read_parameters(self.conditions)
+
+
 def ahead(
-    lowered: Lowered, p: np.ndarray, times: np.ndarray, max_step: float
+    timed: OfTime, p: np.ndarray, times: np.ndarray, max_step: float
 ) -> dict[str, np.ndarray]:
     """Return what integrators take of that for each column of `p`."""
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
-    own = [_of(lowered, p[:, j], span) for j in range(count)]
+    own = [_of(timed, p[:, j], span) for j in range(count)]
     breaks = [one.breaks for one in own]
     jumps = np.full((count, max(each.size for each in breaks)), np.inf)
     cells = max(one.reach.size for one in own)
@@ -56,18 +75,17 @@ def ahead(
     return {"jumps": jumps, "longest": longest, "reach": limits}
 
 
-def _of(lowered: Lowered, p: np.ndarray, span: tuple[float, float]) -> Ahead:
+def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
     """Return it for one parameter vector, from what is known of the program already."""
-    found, known = lowered.conditions, lowered.known_ahead
-    key = (span, p[lowered.read_ahead].tobytes())
+    known, key = timed.known, (span, p[timed.parameters].tobytes())
     if key not in known:
         if len(known) >= _KEPT:
             known.clear()
-        known[key] = _read(found, p, span)
+        known[key] = _read(timed.conditions, p, span)
     return known[key]
 
 
-def _read(found: Any, p: np.ndarray, span: tuple[float, float]) -> Ahead:
+def _read(found: Conditions, p: np.ndarray, span: tuple[float, float]) -> Ahead:
     fastest = _fastest(found.waves, p)
     pulses = reach(found.pulses, p, span) if found.pulses else np.zeros(0)
     breaks = break_points(found.of_time, p, span, fastest) if found.of_time else np.zeros(0)
@@ -83,7 +101,7 @@ def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:
     return max((each for each in sums if np.isfinite(each)), default=0.0)
 
 
-def read_parameters(found: Any) -> np.ndarray:
+def read_parameters(found: Conditions) -> np.ndarray:
     """Return the places of the parameters that any of it depends on."""
     exprs = [*found.of_time, *found.pulses, *(slope for wave in found.waves for slope in wave)]
     places: set[int] = set()

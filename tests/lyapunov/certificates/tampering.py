@@ -4,7 +4,7 @@ import copy
 import json
 from fractions import Fraction
 
-from analysis.recheck import main, seal_of
+from nlctl.analysis.recheck import main, seal_of
 
 
 def scaled(path, factor):

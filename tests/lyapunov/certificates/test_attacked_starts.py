@@ -10,7 +10,7 @@ from mrac_loops import e_modification, first_order, projection, sigma, wing_rock
 from planted_loops import SLIDING, wired
 
 import nlctl
-from analysis.lyapunov import certify
+from nlctl.analysis.lyapunov import certify
 from nlctl.errors import UsageError
 
 TIMES, ROUND = np.linspace(0, 20, 2001), 1 + 1e-6

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from scipy.signal import lsim, lti
 
 import nlctl
-from analysis.intervals.branch_and_bound import Box
-from analysis.intervals.level_set import prove_decrease
-from analysis.lyapunov.bounds.error_bounds import error_bounds, filter_poles, reference_bounds
-from analysis.lyapunov.certificate.certify import certify
-from analysis.lyapunov.certificate.gains import design
 from nlctl import DiagramError, ParameterError
+from nlctl.analysis.intervals.branch_and_bound import Box
+from nlctl.analysis.intervals.level_set import prove_decrease
+from nlctl.analysis.lyapunov.bounds.error_bounds import error_bounds, filter_poles, reference_bounds
+from nlctl.analysis.lyapunov.certificate.certify import certify
+from nlctl.analysis.lyapunov.certificate.gains import design
 
 TIGHT = (0.6, 1.3)  # split of the dead zone
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.lyapunov import ledger, tighten
 from nlctl import ParameterError, UnknownNameError
+from nlctl.analysis.lyapunov import ledger, tighten
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

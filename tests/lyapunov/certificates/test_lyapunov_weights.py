@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.intervals.branch_and_bound import Box
-from analysis.lyapunov.bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V
-from analysis.lyapunov.bounds.sector import plant_terms
-from analysis.lyapunov.bounds.weights import (
+from nlctl.analysis.intervals.branch_and_bound import Box
+from nlctl.analysis.lyapunov.bounds.final_bound import (
+    Gains,
+    alpha_0,
+    alpha_1,
+    final_bound,
+    initial_V,
+)
+from nlctl.analysis.lyapunov.bounds.sector import plant_terms
+from nlctl.analysis.lyapunov.bounds.weights import (
     Network,
     approximation_error,
     least_squares_weights,

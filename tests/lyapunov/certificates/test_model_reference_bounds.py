@@ -19,9 +19,9 @@ from mrac_loops import (
 )
 
 import nlctl
-from analysis.lyapunov import certify
-from analysis.lyapunov.model_reference.quadratic_form import quadratic_form
 from nlctl import DiagramError, ParameterError
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.lyapunov.model_reference.quadratic_form import quadratic_form
 
 W, D = 2.0, 0.5  # of the plant x' = 2 x + v + 0.5 sin t
 

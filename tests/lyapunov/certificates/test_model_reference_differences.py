@@ -10,11 +10,11 @@ from mrac_loops import QUIET, first_order, half_sine, projection, sigma, wing_ro
 from planted_loops import actuator, again, exchanged
 
 import nlctl
-from analysis.lyapunov import DecompositionError, certify
-from analysis.lyapunov.model_reference.audit import check_decrease
-from analysis.lyapunov.model_reference.closing import matching, read_model_reference
-from analysis.lyapunov.model_reference.decrease import decrease
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov import DecompositionError, certify
+from nlctl.analysis.lyapunov.model_reference.audit import check_decrease
+from nlctl.analysis.lyapunov.model_reference.closing import matching, read_model_reference
+from nlctl.analysis.lyapunov.model_reference.decrease import decrease
 
 
 def linear(a, b):

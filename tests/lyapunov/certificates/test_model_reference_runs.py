@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from mrac_loops import SINE, e_modification, first_order, projection, sigma, wing_rock
 
 import nlctl
-from analysis.lyapunov import certify
-from analysis.lyapunov.loop.roles import read_roles
-from analysis.lyapunov.model_reference.model_loop import ADAPTIVE_PIECES
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.lyapunov.loop.roles import read_roles
+from nlctl.analysis.lyapunov.model_reference.model_loop import ADAPTIVE_PIECES
 
 D, TIMES = 0.5, np.linspace(0, 60, 3001)
 INPUTS = {"w": D}

@@ -23,9 +23,9 @@ from planted_loops import (
 )
 
 import nlctl
-from analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
-from analysis.lyapunov.certificate.certify import certify
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
+from nlctl.analysis.lyapunov.certificate.certify import certify
 from nlctl.equations import equation
 
 C_0 = 0.47662  # of the loop without a difference

@@ -5,9 +5,9 @@ import pytest
 from planted_loops import UPDATE, actuator, again, plant, wired
 
 import nlctl
-from analysis.lyapunov import Box, ledger
-from analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov import Box, ledger
+from nlctl.analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
 from nlctl.functions import nussbaum
 
 BOX = Box.of(x1=(-1.5, 1.5), x2=(-3, 3), v=(-40, 40))

@@ -15,9 +15,9 @@ from planted_loops import wired
 from tampering import answers, put, scaled
 
 import nlctl
-from analysis import recheck as package
-from analysis.lyapunov import certify
-from analysis.recheck import Refuted, main, recheck, seal_of
+from nlctl.analysis import recheck as package
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.recheck import Refuted, main, recheck, seal_of
 from nlctl.errors import UsageError
 
 pytestmark = pytest.mark.slow

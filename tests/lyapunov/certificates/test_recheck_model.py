@@ -12,8 +12,8 @@ from mrac_loops import SINE, e_modification, first_order, half_sine, projection,
 from tampering import answers, leaves_of, put, scaled
 
 import nlctl
-from analysis.lyapunov import certify
-from analysis.recheck import Refuted, main, proved_bounds, recheck, seal_of
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.recheck import Refuted, main, proved_bounds, recheck, seal_of
 
 pytestmark = pytest.mark.slow
 ROLL = {"plant.x1": (-0.2, 0.2), "plant.x2": (-0.2, 0.2), "model.xm1": (-0.1, 0.1),

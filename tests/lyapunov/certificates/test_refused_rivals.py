@@ -3,9 +3,9 @@
 import pytest
 
 import nlctl
-from analysis.lyapunov import certify
-from analysis.paper.rivals import rival_controllers
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov import certify
+from nlctl.analysis.paper.rivals import rival_controllers
 
 LAWS = {
     "paper": "NussbaumLaw",

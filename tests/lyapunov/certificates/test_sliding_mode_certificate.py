@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from analysis.lyapunov import DecompositionError, certify
 from nlctl import DiagramError
+from nlctl.analysis.lyapunov import DecompositionError, certify
 from nlctl.controllers import sliding_mode
 
 TIMES = np.linspace(0, 20, 4001)

@@ -7,7 +7,7 @@ from planted_loops import SLIDING, UPDATE, actuator, exchanged, plant, system, w
 from test_planted_differences import TIME
 
 import nlctl
-from analysis.lyapunov import certify
+from nlctl.analysis.lyapunov import certify
 from nlctl.errors import UsageError
 
 

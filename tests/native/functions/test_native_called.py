@@ -18,7 +18,8 @@ from scipy.special import erfcx
 import nlctl
 from nlctl.errors import UsageError
 from nlctl.native import CompileError
-from nlctl.native.codegen.calls import Call, native_calls
+from nlctl.native.machine.calls import native_calls
+from nlctl.native.opaque.calls import Call
 
 WITH_JIT = not getattr(config, "DISABLE_JIT", False)
 needs_jit = pytest.mark.skipif(not WITH_JIT, reason="nothing is compiled without JIT")

@@ -9,10 +9,10 @@ from plain_plan import compare
 
 from nlctl.errors import ParameterError, UsageError
 from nlctl.native import CompileError
-from nlctl.native.codegen.calls import Source
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.machine.fingerprint import program_key
-from nlctl.native.thirdparty.objects import frozen
+from nlctl.native.opaque.calls import Source
+from nlctl.native.purity.objects import frozen
 
 
 class Tank:

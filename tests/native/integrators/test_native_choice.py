@@ -5,8 +5,9 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.native.integrate.driver import Settings, begin, differentiated, go_on, prepared
+from nlctl.native.integrate.driver import begin, differentiated, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
+from nlctl.native.settings import Settings
 
 ROUNDS = 20  # after so many steps the method is looked at, as it is when methods are compared
 

@@ -16,9 +16,9 @@ from numba.core import config, event
 
 import nlctl
 from nlctl import paper
+from nlctl.native import integrators
 from nlctl.native.integrate import driver
-from nlctl.native.machine import integrators
-from nlctl.native.machine.integrators import SHIPPED, WANTED, shipped_bitcode, sources_key
+from nlctl.native.integrators import SHIPPED, WANTED, shipped_bitcode, sources_key
 from nlctl.native.ship import source_files
 
 pytestmark = pytest.mark.skipif(

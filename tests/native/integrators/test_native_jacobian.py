@@ -9,7 +9,7 @@ from numba.core import config
 from stiff_problems import PROBLEMS
 
 import nlctl
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import derivatives
 from nlctl.native.integrate.state import DIRECTIONS
 
 run: Any = nlctl.input_output_response

@@ -1,7 +1,7 @@
 """Linear equations of the stiff method: their structure is sound, their solution LAPACK's."""
 
 from collections import namedtuple
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import NamedTuple
 
 import control as ct
@@ -14,7 +14,7 @@ from stiff_problems import PROBLEMS
 
 import nlctl
 from nlctl.expressions.dependence import structure
-from nlctl.native.codegen.along import derivatives
+from nlctl.native.along import AlongCode, derivatives
 from nlctl.native.integrate.methods.lu import (
     WHOLE,
     Elimination,
@@ -225,7 +225,8 @@ def test_steps_are_those_of_elimination_as_a_whole():
         x0 = np.asarray(nlctl.initial_state(system), dtype=float) if x0 is None else x0
         runs = []
         for order in (made.elimination, WHOLE):
-            compiled.__dict__["_along"] = (*compiled.__dict__["_along"][:-1], order)
+            kept = compiled.cache.of(AlongCode)
+            kept[:] = [replace(kept[0], elimination=order)]
             runs.append(
                 nlctl.input_output_response(
                     compiled, [0.0, 0.02], 0, x0, method="rodas5p", step=1e-3, audit=False

@@ -17,7 +17,7 @@ from nlctl.expressions.functions import FUNCTIONS
 from nlctl.expressions.graph import numpy_function
 from nlctl.native.machine.routine import entry
 from nlctl.native.taylor.method import order_for
-from nlctl.native.taylor.routine import series
+from nlctl.native.taylor.routine import Series, series
 
 flint = pytest.importorskip("flint")
 ORDER = 12
@@ -520,4 +520,4 @@ def test_parameters_change_without_compiling_again():
             for method in ("tsit5", "taylor")
         )
         assert np.max(np.abs(found - exact)) < 1e-8
-    assert len(compiled.__dict__["_series"]) == 1
+    assert len(compiled.cache.of(Series)) == 1

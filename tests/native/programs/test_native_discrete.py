@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from analysis.metrics import Metric, final
+from nlctl.analysis.metrics import Metric, final
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
 from nlctl.native import ensemble_response

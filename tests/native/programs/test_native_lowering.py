@@ -18,8 +18,8 @@ from plain_plan import by_blocks
 
 import nlctl
 from nlctl.native import CompileError
-from nlctl.native.codegen.lower import lower
 from nlctl.native.compiled import compile as compile_diagram
+from nlctl.native.lower import lower
 from nlctl.native.machine.routine import lowered_code, plain_functions
 
 WITH_JIT = not getattr(config, "DISABLE_JIT", False)

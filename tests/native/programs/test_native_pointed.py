@@ -21,8 +21,8 @@ from nlctl.native.integrate.memory import (
     Reals3,
     arrays_of,
     grown,
-    replaced,
     type_of,
+    with_fields,
     with_table,
 )
 
@@ -176,14 +176,14 @@ def test_a_record_is_passed_on_between_functions():
 def test_a_field_of_another_type_is_refused(field, value, message):
     """What is compiled for one type is not run on another."""
     with pytest.raises(TypeError, match=f"'{field}' of Record needs {message}"):
-        replaced(sample(), **{field: value})
+        with_fields(sample(), **{field: value})
 
 
 @pytest.mark.parametrize("array", [np.ones(4)[::2], np.ones((2, 3)).T])
 def test_an_array_with_gaps_or_in_another_order_is_refused(array):
     name = "line" if array.ndim == 1 else "grid"
     with pytest.raises(ValueError, match=f"'{name}' of Record needs a C-contiguous array"):
-        replaced(sample(), **{name: array})
+        with_fields(sample(), **{name: array})
 
 
 class Outer(NamedTuple):
@@ -212,7 +212,7 @@ def test_a_record_in_a_record_is_the_same_memory():
 def test_another_record_inside_is_refused():
     other = with_table(Outer, number=3.0, inner=sample(), last=np.zeros(1))
     with pytest.raises(TypeError, match="'inner' of Outer needs"):
-        replaced(other, inner=other)
+        with_fields(other, inner=other)
 
 
 def test_a_record_with_more_room_holds_what_it_held():

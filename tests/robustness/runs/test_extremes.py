@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from analysis import metrics
-from analysis.metrics import in_machine_code
-from analysis.metrics.curves import limits_at_breaks, path
+from nlctl.analysis import metrics
+from nlctl.analysis.metrics import in_machine_code
+from nlctl.analysis.metrics.curves import limits_at_breaks, path
 
 highest = in_machine_code(metrics.highest)
 lowest = in_machine_code(metrics.lowest)

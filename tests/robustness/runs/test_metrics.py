@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import simpson
 
-from analysis import metrics
-from analysis.metrics import tracking_metrics
+from nlctl.analysis import metrics
+from nlctl.analysis.metrics import tracking_metrics
 
 
 @given(st.floats(0.5, 3), st.floats(-3, 3), st.floats(0.3, 5))

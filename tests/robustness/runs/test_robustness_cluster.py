@@ -11,9 +11,9 @@ from extras import needed
 from studies_example import write
 from sweep_examples import experiment, same
 
-from analysis.robustness import independent, prepare
-from analysis.robustness.runs.sweep import sweep
-from analysis.studies import load_result, read_study, run
+from nlctl.analysis.robustness import independent, prepare
+from nlctl.analysis.robustness.runs.sweep import sweep
+from nlctl.analysis.studies import load_result, read_study, run
 
 pytestmark = pytest.mark.cluster
 
@@ -92,7 +92,8 @@ def test_a_wrong_address_is_one_sentence_and_leaves_nothing(address, words, tmp_
 def test_without_the_extra_the_message_says_what_to_install(tmp_path):
     """As where distributed is not installed."""
     code = (
-        "import sys; sys.modules['distributed'] = None; from analysis.cli.main import main; main()"
+        "import sys; sys.modules['distributed'] = None;"
+        "from nlctl.analysis.cli.main import main; main()"
     )
     told = subprocess.run(
         [sys.executable, "-c", code, "run", str(write(tmp_path)), "--executor", "dask:tcp://x:1"],

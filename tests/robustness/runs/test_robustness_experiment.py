@@ -8,9 +8,9 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis import metrics
-from analysis.metrics import Metric
-from analysis.robustness import (
+from nlctl.analysis import metrics
+from nlctl.analysis.metrics import Metric
+from nlctl.analysis.robustness import (
     Choice,
     Experiment,
     Requirement,

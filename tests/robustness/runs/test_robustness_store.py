@@ -16,9 +16,17 @@ import pytest
 from places import SUPPORT
 from sweep_examples import experiment, loop, same
 
-from analysis.robustness import Requirement, Spec, always, in_band, independent, prepare, scaled
-from analysis.robustness.runs.store import ChunkStore, StoreError, claimed, put, table_of
-from analysis.robustness.runs.sweep import load, sweep
+from nlctl.analysis.robustness import (
+    Requirement,
+    Spec,
+    always,
+    in_band,
+    independent,
+    prepare,
+    scaled,
+)
+from nlctl.analysis.robustness.runs.store import ChunkStore, StoreError, claimed, put, table_of
+from nlctl.analysis.robustness.runs.sweep import load, sweep
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

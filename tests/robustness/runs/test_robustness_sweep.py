@@ -16,9 +16,9 @@ from scipy import stats
 from sweep_examples import experiment, loop, same
 
 import nlctl
-from analysis.cli.sweep_progress import sweep_bar
-from analysis.metrics import in_machine_code
-from analysis.robustness import (
+from nlctl.analysis.cli.sweep_progress import sweep_bar
+from nlctl.analysis.metrics import in_machine_code
+from nlctl.analysis.robustness import (
     Choice,
     NoGuaranteeError,
     Space,
@@ -31,9 +31,9 @@ from analysis.robustness import (
     sequence_bounds,
     tracking_metrics,
 )
-from analysis.robustness.runs.progress import Progress, Tally, until_decided
-from analysis.robustness.runs.sweep import load, sweep
-from analysis.robustness.stl.piecewise import extremes, with_vertices
+from nlctl.analysis.robustness.runs.progress import Progress, Tally, until_decided
+from nlctl.analysis.robustness.runs.sweep import load, sweep
+from nlctl.analysis.robustness.stl.piecewise import extremes, with_vertices
 
 
 @pytest.fixture(scope="module")

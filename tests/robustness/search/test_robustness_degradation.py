@@ -9,10 +9,10 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.search.degradation import degradation_curve
-from analysis.robustness.statistics.guarantee import clopper_pearson
-from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.search.degradation import degradation_curve
+from nlctl.analysis.robustness.statistics.guarantee import clopper_pearson
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space
 
 D, BETA = 3, 1.2
 NORMAL = Space(

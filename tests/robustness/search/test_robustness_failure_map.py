@@ -10,9 +10,9 @@ from scipy import stats
 from small_systems import function
 
 import nlctl
-from analysis.robustness.search.failure_map import boundary, failure_map
-from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.search.failure_map import boundary, failure_map
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(
     quantities=(

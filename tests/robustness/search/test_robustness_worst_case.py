@@ -12,16 +12,16 @@ from scipy import stats
 from small_systems import function
 
 import nlctl
-from analysis.robustness.runs.experiment import Experiment, evaluate, prepare
-from analysis.robustness.search.confirmation import confirm
-from analysis.robustness.search.shrink import shrink
-from analysis.robustness.search.worst_case import worst_case
-from analysis.robustness.statistics.guarantee import NoGuaranteeError, violation_probability
-from analysis.robustness.stl.formula import always, in_band
-from analysis.robustness.stl.spec import Requirement, Spec
-from analysis.robustness.uncertainty.design import rows
-from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.uncertainty.space import Space, scaled
+from nlctl.analysis.robustness.runs.experiment import Experiment, evaluate, prepare
+from nlctl.analysis.robustness.search.confirmation import confirm
+from nlctl.analysis.robustness.search.shrink import shrink
+from nlctl.analysis.robustness.search.worst_case import worst_case
+from nlctl.analysis.robustness.statistics.guarantee import NoGuaranteeError, violation_probability
+from nlctl.analysis.robustness.stl.formula import always, in_band
+from nlctl.analysis.robustness.stl.spec import Requirement, Spec
+from nlctl.analysis.robustness.uncertainty.design import rows
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space, scaled
 
 
 def box(d, low=-1.0, high=2.0):

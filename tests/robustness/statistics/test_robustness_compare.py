@@ -9,9 +9,9 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis import metrics
-from analysis.metrics import Metric
-from analysis.robustness import (
+from nlctl.analysis import metrics
+from nlctl.analysis.metrics import Metric
+from nlctl.analysis.robustness import (
     Choice,
     Experiment,
     NoGuaranteeError,
@@ -28,7 +28,7 @@ from analysis.robustness import (
     prepare,
     sobol,
 )
-from analysis.robustness.statistics.comparison import compare, crossed
+from nlctl.analysis.robustness.statistics.comparison import compare, crossed
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
 CHOICE = Choice(name="controller", options={"one": 1, "two": 2, "three": 3})

@@ -11,28 +11,28 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.statistics.guarantee import (
+from nlctl.analysis.robustness.statistics.guarantee import (
     NoGuaranteeError,
     clopper_pearson,
     runs_needed,
     violation_probability,
 )
-from analysis.robustness.statistics.sequential import (
+from nlctl.analysis.robustness.statistics.sequential import (
     confidence_sequence,
     decide,
     log_evidence,
     sequence_bounds,
 )
-from analysis.robustness.uncertainty.design import (
+from nlctl.analysis.robustness.uncertainty.design import (
     from_table,
     independent,
     latin_hypercube,
     listed,
     sobol,
 )
-from analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
-from analysis.robustness.uncertainty.quantity import Uncertain
-from analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
+from nlctl.analysis.robustness.uncertainty.quantity import Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0), nominal=0.5),))
 

@@ -12,11 +12,17 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.statistics.guarantee import NoGuaranteeError
-from analysis.robustness.statistics.paired import differences, holm, mcnemar, median_interval, wins
-from analysis.robustness.uncertainty.design import independent, sobol
-from analysis.robustness.uncertainty.quantity import Uncertain
-from analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.statistics.guarantee import NoGuaranteeError
+from nlctl.analysis.robustness.statistics.paired import (
+    differences,
+    holm,
+    mcnemar,
+    median_interval,
+    wins,
+)
+from nlctl.analysis.robustness.uncertainty.design import independent, sobol
+from nlctl.analysis.robustness.uncertainty.quantity import Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space
 
 SPACE = Space(quantities=(Uncertain(name="a", bounds=(0.0, 1.0)),))
 

@@ -9,7 +9,7 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.statistics.sensitivity import (
+from nlctl.analysis.robustness.statistics.sensitivity import (
     censored,
     elementary_effects,
     morris,
@@ -17,10 +17,10 @@ from analysis.robustness.statistics.sensitivity import (
     saltelli,
     sobol_indices,
 )
-from analysis.robustness.stl.spec import unfinished_margin
-from analysis.robustness.uncertainty.design import independent, sobol
-from analysis.robustness.uncertainty.quantity import Choice, Uncertain
-from analysis.robustness.uncertainty.space import Space, scaled
+from nlctl.analysis.robustness.stl.spec import unfinished_margin
+from nlctl.analysis.robustness.uncertainty.design import independent, sobol
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space, scaled
 
 
 def cube(d, low=0.0, high=1.0):

@@ -6,8 +6,8 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 import nlctl
-from analysis.metrics import breaks_of, highest, lowest, with_breaks
-from analysis.robustness import Requirement, always, eventually, in_band, margin
+from nlctl.analysis.metrics import breaks_of, highest, lowest, with_breaks
+from nlctl.analysis.robustness import Requirement, always, eventually, in_band, margin
 
 END = 10.0
 T, FINE = np.linspace(0, END, 801), np.linspace(0, END, 100_001)

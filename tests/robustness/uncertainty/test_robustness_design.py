@@ -12,7 +12,7 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.uncertainty.design import (
+from nlctl.analysis.robustness.uncertainty.design import (
     from_table,
     independent,
     latin_hypercube,
@@ -21,9 +21,9 @@ from analysis.robustness.uncertainty.design import (
     seed_number,
     sobol,
 )
-from analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
-from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.uncertainty.space import Space
+from nlctl.analysis.robustness.uncertainty.lattice import corners, grid, one_at_a_time
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import Space
 
 A = Uncertain(name="a", bounds=(1.0, 3.0), nominal=1.5)
 B = Uncertain(name="b", law=stats.norm(0, 2), nominal=0.0)

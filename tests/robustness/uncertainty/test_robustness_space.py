@@ -9,9 +9,9 @@ from rows import each_row
 from scipy import stats
 
 import nlctl
-from analysis.robustness.uncertainty.binding import diagrams, resolved
-from analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
-from analysis.robustness.uncertainty.space import (
+from nlctl.analysis.robustness.uncertainty.binding import diagrams, resolved
+from nlctl.analysis.robustness.uncertainty.quantity import Choice, SpaceError, Uncertain
+from nlctl.analysis.robustness.uncertainty.space import (
     Space,
     arguments,
     combinations,

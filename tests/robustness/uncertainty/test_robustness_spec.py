@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from rows import each_row
 
 import nlctl
-from analysis.metrics import peak
-from analysis.robustness.stl.formula import (
+from nlctl.analysis.metrics import peak
+from nlctl.analysis.robustness.stl.formula import (
     SampledSignals,
     always,
     eventually,
@@ -17,8 +17,8 @@ from analysis.robustness.stl.formula import (
     margin_trace,
     signals_named,
 )
-from analysis.robustness.stl.piecewise import Trace, higher, largest, with_vertices
-from analysis.robustness.stl.spec import (
+from nlctl.analysis.robustness.stl.piecewise import Trace, higher, largest, with_vertices
+from nlctl.analysis.robustness.stl.spec import (
     FAILED,
     Requirement,
     Spec,

@@ -13,9 +13,10 @@ from collections.abc import Collection, Iterable, Mapping
 
 from ....expressions.graph import Expr
 from ..plan import Function
-from ..solver import Solver, solver_text
+from ..solver import Solver
 from .loops import written
 from .numbers import Writer
+from .search import solver_text
 from .text import Body, Module
 
 COPY = "declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)"

@@ -38,9 +38,11 @@ def crossing(task, lane, w, j):
     """
     if lane.across:
         return _across(task, lane, w, j)
-    if lane.tries > 0 and lane.traces == 0:
-        return NOTHING  # a break point that a block declares is being located
     inside = _is_behind(task, lane, w, j)
+    if lane.tries > 0 and lane.traces == 0:
+        if not inside:
+            return NOTHING  # where only the slope jumps, or a memory turns, is being located
+        lane.tries = lane.seeks = 0
     beyond = 0.0 if inside else _beyond(task, lane, w, j)
     if beyond > 0.0:
         return _shortened(lane, beyond)

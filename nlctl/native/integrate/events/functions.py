@@ -10,7 +10,7 @@ from ..memory import Places1, Places2, Reals1, Reals2, Reals3, arrays_of
 from ..state import INNER
 
 
-class Rows(NamedTuple):
+class EventRows(NamedTuple):
     """Whose rows of g are whose, from the first."""
 
     bending: int  # number of switching functions that blocks declare
@@ -35,6 +35,7 @@ class Events(NamedTuple):
     g_high: Reals2
     behind: Reals2  # 1 where the step before ended with this event; of a condition that is
     # exactly 0 the side that it has come from
+    before_jump: Reals2  # at the end of a step, before anything jumps there
     table: Places2
 
 
@@ -100,7 +101,7 @@ def has_events(w):
 
 
 @numba.njit(**INNER)
-def begins(w, j):
+def begin_next(w, j):
     """Make what event functions are at the end of a lane's step those of the next one's start."""
     events, memories = w.events, w.memories
     for i in range(events.g.shape[0]):

@@ -17,7 +17,7 @@ from .quartic import following_nodes
 _Rows = tuple[tuple[float, ...], ...]
 
 
-class Pair(NamedTuple):
+class ExplicitPair(NamedTuple):
     """An explicit pair as `explicit` and `excursions` take it."""
 
     order: float
@@ -109,7 +109,7 @@ class Tableau:
         """Number of stages, the one at the end of the step included."""
         return len(self.c)
 
-    def pair(self) -> Pair:
+    def pair(self) -> ExplicitPair:
         """Return the arrays that steps are made with."""
         A = np.zeros((self.stages, max(self.stages, 6)))
         for s, row in enumerate(self.a, start=1):
@@ -118,7 +118,7 @@ class Tableau:
         kept = np.array([parts.index(c) if c in parts else 3 for c in self.c], dtype=np.int64)
         rows = (parts or (0.0, 0.0, 0.0), rodas5p.INSIDE, (0.25, 0.5, 0.75))
         return with_table(
-            Pair,
+            ExplicitPair,
             order=float(self.order),
             stable=float(self.stable),
             A=A,
@@ -147,6 +147,6 @@ class Tableau:
 
 
 @functools.cache
-def pair_of(tableau: Tableau) -> Pair:
+def pair_of(tableau: Tableau) -> ExplicitPair:
     """Return the arrays that steps are made with, laid out once."""
     return tableau.pair()

@@ -27,8 +27,8 @@ from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, RUNNING
 
-TRIAL = 20  # steps after which it is judged whether this method pays
-STAGES = 2  # slopes at both ends of a step
+FIRST_TURN = 20  # steps after which it is judged whether this method pays
+SLOPES = 2  # slopes at both ends of a step
 MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
@@ -119,14 +119,23 @@ def is_to_change(task, lane):
         return False
     tried = lane.accepted + lane.rejected - lane.from_tried
     if task.taylor.highest == 0 and lane.span - tried >= MEASURED:
-        lane.from_t = lane.t
+        lane.from_t, lane.from_accepted = lane.t, lane.accepted
+    if task.taylor.highest and tried % FIRST_TURN == 0:
+        stays = 2 * (lane.accepted - lane.from_accepted) < FIRST_TURN  # at a place
+        lane.from_accepted = lane.accepted
+        if stays:
+            lane.span = FIRST_TURN
+            return True
     if lane.tries > 0 or lane.cross > 0.0 or tried < lane.span:
         return False
     work = task.taylor.cost * tried if task.taylor.highest else min(tried, MEASURED)
     lane.pace = (lane.t - lane.from_t) / work
     if task.taylor.highest == 0:
-        return lane.slow == 0
-    if lane.span > TRIAL or lane.pace < lane.other_pace:
+        if 2 * (lane.accepted - lane.from_accepted) >= MEASURED:
+            return lane.slow == 0
+        lane.from_tried = lane.accepted + lane.rejected  # at a place that it does not leave
+        return False
+    if lane.span > FIRST_TURN or lane.pace < lane.other_pace:
         return True
     lane.span = task.taylor.span
     return False

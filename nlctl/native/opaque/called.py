@@ -22,18 +22,18 @@ from ...errors import BlockError, CompileError
 from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...wording import counted
-from ..codegen.calls import Call, Source
-from ..parameters import Slot, current_values
-from ..thirdparty import dicts, vectors
-from ..thirdparty.dicts import (
+from ..diagram.parameters import Slot, current_values
+from ..purity import dicts, vectors
+from ..purity.dicts import (
     callable_constant,
     make_callable,
     params_record,
     read_by_keys,
     unpacked_arguments,
 )
-from ..thirdparty.objects import frozen
-from ..thirdparty.vectors import as_vector
+from ..purity.objects import frozen
+from ..purity.vectors import as_vector
+from .calls import Call, Source
 
 TAUGHT = (dicts, vectors)  # modules that teach numba what functions of others use
 

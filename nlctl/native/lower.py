@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.arrays import Tracer
-from ...expressions.graph import Expr, needed
-from ..diagram.schedule import Schedule
-from ..equations.blocks import Equations, equations
-from ..equations.located import Conditions
-from ..parameters import length
-from ..timed.ahead import read_parameters
-from .calls import Call
-from .ir.program import program_text
-from .plan import Function, Store, plan_function, split
-from .program import Program
-from .rewrite import rewritten
-from .solver import Solver
+from ..expressions.arrays import Tracer
+from ..expressions.graph import Expr, needed
+from .codegen.ir.program import program_text
+from .codegen.plan import Function, Store, plan_function, split
+from .codegen.rewrite import rewritten
+from .codegen.solver import Solver
+from .diagram.parameters import length
+from .diagram.program import Program
+from .diagram.schedule import Schedule
+from .equations.blocks import Equations, equations
+from .equations.located import Conditions
+from .opaque.calls import Call
+from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g", "m"), "out": ("t", "x", "u", "c", "y")}
@@ -85,14 +85,9 @@ class Lowered:
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
 
     @cached_property
-    def known_ahead(self) -> dict[Any, Any]:
-        """What has been found of its functions of time alone, see `nlctl.native.timed`."""
-        return {}
-
-    @cached_property
-    def read_ahead(self) -> np.ndarray:
-        """Places of the parameters that these depend on."""
-        return read_parameters(self.conditions)
+    def timed(self) -> OfTime:
+        """Its functions of time alone."""
+        return OfTime(conditions=self.conditions)
 
     @property
     def opaque(self) -> dict[str, str]:

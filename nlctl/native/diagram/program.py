@@ -17,9 +17,10 @@ from ...expressions.continuity import may_jump
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
-from ..diagram.schedule import Node, Schedule
-from ..parameters import Slot, current_values, slots
-from ..thirdparty.captured import recorded
+from ..purity.captured import recorded
+from .nodes import Node
+from .parameters import Slot, current_values, slots
+from .schedule import Schedule
 
 _MOST = 40  # ways in which clocks meet
 

@@ -14,7 +14,7 @@ from ...expressions.graph import Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
 from ...upstream.control_internals import current_parameters
-from ..parameters import Slot, current_values
+from .parameters import Slot, current_values
 
 
 def time(graph: Graph) -> Tracer:

@@ -11,13 +11,13 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
 from . import known_calls, made
-from .captured import Captured, noted, noted_function, noted_partial
+from .captured import Captured, noted_function, noted_partial
 from .expressions import Frame
 from .source import Definition, Unreadable, definition, source_file
 from .statements import CallWalker
@@ -39,12 +39,13 @@ from .values import (
     least_upper_bound,
     python_function,
 )
+from .walk import Walk
 
 _BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class FunctionReading:
     """What was found in a function and in all that it calls.
 
     Attributes
@@ -60,7 +61,7 @@ class Reading:
     unbound: tuple[str, ...]
 
 
-def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
+def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReading:
     """Check that a function depends on its arguments alone and changes nothing.
 
     Parameters
@@ -71,7 +72,7 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
 
     Returns
     -------
-    Reading
+    FunctionReading
 
     Raises
     ------
@@ -83,37 +84,25 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> Reading:
         error = Impure("yields its values", "return them as a list")
         error.place = f"{source_file(plain)}, line {plain.__code__.co_firstlineno}"
         raise error
-    walk = Walk()
+    walk = FunctionWalk()
     walk.call(captured(function), list(arguments), {})
-    return Reading(captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound)))
+    return FunctionReading(
+        captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound))
+    )
 
 
-class Walk:
-    """Walks a function and all that it calls."""
+class FunctionWalk(Walk):
+    """Walks a function and all that it calls, with what each kind of thing does when called."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.done: dict[Any, KnownValue] = {}
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked
-        self.read: dict[tuple[int, str], Captured] = {}
-        self.unbound: list[str] = []
         self.bodies = 0
-        self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
-
-    def captured(self, holder: Any, name: str, value: Any) -> KnownValue:
-        """Return what is known of a value that is read from around a function, and note it."""
-        if (id(holder), name) not in self.read:
-            self.read[id(holder), name] = noted(holder, name, value)
-        return captured(value)
-
-    def note(self, notes: Iterable[Captured]) -> None:
-        """Keep notes of what a function or an object consists of."""
-        for note in notes:
-            self.read.setdefault((id(note.holder), note.name), note)
 
     def call(
         self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
     ) -> KnownValue:
-        """Return what is known of the result of a call."""
         thing = function.known
         if isinstance(thing, Unknown):
             raise Impure("calls what is only known when it runs", "call a function by its name")
@@ -143,7 +132,6 @@ class Walk:
     def function(
         self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
     ) -> KnownValue:
-        """Return what is known of the result of somebody's Python function."""
         self.note(noted_function(thing))
         try:
             return self.body(definition(thing), thing, None, given, named)

@@ -9,7 +9,7 @@ import functools
 from collections import Counter, OrderedDict, defaultdict, deque
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -37,9 +37,7 @@ from .values import (
     library,
     python_function,
 )
-
-if TYPE_CHECKING:
-    from .purity import Walk
+from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"

@@ -19,15 +19,15 @@ from typing import Any
 import llvmlite.binding as llvm
 import numba
 
-from ...upstream.numba_internals import checks_indices, is_jit_disabled
-from ..integrate import advance, evaluate, start
-from ..integrate.workspace import TASK, WORK
-from . import address, store
-from .fingerprint import function_key, module_key
-from .finish import finished
-from .machine_code import Wanted, store_key
+from ..upstream.numba_internals import checks_indices, is_jit_disabled
+from .integrate import advance, evaluate, start
+from .integrate.workspace import TASK, WORK
+from .machine import address, store
+from .machine.fingerprint import function_key, module_key
+from .machine.finish import finished
+from .machine.machine_code import Wanted, store_key
 
-HERE = Path(__file__).parents[1]
+HERE = Path(__file__).parent
 SHIPPED = HERE / "integrators.bitcode"
 _RETURNED = (0, -2)  # what numba's functions return, unless they raise an exception
 _ADDRESS = numba.intp
@@ -111,7 +111,7 @@ def integrator_key() -> str:
 
 def _made_anew() -> bytes:
     """Return what numba makes of the sources, from the cache if it is there."""
-    from .export import exported
+    from .machine.export import exported
 
     key = store_key(integrator_key(), "bitcode")
     code = store.read(key)

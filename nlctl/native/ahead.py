@@ -5,11 +5,11 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
-from ...annotations import as_annotated
-from ..codegen.along import derivatives
-from ..compiled import Compiled
-from ..integrate.discrete import compile_discrete
-from .evaluations import ENSEMBLE_WIDTH, machine
+from ..annotations import as_annotated
+from .along import derivatives
+from .compiled import Compiled
+from .integrate.discrete import compile_discrete
+from .machine.evaluations import ENSEMBLE_WIDTH, machine
 
 
 @as_annotated

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
 
-from ..blocks import Block
-from ..errors import UsageError
-from ..upstream.control_internals import current_parameters
-from .thirdparty.captured import same
-
-if TYPE_CHECKING:
-    from .diagram.schedule import Node
+from ...blocks import Block
+from ...errors import UsageError
+from ...upstream.control_internals import current_parameters
+from ..purity.captured import same
+from .nodes import Node
 
 
 @dataclass(frozen=True, kw_only=True)

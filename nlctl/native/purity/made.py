@@ -10,7 +10,7 @@ import dataclasses
 import enum
 import inspect
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, Generic, Protocol
+from typing import Any, Generic, Protocol
 
 from .values import (
     OUTSIDE,
@@ -24,9 +24,7 @@ from .values import (
     captured,
     library,
 )
-
-if TYPE_CHECKING:
-    from .purity import Walk
+from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)

@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from types import BuiltinFunctionType, FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -39,9 +39,7 @@ from .values import (
     least_upper_bound,
     library,
 )
-
-if TYPE_CHECKING:
-    from .purity import Walk
+from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
 OPERATORS = {

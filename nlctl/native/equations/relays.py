@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
 
 from ...expressions.arrays import Tracer, concatenated, scalar
 from ...expressions.graph import Expr, Graph
 from ...sliding.blocks import slides
-from ..codegen.program import memory
-from ..codegen.trace import traced_parameters
-from .rates import OUTPUTS, Motion, SlidingInput, sliding_rates
-from .second import Limits
-
-if TYPE_CHECKING:
-    from ..diagram.schedule import Node, Schedule
-    from ..equations.reader import Reader
+from ..diagram.nodes import Node
+from ..diagram.program import memory
+from ..diagram.schedule import Schedule
+from ..diagram.trace import traced_parameters
+from ..sliding.rates import OUTPUTS, Motion, SlidingInput, sliding_rates
+from ..sliding.second import Limits
+from .reader import Reader
 
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:

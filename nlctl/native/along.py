@@ -9,19 +9,17 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...expressions.dependence import structure
-from ..integrate.methods.lu import Elimination, elimination
-from ..integrate.state import DIRECTIONS
-from ..jacobians import along
-from ..machine.routine import entry, lowered_code
-from .lower import lower_along
-
-if TYPE_CHECKING:
-    from ..compiled import Compiled
+from ..expressions.dependence import structure
+from .integrate.methods.lu import Elimination, elimination
+from .integrate.state import DIRECTIONS
+from .jacobians import along
+from .lower import Lowered, lower_along
+from .machine.routine import entry, lowered_code
+from .reading import Reading
 
 _ONCE = threading.Lock()  # of several threads that need it one compiles
 
@@ -53,28 +51,42 @@ class Along:
         return entry(self.point), entry(self.function)
 
 
-def derivatives(compiled: Compiled, p: np.ndarray) -> Along | None:
+@dataclass(frozen=True, kw_only=True)
+class AlongCode:
+    """The functions of `Along` for all parameters that they hold for."""
+
+    lowered: Lowered
+    prepare: Any
+    point: Any
+    function: Any
+    elimination: Elimination
+
+
+def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     """Return the derivatives for a parameter vector, made when they are first needed.
 
     None if there are none: an equation was differentiated for an integer parameter that has
     another value now.  Opaque functions have differences in them.
     """
+    known = reading.cache.of(AlongCode)
     with _ONCE:
-        if "_along" not in compiled.__dict__:
-            compiled.__dict__["_along"] = _made(compiled)
-    made = compiled.__dict__["_along"]
-    if made is None or not made[0].holds_for(p):
+        if not known:
+            known.append(_made(reading))
+    (made,) = known
+    if not made.lowered.holds_for(p):
         return None
-    lowered, prepare, point, function, order = made
-    c = np.zeros((lowered.size, DIRECTIONS))
-    prepare(np.repeat(p[:, None], DIRECTIONS, axis=1), c)
-    return Along(point=point, function=function, c=c, elimination=order)
+    c = np.zeros((made.lowered.size, DIRECTIONS))
+    made.prepare(np.repeat(p[:, None], DIRECTIONS, axis=1), c)
+    return Along(point=made.point, function=made.function, c=c, elimination=made.elimination)
 
 
-def _made(compiled: Compiled) -> Any:
-    equations = compiled.equations
-    n, m = compiled.system.nstates or 0, compiled.schedule.ninputs
+def _made(reading: Reading) -> AlongCode:
+    equations = reading.equations
+    n, m = reading.system.nstates or 0, reading.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
-    lowered = lower_along(compiled.schedule, compiled.program, equations, rows, DIRECTIONS)
+    lowered = lower_along(reading.schedule, reading.program, equations, rows, DIRECTIONS)
+    prepare, point, function = lowered_code(lowered)
     order = elimination(structure(equations.pieces("dx"), "x", n))
-    return lowered, *lowered_code(lowered), order
+    return AlongCode(
+        lowered=lowered, prepare=prepare, point=point, function=function, elimination=order
+    )

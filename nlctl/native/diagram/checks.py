@@ -14,9 +14,9 @@ from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
 from ...wording import counted
-from ..parameters import current_values
-from .purity import Reading, check_pure
-from .values import FRESH, VECTOR, Impure, captured
+from ..purity.check import FunctionReading, check_pure
+from ..purity.values import FRESH, VECTOR, Impure, captured
+from .parameters import current_values
 
 
 def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
@@ -35,7 +35,7 @@ def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
         )
 
 
-def check_functions(path: str, system: Any) -> Reading:
+def check_functions(path: str, system: Any) -> FunctionReading:
     """Check that a block's functions depend on their arguments alone, and return enough values.
 
     The functions are read, not called, until they are known to remember nothing.
@@ -48,7 +48,7 @@ def check_functions(path: str, system: Any) -> Reading:
 
     Returns
     -------
-    Reading
+    FunctionReading
         Of all functions together.
 
     Raises
@@ -70,7 +70,7 @@ def check_functions(path: str, system: Any) -> Reading:
             ) from None
     if not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
-    return Reading(
+    return FunctionReading(
         captured=tuple(note for each in found for note in each.captured),
         unbound=tuple(name for each in found for name in each.unbound),
     )

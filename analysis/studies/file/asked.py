@@ -1,0 +1,64 @@
+"""What a study file says of every analysis, whatever its kind."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from .field_types import Names, Strict
+
+__all__ = ["Asked", "Varied"]
+
+
+class Asked(Strict):
+    """What a study file says of every analysis; the schema of a kind adds its own keys.
+
+    Examples
+    --------
+    The keys of a table of one's own, checked as those of nlctl's kinds are:
+
+    >>> from pydantic import Field
+    >>> from nlctl.analysis.studies import Asked
+    >>> class Spread(Asked):
+    ...     of: str = Field("spec", description="Column of the main table.")
+    ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
+    ...     @property
+    ...     def claim(self):
+    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+    >>> Spread(kind="spread", limit=0.5).claim
+    'the spread is at most 0.5'
+    >>> Spread(kind="spread", limit=-1.0)
+    Traceback (most recent call last):
+    pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
+    limit
+      Input should be greater than 0 ...
+    """
+
+    key: str = Field(
+        "",
+        pattern=r"^[a-z0-9-]*$",
+        description="Name of its folder: lower-case letters, digits, hyphens; by default the kind.",
+    )
+    title: str = Field("", description="Its heading in the report.")
+    kind: str
+
+    @property
+    def claim(self) -> str:
+        """What the study claims by asking for it; empty if it asks and claims nothing."""
+        return ""
+
+
+class Varied(Asked):
+    """An analysis that may vary a part of the quantities.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.studies import Varied
+    >>> class Corners(Varied):
+    ...     levels: int = 2
+    >>> Corners(kind="corners", quantities=["lag.T"]).quantities
+    ('lag.T',)
+    >>> Corners(kind="corners").quantities  # all
+    ()
+    """
+
+    quantities: Names = Field((), description="What is varied, the rest nominal; all by default.")

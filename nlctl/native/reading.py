@@ -1,0 +1,87 @@
+"""What was read of a diagram: its schedule, its program, its equations."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..diagrams import Apart, override
+from ..errors import UsageError
+from .cache import Cache
+from .diagram.parameters import packed
+from .diagram.program import Program
+from .diagram.schedule import Schedule
+from .equations.blocks import Equations, equations
+from .lower import Lowered, lower
+from .purity.captured import changed
+
+_RESOLVING = threading.Lock()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reading:
+    """A diagram as it was read.
+
+    Attributes
+    ----------
+    schedule : Schedule
+        What was read from the diagram.
+    program : Program
+        The arrays that machine code takes and fills.
+    original : control.InputOutputSystem or None
+        The diagram itself; none in another process.
+    apart : Apart or None
+        The copy of it that was read, in which runs write their parameters.
+    cache : Cache
+        What has been made of it, such as machine code.
+    """
+
+    schedule: Schedule
+    program: Program
+    original: Any = None
+    apart: Apart | None = None
+    cache: Cache = field(init=False, repr=False, default_factory=Cache)
+
+    @property
+    def system(self) -> Any:
+        """The diagram itself, or in another process the copy of it that was read."""
+        return self.schedule.system if self.original is None else self.original
+
+    @cached_property
+    def equations(self) -> Equations:
+        """What the blocks' functions compute as expressions."""
+        return equations(self.schedule, self.program.layout, meetings=self.program.meetings)
+
+    @cached_property
+    def lowered(self) -> Lowered:
+        """The plan of a program for one member."""
+        return lower(self.schedule, self.program, 1, self.equations)
+
+    def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
+        """Return the vector `p` of shape (k,) that the program takes."""
+        with _RESOLVING:  # python-control keeps what it has resolved in the blocks
+            if self.apart is not None and not self.apart.refreshed():
+                raise UsageError(
+                    f"'{self.system.name}' has other blocks than when it was compiled: compile "
+                    "again"
+                )
+            other = changed(self.schedule.captured)
+            if other is not None:
+                raise UsageError(
+                    f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "
+                    f"compiled and is {_short(other.now)} now: compile again, or make it a "
+                    "parameter"
+                )
+            override(self.schedule.system, params)
+            return packed(self.schedule.holders, self.program.layout, self.program.fixed)
+
+
+def _short(value: Any) -> str:
+    """Return a value in one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
