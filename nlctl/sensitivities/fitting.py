@@ -67,7 +67,7 @@ class Fit:
     ... )
     >>> found = nlctl.fit(plant, [0, 1, 2, 3], {"x": [0.0, 1.1, 1.9, 3.0]}, {"plant.a": 0.5})
     >>> print(found)
-    Fit of 1 parameter, noise 0.0817
+    Fit of 1 parameter, noise 0.0802
       plant.a = 0.992857 +- 0.021
     """
 
