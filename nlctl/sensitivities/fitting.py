@@ -18,7 +18,7 @@ from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..params import as_numbers, checked_times
 from ..wording import counted
-from .names import varied_quantities
+from .names import VariedQuantity, varied_quantities
 from .record import SensitivityResponse
 from .response import sensitivity_response
 
@@ -169,7 +169,8 @@ def fit(
         ``{"y": samples of shape (m,)}`` by signals as in `nlctl.sensitivity_response`; NaN where
         there are gaps.
     parameters : mapping
-        ``{"plant.a": 1.0}``: where the search starts, or ``(start, low, high)`` with bounds.
+        ``{"plant.a": 1.0}``: where the search starts, within what the block declares, or
+        ``(start, low, high)`` with bounds of one's own.
         Initial states are ``"plant.x1(0)"``.
     inputs : array_like, list or float, optional
         Inputs over `timepts`.
@@ -212,8 +213,10 @@ def fit(
     if not isinstance(diagram, Compiled):
         diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
     given = _data(data, times, sigma)
-    names, start, bounds = _sought(parameters)
-    varied_quantities(diagram, names)
+    if not parameters:
+        raise ParameterError("fit needs at least one parameter, {'plant.a': 1.0}")
+    names = list(parameters)
+    start, bounds = _sought(parameters, varied_quantities(diagram, names))
     count = sum(int(np.isfinite(row).sum()) for row in given.values())
     if count < len(names):
         raise ParameterError(
@@ -310,7 +313,7 @@ class _Search:
         rows = np.stack(list(self.data.values()))
         try:
             values = self.response(x).values
-        except DivergedError:
+        except (DivergedError, ParameterError):  # it ends before, or no block takes these values
             return np.full(int(self._known.sum()), _LOST)
         return np.nan_to_num((values - rows) / self.sigma[:, None], nan=_LOST)[self._known]
 
@@ -351,22 +354,22 @@ def _sigmas(data: Mapping[str, np.ndarray], sigma: Any) -> np.ndarray:
     return np.array(each, dtype=float)
 
 
-def _sought(parameters: Any) -> tuple[list[str], np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Return names, where a search starts, and its bounds."""
-    if not parameters:
-        raise ParameterError("fit needs at least one parameter, {'plant.a': 1.0}")
+def _sought(
+    parameters: Mapping[str, Any], quantities: Sequence[VariedQuantity]
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Return where a search starts, and its bounds: those of the blocks where none are given."""
     rows = []
-    for name, value in parameters.items():
+    for (name, value), quantity in zip(parameters.items(), quantities, strict=True):
         row = as_numbers(value)
         if row is None or row.shape not in ((), (3,)):
             raise ParameterError(
                 f"'{name}' needs a number to start from, or (start, low, high), got {value!r}"
             )
-        start, low, high = row if row.ndim else (float(row), -np.inf, np.inf)
+        start, low, high = row if row.ndim else (float(row), quantity.lowest, quantity.highest)
         if not low <= start <= high or not low < high:
             raise ParameterError(
                 f"'{name}' needs a start within its bounds, got {start:g} in [{low:g}, {high:g}]"
             )
         rows.append((start, low, high))
     starts, lows, highs = np.array(rows, dtype=float).T
-    return list(parameters), starts, (lows, highs)
+    return starts, (lows, highs)

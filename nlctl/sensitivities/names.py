@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..blocks import Block
 from ..delays.lines import is_delayed
 from ..diagrams import state_names
 from ..errors import CompileError, ParameterError
@@ -13,6 +16,7 @@ from ..names import find_name, unknown
 from ..native import Compiled
 from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
+from ..params import declared_params
 
 __all__ = ["Observed", "VariedQuantity", "observed_signals", "varied_quantities"]
 
@@ -30,11 +34,16 @@ class Observed:
 
 @dataclass(frozen=True, kw_only=True)
 class VariedQuantity:
-    """By what is differentiated: a parameter by its place, or the initial value of a state."""
+    """By what is differentiated: a parameter by its place, or the initial value of a state.
+
+    Its block takes a parameter between `lowest` and `highest`.
+    """
 
     name: str
     place: int = -1
     state: int = -1
+    lowest: float = -np.inf
+    highest: float = np.inf
 
 
 def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> list[Observed]:
@@ -105,7 +114,8 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
         place, owner = parameters[full]
         _check_moves(compiled, owner, full)
         check_enters_alone(owner, full)
-        found.append(VariedQuantity(name=name, place=place))
+        lowest, highest = _bounds(owner, full)
+        found.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
     return found
 
 
@@ -122,6 +132,19 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
             f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
             "nobody keeps; take differences of runs"
         )
+
+
+def _bounds(owner: Any, name: str) -> tuple[float, float]:
+    """Return between what a block declares that a parameter lies."""
+    if not isinstance(owner.system, Block):
+        return -np.inf, np.inf
+    field = name.removeprefix(f"{owner.path}.").partition("[")[0]
+    declared = declared_params(owner.system.spec).get(field)
+    if declared is None:
+        return -np.inf, np.inf
+    low = [v for v in (declared.above, declared.at_least) if v is not None]
+    high = [v for v in (declared.below, declared.at_most) if v is not None]
+    return max(low, default=-np.inf), min(high, default=np.inf)
 
 
 def _checked(what: str, names: Any) -> list[str]:

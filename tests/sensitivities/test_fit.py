@@ -138,3 +138,13 @@ def test_bad_input(data, parameters, more, match):
     """One sentence each."""
     with pytest.raises(nlctl.errors.ParameterError, match=match):
         nlctl.fit(decay(), T, data, parameters, **more)
+
+
+def test_bounds_of_a_block():
+    """A lag declares T > 0: from T = 5 the search comes to 0.02 and never asks for less than 0."""
+    lag = nlctl.block(nlctl.Lag(T=5.0), "lag")
+    t = np.linspace(0, 0.1, 21)
+    found = nlctl.fit(lag, t, {"v": 1 - np.exp(-t / 0.02)}, {"lag.T": 5.0}, 1.0)
+    assert abs(found["lag.T"] - 0.02) < 1e-8
+    with pytest.raises(nlctl.errors.ParameterError, match="within its bounds"):
+        nlctl.fit(lag, t, {"v": t}, {"lag.T": -1.0}, 1.0)
