@@ -188,13 +188,14 @@ class _Maker:
         before, n, by = source.program, places.states, places.by
         owner = source.extended.owner
         jumping = list(before.jumping)
+        first = places.kept + self.sides.first_memory
         for i, _, _ in before.jumping:
             jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
+            jumping.append((i, first, first + len(before.memory)))
         if self.sides.watches:
             jumping.append((owner, n, places.last))
         turning, guards = list(self.saltation.at_turns()), list(before.guards)
         if turning:
-            first = places.kept + self.sides.first_memory
             jumping += [(owner + 1, m, m + 1) for m in turning]
             jumping.append((owner + 1, first, first + len(before.memory)))
             guards.insert(0, owner + 1)  # what else jumps then says more

@@ -13,11 +13,11 @@ both by name only).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from ..expressions.graph import Expr, Graph
+from ..expressions.graph import Expr, Graph, needed
 from ..native.sliding.pieces import replaced_parts
 from .directions import Direction, SomeRows, Taken, rows_replaced, taken
 from .places import StatePlaces
@@ -29,6 +29,7 @@ __all__ = ["Saltation"]
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _FAR = 1e300
+_WAY = "way"  # the array that stands for the derivatives of the states
 _STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 
@@ -132,6 +133,7 @@ class Saltation:
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
+        rows |= self._carried_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
         sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
@@ -144,7 +146,8 @@ class Saltation:
         found.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
         found.append((graph.leaf("t", 0, None), 1))
         found.append((self._first(places.at_reset, together), 1))
-        return found
+        kept = {m: rows.get(m, kept) for m, kept in self.sides.memories.items()}
+        return [*found, *((e, 1) for e in self.sides.kept(list(kept.values())))]
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
@@ -275,20 +278,49 @@ class Saltation:
         ]
         seed, moving = self.seeds[j], source.time(arriving, move)
         of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
-        made = source.slopes(list(rows.values()), Direction(of=of))
-        zero = graph.const(0.0)
-        changes = dict(zip(rows, (e or zero for e in made), strict=True))
+        changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
         state, left = taken(graph, arriving), taken(graph, behind)
         found = []
         for k in range(self.places.states):
             moved = changes[k] if k in changes else state(k, 0, None)
             moved = graph.op("sub", moved, graph.op("mul", left(k, 0, None), move))
-            found.append((graph.op("select", broken, zero, moved), 1))
+            found.append((graph.op("select", broken, graph.const(0.0), moved), 1))
         return found
+
+    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
+        """Return the derivatives of expressions, with memories as they are kept.
+
+        The derivatives of the states are put in last: what they say of memories stays.
+        """
+        graph, source = self.source.graph, self.source
+
+        def place(start: int, step: int, size: int | None) -> Expr | None:
+            if start >= self.places.states:
+                return None
+            return graph.node("leaf", data=(_WAY, start, step), size=size, varies=True)
+
+        made = source.slopes(exprs, Direction(of={**of, "x": place}))
+        zero = graph.const(0.0)
+        found = self.sides.kept([e or zero for e in made])
+        leaves = [e for e in needed(found) if e.op == "leaf" and e.data[0] == _WAY]
+        ways = {leaf: of["x"](*leaf.data[1:], leaf.size) or zero for leaf in leaves}
+        return replaced_parts(graph, found, ways)
+
+    def _carried_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
+        """Return what becomes of memories that are carried along where other states jump.
+
+        First they are what has carried them until then.
+        """
+        carried = self.source.carried
+        return {
+            m: self.source.with_states([become], {**rows, m: become})[0]
+            for m, become in carried.items()
+        }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
         """Return expressions behind a jump of some states, and what memories switch to by it."""
-        source = self.source
+        source, carried = self.source, self.source.carried
+        rows = {k: self.sides.kept([e])[0] if k in carried else e for k, e in rows.items()}
         held = [
             (m, c) for m, c in zip(source.program.memory, source.committed, strict=True)
             if m in source.switched

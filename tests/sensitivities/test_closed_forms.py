@@ -391,3 +391,46 @@ def test_stiff():
         van_der_pol, [0, 50.0, 100.0], ["x", "y"], {"plant.m": 200.0, "plant.x(0)": 2.0},
         {"plant.x": 2.0}, within=1e-5, method="rodas5p",
     )  # fmt: skip
+
+
+def behind_a_gap(source, signal, width):
+    """A play behind a signal of a block, and its integral."""
+    gap = nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=width, c_l=-width), "gap")
+    integral = ct.nlsys(
+        lambda t, x, u, p: u, lambda t, x, u, p: x, inputs=["v"], outputs=["y"], states=["y"],
+        name="integral",
+    )  # fmt: skip
+    return ct.interconnect(
+        [source, gap, integral],
+        connections=[["gap.u", f"{source.name}.{signal}"], ["integral.v", "gap.v"]], inputs=[],
+        outlist=["gap.v", "integral.y", *(f"{source.name}.{s}" for s in source.output_labels)],
+        outputs=["v", "y", *(f"source_{s}" for s in source.output_labels)], name="loop",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [0.1, 2.0])
+def test_play_behind_a_reset(width):
+    """The speed of a bouncing ball through a play that is carried, jumps, and stands."""
+    loop = behind_a_gap(nlctl.block(Ball(), "ball"), "v", width)
+    check(
+        loop, np.linspace(0, 1.6, 9), ["v", "y", "source_h", "source_v"],
+        {"ball.e": 0.8, "ball.h(0)": 1.0, "ball.g": 9.81, "gap.c_r": width, "gap.c_l": -width},
+        h=1e-4, within=1e-6,
+    )  # fmt: skip
+
+
+def test_play_behind_a_comparison():
+    """x rises with 1 until s = p and falls with 1/2: the play stands at p - c, then follows."""
+    source = block(
+        lambda t, x, u, p: [1.0, np.where(x[0] > p["p"], -0.5, 1.0)], {"p": 0.7}, ("s", "x"),
+        name="source",
+    )  # fmt: skip
+    loop = behind_a_gap(source, "x", 0.1)
+    made = nlctl.sensitivity_response(
+        loop, [0, 0.5, 1.0, 1.5], of=["v", "y"], with_respect_to=["source.p", "gap.c_r"]
+    )
+    # from t = 0.1: t - 0.1; from 0.7: 0.6; from 1.1: 0.8 - (t - 0.7) / 2 = 1.5 p + 0.1 - t / 2
+    assert np.allclose(made.values[0], [0, 0.4, 0.6, 0.4])
+    assert np.allclose(made["v", "source.p"], [0, 0, 1, 1.5], rtol=0, atol=1e-8)
+    assert np.allclose(made["v", "gap.c_r"], [0, -1, -1, 0], rtol=0, atol=1e-8)
+    assert abs(end(made, "y", "source.p") - (0.4 + 1.5 * 0.4)) < 1e-7
