@@ -434,3 +434,34 @@ def test_play_behind_a_comparison():
     assert np.allclose(made["v", "source.p"], [0, 0, 1, 1.5], rtol=0, atol=1e-8)
     assert np.allclose(made["v", "gap.c_r"], [0, -1, -1, 0], rtol=0, atol=1e-8)
     assert abs(end(made, "y", "source.p") - (0.4 + 1.5 * 0.4)) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("actuator", "own"),
+    [
+        (nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.2, c_l=-0.2), {"actuator.c_r": 0.2}),
+        (nlctl.Relay(on=0.6, off=-0.4), {"actuator.height": 1.0}),
+        (nlctl.DeadZone(), {"actuator.b_r": nlctl.DeadZone().b_r}),
+        (nlctl.PrandtlIshlinskii(), {"actuator.w[0]": nlctl.PrandtlIshlinskii().w[0]}),
+    ],
+    ids=["backlash", "relay", "dead zone", "Prandtl-Ishlinskii"],
+)
+def test_actuators_behind_a_sampled_law(actuator, own):
+    """What an actuator is given jumps at a clock: at times that no parameter moves."""
+    source = block(
+        lambda t, x, u, p: [p["w"] * x[1], -p["w"] * x[0]], {"w": 2.0}, ("s", "c"), "source"
+    )
+    law = ct.nlsys(
+        None, lambda t, x, u, p: [p["K"] * u[0]], inputs=["s"], outputs=["u"], params={"K": 1.5},
+        name="law",
+    )  # fmt: skip
+    plant = ct.nlsys(
+        lambda t, x, u, p: [u[0] - p["a"] * x[0]], lambda t, x, u, p: x, inputs=["v"],
+        outputs=["y"], states=["y"], params={"a": 0.5}, name="plant",
+    )  # fmt: skip
+    blocks = {"source": source, "law": nlctl.sampled(law, 0.07), "actuator": actuator}
+    check(
+        nlctl.interconnect({**blocks, "plant": plant}, outputs=["y"]), np.linspace(0, 3, 7), ["y"],
+        own | {"source.c(0)": 1.0, "law.K": 1.5, "plant.a": 0.5, "source.w": 2.0},
+        {"source.c": 1.0}, h=1e-4,
+    )  # fmt: skip
