@@ -229,8 +229,9 @@ def fit(
               "rtol": rtol, "atol": atol},
     )  # fmt: skip
     search.response(start)
+    derivatives: Any = search.jacobian  # SciPy takes functions as well as texts
     found = least_squares(
-        search.residuals, start, search.jacobian, bounds, x_scale=np.where(start, abs(start), 1.0),
+        search.residuals, start, derivatives, bounds, x_scale=np.where(start, abs(start), 1.0),
         xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=max_evaluations,
     )  # fmt: skip
     return _found(search, found)
@@ -262,7 +263,7 @@ def _covariance(
     """Return the covariance of parameters, and which are not told by the data."""
     _, values, directions = np.linalg.svd(jacobian * scale, full_matrices=False)
     blind = values <= _UNKNOWN * max(values[0], np.finfo(float).tiny)
-    unknown = (np.abs(directions[blind]) > _SHARE).any(axis=0)
+    unknown = np.any(np.abs(directions[blind]) > _SHARE, axis=0, keepdims=True)[0]
     inverse = np.where(blind, 0.0, 1.0 / np.where(blind, 1.0, values))
     root = directions.T * inverse
     covariance = noise**2 * (root @ root.T) * np.outer(scale, scale)

@@ -261,12 +261,13 @@ class _Maker:
         count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
         own, arriving = _divided(graph, pieces, count)
         own += [(self.source.carried[m], 1) for m in self.wanted]
-        parts = [(own, arriving)]
-        for j in range(self.places.by):
-            changes = [self._along(part, j) for part in (own, arriving)]
-            kept = [self.sides.kept([e for e, _ in part]) for part in changes]
-            parts.append(tuple([(e, 1) for e in part] for part in kept))
+        shown = ((self._shown(own, j), self._shown(arriving, j)) for j in range(self.places.by))
+        parts = [(own, arriving), *shown]
         return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
+
+    def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
+        """Return the derivatives of numbers, of memories that are carried as they are kept."""
+        return [(e, 1) for e in self.sides.kept([e for e, _ in self._along(numbers, j)])]
 
     def _switching(self) -> list[tuple[int, Tracer]]:
         source = self.source

@@ -19,7 +19,7 @@ from functools import cached_property
 
 from ..expressions.graph import Expr, Graph, needed
 from ..native.sliding.pieces import replaced_parts
-from .directions import Direction, SomeRows, Taken, rows_replaced, taken
+from .directions import Direction, SomeRows, Taken, rows_replaced
 from .places import StatePlaces
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
@@ -279,11 +279,11 @@ class Saltation:
         seed, moving = self.seeds[j], source.time(arriving, move)
         of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
         changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
-        state, left = taken(graph, arriving), taken(graph, behind)
+        state, left = graph.joined(arriving), graph.joined(list(behind))
         found = []
         for k in range(self.places.states):
-            moved = changes[k] if k in changes else state(k, 0, None)
-            moved = graph.op("sub", moved, graph.op("mul", left(k, 0, None), move))
+            moved = changes[k] if k in changes else graph.item(state, k)
+            moved = graph.op("sub", moved, graph.op("mul", graph.item(left, k), move))
             found.append((graph.op("select", broken, graph.const(0.0), moved), 1))
         return found
 
@@ -303,7 +303,7 @@ class Saltation:
         zero = graph.const(0.0)
         found = self.sides.kept([e or zero for e in made])
         leaves = [e for e in needed(found) if e.op == "leaf" and e.data[0] == _WAY]
-        ways = {leaf: of["x"](*leaf.data[1:], leaf.size) or zero for leaf in leaves}
+        ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
         return replaced_parts(graph, found, ways)
 
     def _carried_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
