@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
+import struct
 from typing import Annotated, Any, get_origin, get_type_hints
 
 import numba
@@ -27,8 +28,11 @@ from ...upstream.numba_internals import (
 
 _INT = ir.IntType(64)
 _LINE = 8  # floats in a line of the cache
+_FLOAT, _BITS = struct.Struct("=d"), struct.Struct("=q")
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
 
+
+_REST = [(0,) * (_ENTRY - 1 - ndim) for ndim in range(_ENTRY)]  # of an entry
 
 # arrays in a record: their data type and dimensions
 Reals1 = Annotated[np.ndarray, np.float64, 1]
@@ -95,38 +99,46 @@ def with_table(record: Any, **values: Any) -> Any:
     ValueError
         If an array is not C-contiguous: the table has no strides.
     """
-    for name, wanted in type_of(record).formats.items():
+    numbers: list[int] = []
+    for name, (dtype, ndim) in type_of(record).formats.items():
         value = values[name]
-        found = (type_of(type(value)), 0) if hasattr(value, "_fields") else _format(value)
-        plain = (
-            not isinstance(found[0], Pointed) and found[0].hasobject
-        )  # functions instead of addresses, without JIT
-        if found != wanted and not plain:
-            raise TypeError(
-                f"'{name}' of {record.__name__} needs {wanted[1]} dimensions of {wanted[0]}, got "
-                f"{found[1]} of {found[0]}"
-            )
-    rows = [_row(record, name, values[name]) for name in _named(record)]
-    return record(**values, table=np.array(rows, dtype=np.int64))
+        if isinstance(value, np.ndarray):
+            if value.dtype != dtype or value.ndim != ndim:
+                _check_format(record, name, value)
+            if not value.flags.c_contiguous:
+                raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
+            numbers += (value.__array_interface__["data"][0], *value.shape, *_REST[ndim])
+        else:
+            numbers += (_number(record, name, value), *_REST[0])
+    return record(**values, table=np.array(numbers, dtype=np.int64).reshape(-1, _ENTRY))
 
 
-def _format(value: Any) -> tuple[Any, int]:
-    """Return data type and number of dimensions of a number or an array."""
-    found = np.asarray(value)
-    return found.dtype, found.ndim
-
-
-def _row(record: Any, name: str, value: Any) -> list[int]:
-    """Return what the table has for a field."""
+def _number(record: Any, name: str, value: Any) -> int:
+    """Return what a table has for a number: a float's bits, an integer; for a record its table."""
+    if type(value) is float and type_of(record).fields[name] is types.float64:
+        return _BITS.unpack(_FLOAT.pack(value))[0]
+    if type(value) is int and type_of(record).fields[name] is types.int64:
+        return value
+    _check_format(record, name, value)
     if hasattr(value, "_fields"):
-        row = [value.table.ctypes.data]
-    elif isinstance(value, np.ndarray):
-        if not value.flags.c_contiguous:
-            raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
-        row = [value.ctypes.data, *value.shape]
+        return value.table.ctypes.data
+    return int(np.asarray(value).view(np.int64))
+
+
+def _check_format(record: Any, name: str, value: Any) -> None:
+    """Refuse a field of another type than machine code takes it for."""
+    wanted, plain = type_of(record).formats[name], False
+    if hasattr(value, "_fields"):
+        found: tuple[Any, int] = (type_of(type(value)), 0)
     else:
-        row = [int(np.asarray(value).view(np.int64))]  # a float's bits, or an integer
-    return row + [0] * (_ENTRY - len(row))
+        array = np.asarray(value)
+        found = (array.dtype, array.ndim)
+        plain = array.dtype.hasobject  # functions instead of addresses, without JIT
+    if found != wanted and not plain:
+        raise TypeError(
+            f"'{name}' of {record.__name__} needs {wanted[1]} dimensions of {wanted[0]}, got "
+            f"{found[1]} of {found[0]}"
+        )
 
 
 def with_fields(record: Any, **changes: Any) -> Any:
