@@ -110,6 +110,15 @@ from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
 from .response import EngineWarning, input_output_response
 from .sampling import Clock, Sampled, Sampling, TriggeredHold, discretise, sampled
+from .sensitivities import (
+    Fit,
+    MetricGradient,
+    NoDerivative,
+    SensitivityResponse,
+    fit,
+    metric_gradient,
+    sensitivity_response,
+)
 from .sliding import IdealRelay
 
 __all__ = [
@@ -153,6 +162,7 @@ __all__ = [
     "FilteredError",
     "FilteredLaw",
     "FilteredStep",
+    "Fit",
     "FixedGainLaw",
     "ForcedDuffing",
     "FunctionReference",
@@ -169,9 +179,11 @@ __all__ = [
     "LeakyNussbaumLaw",
     "LinearRegressor",
     "LuGre",
+    "MetricGradient",
     "ModelError",
     "ModelReferenceLaw",
     "MonotoneNussbaumLaw",
+    "NoDerivative",
     "NussbaumLaw",
     "OneSidedDeadZones",
     "ParameterError",
@@ -190,6 +202,7 @@ __all__ = [
     "Sampling",
     "Saturation",
     "SecondOrderLag",
+    "SensitivityResponse",
     "SlidingModeLaw",
     "Spec",
     "StatePredictor",
@@ -220,6 +233,7 @@ __all__ = [
     "ensemble_response",
     "equation",
     "faults",
+    "fit",
     "functions",
     "grid_centres",
     "initial_state",
@@ -228,6 +242,7 @@ __all__ = [
     "l1_adaptive",
     "latin_hypercube_centres",
     "linearize",
+    "metric_gradient",
     "mrac",
     "native",
     "paper",
@@ -239,6 +254,7 @@ __all__ = [
     "relay_grid",
     "replaced",
     "sampled",
+    "sensitivity_response",
     "sliding_mode",
     "state_names",
     "typeset",

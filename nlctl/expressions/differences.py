@@ -43,6 +43,8 @@ def opaque_difference(graph: Graph, call: Expr, tangents: Sequence[Expr | None])
     h = op("select", moves, op("div", const(RELATIVE_STEP), speed), const(0.0))
     ahead, behind = (_moved(graph, call, tangents, step) for step in (h, op("neg", h)))
     factor = op("select", moves, op("div", speed, const(2.0 * RELATIVE_STEP)), const(0.0))
+    if call.size == 1:  # a number, not a loop of one element
+        ahead, behind = graph.item(ahead, 0), graph.item(behind, 0)
     return op("mul", op("sub", ahead, behind), factor)
 
 

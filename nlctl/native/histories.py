@@ -39,7 +39,7 @@ def lines_of(
         delays[row] = p[reading.program.layout[line.block or 0]["delay"].offset]
         check_positive(varied[row], delays[row], read.nodes[line.block or 0].path)
     return with_table(
-        DelayLines, delays=delays, direct=_direct(read).astype(np.int64), signals=signals,
+        DelayLines, delays=delays, direct=direct_lines(read).astype(np.int64), signals=signals,
         **variation_table(varied),
     )  # fmt: skip
 
@@ -111,7 +111,7 @@ def _with_places(work: Any, room: int) -> Any:
     return with_fields(work, past=grown(work.past, _KEPT, room))
 
 
-def _direct(read: Schedule) -> np.ndarray:
+def direct_lines(read: Schedule) -> np.ndarray:
     """Return which lines' arriving signals depend at once on what leaves which lines."""
     leaving = {line: i for i, line in enumerate(read.lines)}
     found: dict[Any, frozenset[int]] = {}

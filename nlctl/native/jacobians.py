@@ -182,8 +182,7 @@ def jacobian(
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
-    searches = {name: searched(one) for name, one in reading.equations.solvers.items()}
-    searches |= {name: _of_columns(call) for name, call in reading.equations.calls.items()}
+    searches = searches_of(reading.equations)
     count, found = directions.shape[1], {}
     for name, rows in made.rows.items():
         wanted = [e for e, _ in rows if e is not None]
@@ -194,6 +193,12 @@ def jacobian(
         ]
         found[name] = np.concatenate([np.zeros((0, count)), *parts])
     return found
+
+
+def searches_of(equations: Equations) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    """Return what finds signals of algebraic loops and calls opaque functions, by name."""
+    found = {name: searched(one) for name, one in equations.solvers.items()}
+    return found | {name: _of_columns(call) for name, call in equations.calls.items()}
 
 
 def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
@@ -325,12 +330,7 @@ def parameter_jacobian(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
     system = reading.system
-    places, owners = {}, {}
-    for i, own in reading.program.layout.items():
-        for slot in own.values():
-            for k in range(slot.size if slot.kind == "f" else 0):
-                name = f"{slot.name}[{k}]" if slot.shape else slot.name
-                places[name], owners[name] = slot.offset + k, reading.schedule.holders[i]
+    places = float_parameters(reading)
     _tell_of_differences(reading)
     reading.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + reading.schedule.ninputs
@@ -338,14 +338,35 @@ def parameter_jacobian(
     for k, name in enumerate(parameters):
         if name not in places:
             raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
-        _check_enters_alone(owners[name], name)
-        directions[start + places[name], k] = 1.0
+        place, owner = places[name]
+        check_enters_alone(owner, name)
+        directions[start + place, k] = 1.0
     found = jacobian(reading, x0, u0, t, params, directions)
     return found["dx"], found["y"]
 
 
-def _check_enters_alone(node: Node, name: str) -> None:
-    """Refuse a parameter that numbers follow from: these are constants to the equations."""
+def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
+    """Return the parameters that can be differentiated by: place in `p`, and whose they are.
+
+    Entries of arrays have their index in their names.
+    """
+    found = {}
+    for i, own in reading.program.layout.items():
+        for slot in own.values():
+            for k in range(slot.size if slot.kind == "f" else 0):
+                name = f"{slot.name}[{k}]" if slot.shape else slot.name
+                found[name] = slot.offset + k, reading.schedule.holders[i]
+    return found
+
+
+def check_enters_alone(node: Node, name: str) -> None:
+    """Refuse a parameter that numbers follow from: these are constants to the equations.
+
+    Raises
+    ------
+    CompileError
+        If `name` is one.
+    """
     spec: Any = node.system.current_spec if isinstance(node.system, Block) else None
     field, _, place = name.removeprefix(f"{node.path}.").partition("[")
     if not hasattr(spec, "derived") or field not in declared_params(spec):

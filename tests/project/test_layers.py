@@ -25,7 +25,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.__main__"],
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",

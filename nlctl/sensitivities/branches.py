@@ -1,0 +1,148 @@
+"""On which side of a jump equations are: an integer that is kept while they stay there.
+
+Of a comparison it is whether it holds, of `sign` its value, of `floor` and `%` how many whole ones
+there are.  With it the equations can be had as they were right before a jump, at the very point
+where they have jumped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from ..expressions.graph import Expr, Graph, needed
+
+__all__ = ["Branch", "branch_of", "jumping"]
+
+_ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
+_WHOLE = ("floor", "ceil", "trunc", "rint")
+_QUOTIENTS = {"remainder": "floor", "fmod": "trunc"}
+_JUMPS = (*_ORDERS, *_WHOLE, *_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch:
+    """One side of a jump.
+
+    Attributes
+    ----------
+    now : Expr
+        The side that the arguments are on.
+    level : Expr
+        A smooth function that is at a fixed value where the side is left.
+    extent : Expr
+        Of what size the numbers are that it is the difference of.
+    margin : Expr
+        At least 0 as long as the arguments are on the side that is kept.
+    value : Expr
+        The operation, with the side that is kept.
+    """
+
+    now: Expr
+    level: Expr
+    extent: Expr
+    margin: Expr
+    value: Expr
+
+
+def jumping(exprs: Iterable[Expr]) -> list[Expr]:
+    """Return the operations that may jump in expressions, parts first.
+
+    Parameters
+    ----------
+    exprs : iterable of Expr
+    """
+    nodes = needed(exprs)
+    return [n for n in nodes if n.varies and n.op in _JUMPS and any(a.varies for a in n.args)]
+
+
+def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:
+    """Return the side of an operation.
+
+    Parameters
+    ----------
+    graph : Graph
+    op : str
+        One that `jumping` returns.
+    args : sequence of Expr
+    kept : Expr
+        The side that is kept.
+    """
+    numbers = [graph.number(arg) for arg in args]
+    if op in _ORDERS:
+        return _of_order(graph, op, numbers, kept)
+    if op in _WHOLE:
+        (z,) = numbers
+        now = graph.op(op, z)
+        return _made(graph, now, z, [z], _within(graph, op, z, kept), kept)
+    if op in _QUOTIENTS:
+        over, under = numbers
+        z, rounding = graph.op("div", over, under), _QUOTIENTS[op]
+        rest = graph.op(op, over, under)
+        whole = graph.op("sub", over, rest)
+        now = graph.op("rint", graph.op("div", whole, under))  # as many as the operation takes off
+        other = graph.op("sub", over, graph.op("mul", kept, under))
+        value = graph.op("select", graph.op("eq", kept, now), rest, other)  # to the last digit
+        return _made(graph, now, z, [z], _within(graph, rounding, z, kept), value)
+    return _of_sign(graph, op, numbers, kept)
+
+
+def _made(
+    graph: Graph, now: Expr, level: Expr, parts: Sequence[Expr], margin: Expr, value: Expr
+) -> Branch:
+    extent = graph.const(0.0)
+    for part in parts:
+        extent = graph.op("add", extent, graph.op("absolute", part))
+    return Branch(now=now, level=level, extent=extent, margin=margin, value=value)
+
+
+def _of_order(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Branch:
+    one = graph.const(1.0)
+    level = graph.op("sub", *numbers)
+    now = graph.number(graph.op(op, *numbers))
+    way = graph.op("sub", graph.op("mul", graph.const(2.0), kept), one)
+    margin = graph.op("mul", graph.op("mul", graph.const(_ORDERS[op]), way), level)
+    value = graph.op("gt", kept, graph.const(0.5))
+    return _made(graph, now, level, numbers, margin, value)
+
+
+def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Branch:
+    const, other = graph.const, numbers[-1]
+    level = other if op == "copysign" else numbers[0]
+    margin = graph.op("mul", kept, level)
+    if op == "sign":
+        at_zero = graph.op("neg", graph.op("absolute", level))
+        margin = graph.op("select", graph.op("eq", kept, const(0.0)), at_zero, margin)
+        return _made(graph, graph.op("sign", level), level, [level], margin, kept)
+    below = graph.op("lt", level, const(0.0))
+    now = graph.op("select", below, const(-1.0), const(1.0))
+    if op == "heaviside":
+        value = graph.op("select", graph.op("gt", kept, const(0.0)), const(1.0), const(0.0))
+    elif op == "copysign":
+        value = graph.op("mul", graph.op("absolute", numbers[0]), kept)
+    else:  # the angle jumps on the left half of the axis only
+        turned = graph.op("mul", const(math.pi), graph.op("sub", kept, now))
+        left = graph.op("lt", other, const(0.0))
+        angle = graph.op("arctan2", *numbers)
+        value = graph.op("add", angle, graph.op("select", left, turned, const(0.0)))
+    return _made(graph, now, level, [level], margin, value)
+
+
+def _within(graph: Graph, rounding: str, z: Expr, kept: Expr) -> Expr:
+    """Return what is at least 0 while `z` is rounded to the number that is kept."""
+    op, one = graph.op, graph.const(1.0)
+    above, below = op("sub", z, kept), op("sub", kept, z)
+    if rounding == "rint":
+        return op("sub", graph.const(0.5), op("absolute", above))
+    up, down = (
+        op("minimum", above, op("add", below, one)),
+        op("minimum", below, op("add", above, one)),
+    )
+    if rounding == "floor":
+        return up
+    if rounding == "ceil":
+        return down
+    around = op("sub", one, op("absolute", z))
+    outside = op("select", op("gt", kept, graph.const(0.0)), up, down)
+    return op("select", op("eq", kept, graph.const(0.0)), around, outside)

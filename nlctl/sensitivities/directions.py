@@ -1,0 +1,156 @@
+"""Directions in which equations are differentiated: of states, time, inputs and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ..errors import CompileError
+from ..expressions.derivatives import tangents
+from ..expressions.graph import Expr, Graph, Untraceable, needed
+
+__all__ = ["Direction", "from_time", "one_sided", "rows_replaced", "slopes", "taken"]
+
+SomeRows = tuple[Expr, int]  # some rows: one expression, and how many
+Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Direction:
+    """Where everything that equations read goes.
+
+    Attributes
+    ----------
+    of : mapping
+        For ``"x"``, ``"t"``, ``"u"``, ``"p"`` what gives some of its rows, None where they stand
+        still.
+    """
+
+    of: Mapping[str, Taken] = field(default_factory=dict)
+
+    def __call__(self, leaf: Expr) -> Expr | None:
+        """Return the derivative of what is read."""
+        array, start, step = leaf.data
+        if array not in self.of or leaf.kind != "f":
+            return None
+        return self.of[array](start, step, leaf.size)
+
+
+def slopes(
+    graph: Graph,
+    exprs: Sequence[Expr],
+    direction: Direction,
+    solutions: Mapping[str, Sequence[Expr]],
+) -> list[Expr | None]:
+    """Return the derivatives of expressions along a direction, None where they are 0.
+
+    Raises
+    ------
+    CompileError
+        If a search for the signals of an algebraic loop has no derivative.
+    """
+    try:
+        return tangents(graph, list(exprs), direction, solutions, differences=True)
+    except Untraceable as error:
+        raise CompileError(f"the equations have no derivatives: {error}") from None
+
+
+def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
+    """Return what gives some of the rows that expressions make up, and stands still behind them."""
+    whole, rows = graph.joined(list(pieces)) if pieces else None, sum(size for _, size in pieces)
+
+    def found(start: int, step: int, size: int | None) -> Expr | None:
+        if whole is None or start >= rows:
+            return None
+        return graph.item(whole, start) if size is None else graph.part(whole, start, step, size)
+
+    return found
+
+
+def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: range) -> Direction:
+    """Return where time and inputs go while time goes by `time`, by 1 if that is None.
+
+    Parameters
+    ----------
+    graph : Graph
+    time : Expr or None
+    inputs : int
+        Number of the diagram's inputs.
+    first : int
+        Place, among the program's inputs, from which on their rates follow.
+    lines : range
+        StatePlaces of delayed signals, whose rates nobody keeps.
+    """
+
+    def of_time(*_: object) -> Expr:
+        return graph.const(1.0) if time is None else time
+
+    def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
+        if start in lines:
+            raise CompileError(
+                "when something jumps depends on a delayed signal, whose rate nobody keeps: put a "
+                "lag behind the delay (nlctl.Lag), or take differences of runs"
+            )
+        if start >= inputs:
+            return None
+        where = ("u", first + start, step)
+        rate = graph.node("leaf", data=where, size=size, varies=True)
+        return rate if time is None else graph.op("mul", rate, time)
+
+    return Direction(of={"t": of_time, "u": of_inputs})
+
+
+def rows_replaced(
+    graph: Graph, pieces: Sequence[SomeRows], instead: Mapping[int, Expr]
+) -> list[SomeRows]:
+    """Return pieces with other numbers in some of their rows."""
+    found: list[SomeRows] = []
+    row = 0
+    for expr, size in pieces:
+        inside = sorted(k - row for k in instead if row <= k < row + size)
+        at = 0
+        for k in inside:
+            if k > at:
+                found.append(_part(graph, expr, at, k - at))
+            found.append((instead[row + k], 1))
+            at = k + 1
+        if at < size:
+            found.append(_part(graph, expr, at, size - at) if at else (expr, size))
+        row += size
+    return found
+
+
+def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
+    if expr.size is None:
+        return expr, size
+    return (graph.item(expr, start) if size == 1 else graph.part(expr, start, 1, size)), size
+
+
+def one_sided(graph: Graph, exprs: Sequence[Expr], direction: Direction) -> list[Expr]:
+    """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads.
+
+    Their derivatives along that direction are those to its own side.
+    """
+    new: dict[Expr, Expr] = {}
+    for node in needed(exprs):
+        args = tuple(new.get(a, a) for a in node.args)
+        if node.op in ("maximum", "minimum", "absolute") and node.varies:
+            new[node] = _leading(graph, node.op, args, direction)
+        elif args != node.args:
+            new[node] = graph.node(
+                node.op, *args, data=node.data, size=node.size, kind=node.kind,
+                varies=node.varies, value=node.value,
+            )  # fmt: skip
+    return [new.get(e, e) for e in exprs]
+
+
+def _leading(graph: Graph, op: str, args: Sequence[Expr], direction: Direction) -> Expr:
+    pair = list(map(graph.number, args))
+    if op == "absolute":
+        pair.append(graph.op("neg", pair[0]))
+    made = slopes(graph, pair, direction, {})
+    rates = [graph.const(0.0) if rate is None else rate for rate in made]
+    order = "lt" if op == "minimum" else "gt"
+    ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
+    first = graph.op("or", graph.op(order, *pair), ahead)
+    return graph.op("select", first, *pair)

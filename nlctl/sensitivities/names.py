@@ -1,0 +1,159 @@
+"""Of what derivatives are taken, and by what: names that are looked up in a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..blocks import Block
+from ..delays.lines import is_delayed
+from ..diagrams import state_names
+from ..errors import CompileError, ParameterError
+from ..names import find_name, unknown
+from ..native import Compiled
+from ..native.diagram.wiring import Signal as Output
+from ..native.jacobians import check_enters_alone, float_parameters
+from ..params import declared_params
+
+__all__ = ["Observed", "VariedQuantity", "observed_signals", "varied_quantities"]
+
+_AT_START = "(0)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """What is differentiated: a combination of outputs of blocks, or a state."""
+
+    name: str
+    combination: Any = None
+    state: int = -1
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariedQuantity:
+    """By what is differentiated: a parameter by its place, or the initial value of a state.
+
+    Its block takes a parameter between `lowest` and `highest`.
+    """
+
+    name: str
+    place: int = -1
+    state: int = -1
+    lowest: float = -np.inf
+    highest: float = np.inf
+
+
+def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> list[Observed]:
+    """Return signals by their names; None for the outputs of the diagram.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    names : sequence of str, str or None
+        Outputs of the diagram or of blocks in it, and states.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If a name is not that of exactly one of them.
+    ParameterError
+        If there are none, or one twice.
+    """
+    system, read = compiled.system, compiled.schedule
+    own: list[str] = list(system.output_labels or [])
+    known = {
+        f"{node.path}.{label}": Observed(name="", combination={Output(i, k): 1.0})
+        for i, node in enumerate(read.nodes)
+        for k, label in enumerate(node.system.output_labels or [])
+    }
+    known |= {name: Observed(name="", state=i) for i, name in enumerate(state_names(system))}
+    known |= {
+        name: Observed(name="", combination=combination)
+        for name, combination in zip(own, read.outputs, strict=False)
+    }
+    wanted = _checked("of", own if names is None else names)
+    full = [name if name in known else find_name("signal", name, known) for name in wanted]
+    return [
+        Observed(name=name, combination=known[k].combination, state=known[k].state)
+        for name, k in zip(wanted, full, strict=True)
+    ]
+
+
+def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[VariedQuantity]:
+    """Return parameters and initial states by their names.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    names : sequence of str or str
+        ``"law.beta"``, ``"law.K[1]"``; ``"plant.x1(0)"``.
+
+    Raises
+    ------
+    UnknownNameError, AmbiguousNameError
+        If a name is not that of exactly one of them.
+    ParameterError
+        If there are none, or one twice.
+    CompileError
+        If it does not enter by the equations alone.
+    """
+    states = {name: i for i, name in enumerate(state_names(compiled.system))}
+    parameters = float_parameters(compiled)
+    found = []
+    for name in _checked("with_respect_to", names):
+        if name.endswith(_AT_START):
+            state = find_name("state", name.removesuffix(_AT_START), states)
+            found.append(VariedQuantity(name=name, state=states[state]))
+            continue
+        if name not in parameters and name in states:
+            raise unknown("parameter", name, [*parameters, f"{name}{_AT_START}"])
+        full = name if name in parameters else find_name("parameter", name, parameters)
+        place, owner = parameters[full]
+        _check_moves(compiled, owner, full)
+        check_enters_alone(owner, full)
+        lowest, highest = _bounds(owner, full)
+        found.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
+    return found
+
+
+def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
+    """Refuse what says when samples are taken, and what arrives when."""
+    key = name.rpartition(".")[2]
+    if any(owner is node for node in compiled.schedule.samplings):
+        raise CompileError(
+            f"'{name}' says when samples are taken: derivatives by clocks are not known; take "
+            "differences of runs"
+        )
+    if is_delayed(owner.system) and key == "delay":
+        raise CompileError(
+            f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
+            "nobody keeps; take differences of runs"
+        )
+
+
+def _bounds(owner: Any, name: str) -> tuple[float, float]:
+    """Return between what a block declares that a parameter lies."""
+    if not isinstance(owner.system, Block):
+        return -np.inf, np.inf
+    field = name.removeprefix(f"{owner.path}.").partition("[")[0]
+    declared = declared_params(owner.system.spec).get(field)
+    if declared is None:
+        return -np.inf, np.inf
+    low = [v for v in (declared.above, declared.at_least) if v is not None]
+    high = [v for v in (declared.below, declared.at_most) if v is not None]
+    return max(low, default=-np.inf), min(high, default=np.inf)
+
+
+def _checked(what: str, names: Any) -> list[str]:
+    names = [names] if isinstance(names, str) else names
+    if not isinstance(names, list | tuple) or not all(isinstance(n, str) for n in names):
+        raise ParameterError(f"{what} needs a list of names, got {names!r}")
+    if not names:
+        raise ParameterError(f"{what} needs at least one name")
+    for name in names:
+        if list(names).count(name) > 1:
+            raise ParameterError(f"{what} has '{name}' twice")
+    return list(names)

@@ -1,0 +1,324 @@
+"""The derivative of a whole program, as a program: flow, outputs, memories, samples and jumps.
+
+Derivatives by each quantity are further states.  They flow with the linearized equations, become
+with memories and samples what the derivative of these says, and jump at conditions and resets
+(`saltation`).  So one run has them with the states, under the same error control.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..expressions.arrays import Tracer, as_array, scalar
+from ..expressions.graph import Expr
+from ..native import Compiled
+from ..native.diagram.program import Program
+from ..native.equations.blocks import Equations
+from .directions import Direction, SomeRows
+from .names import Observed, VariedQuantity
+from .places import StatePlaces
+from .saltation import Saltation
+from .schedule import Extended, extended, with_derivatives
+from .sides import KeptSides, sides_of
+from .source import EquationParts, equation_parts
+
+__all__ = ["Differentiated", "parameters_with", "with_its_derivatives"]
+
+_LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
+
+
+@dataclass(frozen=True, kw_only=True)
+class Differentiated:
+    """A diagram, compiled with its derivatives.
+
+    Attributes
+    ----------
+    compiled : Compiled
+    places : StatePlaces
+    extended : Extended
+    sides : KeptSides
+    outputs : int
+        Number of the signals that are outputs.
+    saltation : Saltation
+    """
+
+    compiled: Compiled
+    places: StatePlaces
+    extended: Extended
+    sides: KeptSides
+    outputs: int
+    saltation: Saltation
+
+
+def parameters_with(
+    made: Extended,
+    quantities: Sequence[VariedQuantity],
+    p: np.ndarray,
+    scale: np.ndarray,
+    settings: Any,
+    span: float,
+) -> np.ndarray:
+    """Return all parameters of a program with derivatives.
+
+    Parameters
+    ----------
+    made : Extended
+    quantities : sequence of VariedQuantity
+    p : ndarray
+        Those of the diagram.
+    scale : ndarray
+        By how much of each quantity is with_its_derivatives.
+    settings : Settings
+    span : float
+        How long the run is (s).
+    """
+    size, late = made.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
+    found = np.concatenate([p, np.zeros(size - p.size)])
+    layout = made.layout
+    for j, quantity in enumerate(quantities):
+        for i in range(made.lines):
+            own = layout[made.schedule.lines[made.line(j, i)].block or 0]
+            original = layout[made.schedule.lines[i].block or 0]
+            found[own["delay"].offset] = p[original["delay"].offset]
+            if quantity.place == original["before"].offset:
+                found[own["before"].offset] = scale[j]
+    given = {"scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late}
+    for name, value in given.items():
+        slot = made.slot(name)
+        found[slot.offset : slot.offset + slot.size] = value
+    return found
+
+
+def with_its_derivatives(
+    compiled: Compiled,
+    signals: Sequence[Observed],
+    quantities: Sequence[VariedQuantity],
+    p: np.ndarray,
+    settings: Any,
+) -> Differentiated:
+    """Compile a diagram with its derivatives.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    signals : sequence of Observed
+        What is wanted.
+    quantities : sequence of VariedQuantity
+        By what is with_its_derivatives.
+    p : ndarray
+        Parameters, whose integers may steer equations.
+    settings : Settings
+
+    Raises
+    ------
+    CompileError
+        If something has no derivative.
+    """
+    by, n = len(quantities), compiled.system.nstates or 0
+    combinations = [s.combination for s in signals if s.combination is not None]
+    made = extended(compiled, combinations, by)
+    whole = parameters_with(made, quantities, p, np.ones(by), settings, 1.0)
+    source = equation_parts(compiled, made, whole)
+    sides = sides_of(source, n * (1 + by))
+    places = StatePlaces(states=n, by=by, branches=sides.rows)
+    seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
+    kept = [s.state for s in signals if s.state in source.carried]
+    maker = _Maker(
+        source=source, sides=sides, places=places, seeds=seeds, wanted=kept,
+        saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
+    )  # fmt: skip
+    outputs = len(combinations) + len(kept)
+    schedule = with_derivatives(compiled, made, places.size, outputs * (1 + by), by)
+    found = replace(compiled, schedule=schedule, program=maker.program(), original=None, apart=None)
+    found.__dict__["equations"] = maker.equations()
+    return Differentiated(
+        compiled=found, places=places, extended=made, sides=sides, outputs=outputs,
+        saltation=maker.saltation,
+    )  # fmt: skip
+
+
+def _seed(
+    source: EquationParts, places: StatePlaces, j: int, quantity: VariedQuantity
+) -> Direction:
+    """Return the direction in which everything goes by a quantity."""
+    graph, made = source.graph, source.extended
+    scale = graph.leaf("p", made.slot("scale").offset + j, None)
+
+    def of_states(start: int, step: int, size: int | None) -> Expr | None:
+        if start >= places.states:
+            return None
+        where = ("x", places.derivative(j) + start, step)
+        return graph.node("leaf", data=where, size=size, varies=True)
+
+    def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
+        if not 0 <= start - source.inputs < made.lines:
+            return None
+        first = source.inputs + made.line(j, start - source.inputs)
+        return graph.node("leaf", data=("u", first, step), size=size, varies=True)
+
+    def of_parameters(start: int, step: int, size: int | None) -> Expr | None:
+        rows = [start + step * i for i in range(size or 1)]
+        if quantity.place not in rows:
+            return None
+        zero = graph.const(0.0)
+        parts = [(scale if row == quantity.place else zero, 1) for row in rows]
+        return graph.joined(parts) if size else scale
+
+    return Direction(of={"x": of_states, "u": of_inputs, "p": of_parameters})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Maker:
+    """Makes the program of derivatives from a source."""
+
+    source: EquationParts
+    sides: KeptSides
+    places: StatePlaces
+    seeds: Sequence[Direction]
+    saltation: Saltation
+    wanted: Sequence[int]
+
+    def program(self) -> Program:
+        """Return the arrays of the program."""
+        source, places = self.source, self.places
+        before, n, by = source.program, places.states, places.by
+        owner = source.extended.owner
+        jumping = list(before.jumping)
+        first = places.kept + self.sides.first_memory
+        for i, _, _ in before.jumping:
+            jumping += [(i, n, places.kept), (i, places.grazing, places.size)]
+            jumping.append((i, first, first + len(before.memory)))
+        if self.sides.watches:
+            jumping.append((owner, n, places.last))
+        turning, guards = list(self.saltation.at_turns()), list(before.guards)
+        if turning:
+            jumping += [(owner + 1, m, m + 1) for m in turning]
+            jumping.append((owner + 1, first, first + len(before.memory)))
+            guards.insert(0, owner + 1)  # what else jumps then says more
+        if self.saltation.turning:
+            jumping.append((owner + 2, places.grazing, places.grazing + 1))
+            guards[:0] = [owner + 2] * len(self.saltation.turning)
+        sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
+        made = replace(
+            before,
+            layout=source.extended.layout,
+            guards=(*guards, *([owner] if self.sides.watches else [])),
+            jumping=tuple(jumping),
+            sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
+        )
+        made.__dict__["meetings"] = before.meetings
+        return made
+
+    def equations(self) -> Equations:
+        """Return what the program computes."""
+        found = self.source.found
+        located = tuple(replace(each, bends=False) for each in found.conditions.located)
+        results: dict[str, list[tuple[int, Tracer]]] = {
+            "dx": self._flow(),
+            "g": self._switching(),
+            "m": found.results["m"],
+            "y": self._outputs(),
+        }
+        if found.results.get("reset") or self.sides.watches or self.source.carried:
+            results["reset"] = self._resets()
+        for name in found.results:
+            if name.startswith("sample"):
+                results[name] = self._samples(name)
+        return replace(
+            found, results=results, conditions=replace(found.conditions, located=located)
+        )
+
+    # -- results ---------------------------------------------------------------------------------
+
+    def _along(self, pieces: Sequence[SomeRows], j: int) -> list[SomeRows]:
+        """Return the derivatives of pieces by a quantity."""
+        graph = self.source.graph
+        made = self.source.slopes([e for e, _ in pieces], self.seeds[j])
+        zero = graph.const(0.0)
+        return [(zero if e is None else e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+
+    def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
+        """Return pieces as arrays with their rows."""
+        found = []
+        for expr, size in pieces:
+            found.append((first, _array(self.source.graph, expr, size)))
+            first += size
+        return found
+
+    def _flow(self) -> list[tuple[int, Tracer]]:
+        pieces, places = list(self.source.flow), self.places
+        for j in range(places.by):
+            pieces += self._along(self.source.flow, j)
+        rest = places.size - places.kept
+        return self._rows(0, [*pieces, (self.source.graph.const(0.0), rest)])
+
+    def _outputs(self) -> list[tuple[int, Tracer]]:
+        graph, pieces = self.source.graph, self.source.found.pieces("y")
+        count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
+        own, arriving = _divided(graph, pieces, count)
+        own += [(self.source.carried[m], 1) for m in self.wanted]
+        shown = ((self._shown(own, j), self._shown(arriving, j)) for j in range(self.places.by))
+        parts = [(own, arriving), *shown]
+        return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
+
+    def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
+        """Return the derivatives of numbers, of memories that are carried as they are kept."""
+        return [(e, 1) for e in self.sides.kept([e for e, _ in self._along(numbers, j)])]
+
+    def _switching(self) -> list[tuple[int, Tracer]]:
+        source = self.source
+        first = source.program.switching + source.found.conditions.rows
+        found = [(row, array) for row, array in source.found.results["g"] if row < first]
+        found = [(row, array) for row, array in found if array.size]
+        rows = [apart for apart, _ in self.saltation.turning]
+        rows += [self.sides.carried] if source.carried else []
+        rows += source.guards
+        rows += [self.sides.margin] if self.sides.watches else []
+        return [*found, *self._rows(first, [(e, 1) for e in rows])]
+
+    def _resets(self) -> list[tuple[int, Tracer]]:
+        source = self.source
+        own = source.found.results.get("reset", [])
+        pieces = [p for _, array in own for p in array.pieces()]
+        guards: dict[int, list[Expr]] = {}
+        for i, guard in zip(source.program.guards, source.guards, strict=True):
+            guards.setdefault(i, []).append(guard)
+        for (i, begin, _), (_, array) in zip(source.program.jumping, own, strict=True):
+            pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
+        if self.sides.watches:
+            pieces += self.saltation.at_conditions()
+        turned = self.saltation.at_turns()
+        if turned:
+            pieces += [(e, 1) for e in turned.values()]
+            pieces += self.sides.now[len(self.sides.sides) :]
+        if self.saltation.turning:
+            pieces.append((self.saltation.at_touch(), 1))
+        return self._rows(0, pieces)
+
+    def _samples(self, name: str) -> list[tuple[int, Tracer]]:
+        graph, count = self.source.graph, len(self.source.program.sampled)
+        found = list(self.source.found.results[name])
+        for row, array in self.source.found.results[name]:
+            for j in range(self.places.by):
+                found += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
+        found += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
+        return found
+
+
+def _array(graph: Any, expr: Expr, size: int) -> Tracer:
+    """Return an expression as an array."""
+    if size == 1:
+        return scalar(graph, expr).reshape(1)
+    return Tracer(graph, as_array(expr), 0, size)
+
+
+def _divided(
+    graph: Any, pieces: Sequence[SomeRows], count: int
+) -> tuple[list[SomeRows], list[SomeRows]]:
+    """Return the first rows of pieces, and the others."""
+    single = [(graph.item(e, k), 1) for e, size in pieces for k in range(size)]
+    return single[:count], single[count:]

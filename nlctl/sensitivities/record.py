@@ -1,0 +1,142 @@
+"""What derivatives of a run are returned as."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..annotations import as_annotated
+from ..names import unknown
+from ..wording import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["NoDerivative", "SensitivityResponse"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoDerivative:
+    """Where a run has no derivative from some time on.
+
+    Attributes
+    ----------
+    time : float
+        From when on (s).
+    where : str
+        The block and what happens in it.
+    why : str
+        What there is instead of a derivative.
+    with_respect_to : tuple of str
+        By what there is none.
+
+    Examples
+    --------
+    >>> lack = nlctl.NoDerivative(
+    ...     time=0.5, where="guard of 'a'", why="grazing", with_respect_to=("p",)
+    ... )
+    >>> print(lack)
+    no derivative by p from t = 0.5 s on (guard of 'a'): grazing
+    """
+
+    time: float
+    where: str
+    why: str
+    with_respect_to: tuple[str, ...]
+
+    def __str__(self) -> str:
+        where = f" ({self.where})" if self.where else ""
+        by = ", ".join(self.with_respect_to)
+        return f"no derivative by {by} from t = {self.time:.9g} s on{where}: {self.why}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SensitivityResponse:
+    """A run with its derivatives, of `nlctl.sensitivity_response`.
+
+    ``response["plant.y", "law.beta"]`` is the derivative of one signal by one quantity over time.
+
+    Attributes
+    ----------
+    time : ndarray of shape (m,)
+        Times in s.
+    signals : tuple of str
+        Of what derivatives are taken.
+    with_respect_to : tuple of str
+        By what.
+    values : ndarray of shape (signals, m)
+        The signals themselves.
+    derivatives : ndarray of shape (signals, quantities, m)
+        NaN where there is none.
+    missing : tuple of NoDerivative
+        Where, and why; empty if there are derivatives up to the end.
+    scale : ndarray of shape (quantities,)
+        Of what size each quantity is taken to be: tolerances hold for a derivative times that.
+    statistics : Statistics
+        Status, time reached, steps.
+
+    Examples
+    --------
+    >>> lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
+    >>> response = nlctl.sensitivity_response(lag, [0, 1], 1.0, with_respect_to=["lag.T"])
+    >>> print(round(float(response["v", "lag.T"][-1]), 6))  # -exp(-1 / T) / T^2
+    -0.541341
+    """
+
+    time: np.ndarray
+    signals: tuple[str, ...]
+    with_respect_to: tuple[str, ...]
+    values: np.ndarray
+    derivatives: np.ndarray
+    scale: np.ndarray
+    missing: tuple[NoDerivative, ...] = ()
+    statistics: Any = field(default=None)
+
+    @property
+    def success(self) -> bool:
+        """Whether there are derivatives up to the end."""
+        return not self.missing
+
+    @property
+    def message(self) -> str | None:
+        """Why there are none from some time on, in words."""
+        return "; ".join(map(str, self.missing)) or None
+
+    def __getitem__(self, names: tuple[str, str]) -> np.ndarray:
+        signal, quantity = names
+        if signal not in self.signals:
+            raise unknown("signal", str(signal), self.signals, "of this response")
+        if quantity not in self.with_respect_to:
+            raise unknown("quantity", str(quantity), self.with_respect_to, "of this response")
+        place = self.signals.index(signal), self.with_respect_to.index(quantity)
+        return self.derivatives[place]
+
+    @as_annotated
+    def to_pandas(self) -> pd.DataFrame:
+        """Return everything over time as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each time: ``time``, the signals, and their derivatives with names such as
+            ``d(y)/d(law.beta)``.
+        """
+        import pandas as pd
+
+        columns = {"time": self.time, **dict(zip(self.signals, self.values, strict=True))}
+        for i, signal in enumerate(self.signals):
+            for j, quantity in enumerate(self.with_respect_to):
+                columns[f"d({signal})/d({quantity})"] = self.derivatives[i, j]
+        return pd.DataFrame(columns)
+
+    def __repr__(self) -> str:
+        t = self.time
+        lines = [
+            f"Derivatives of a run: {counted(t.size, 'time')} from {t[0]:g} to {t[-1]:g} s",
+            f"  of               {', '.join(self.signals)}",
+            f"  with respect to  {', '.join(self.with_respect_to)}",
+        ]
+        lines += [f"  {each}" for each in self.missing]
+        return "\n".join(lines)

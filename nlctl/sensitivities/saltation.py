@@ -1,0 +1,452 @@
+"""How derivatives jump where something happens at a time that moves with what they are taken by.
+
+At a time t* the states become x+ = R(x-), and flow with f- before and f+ behind.  Derivatives at
+a fixed time, S, then jump to
+
+    S+ = R' (S- + f- t*') - f+ t*',     t*' = -(g_x S- + g_p) / (g_x f- + g_t),
+
+where R' takes time and parameters along, g(t*, x-) = 0 says when it happens, and ' is the
+derivative by what S is taken by (Aizerman, Gantmakher, Quarterly Journal of Mechanics and Applied
+Mathematics 11, 1958; Filippov, Differential Equations with Discontinuous Righthand Sides, 1988:
+both by name only).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from ..expressions.graph import Expr, Graph, needed
+from ..native.sliding.pieces import replaced_parts
+from .directions import Direction, SomeRows, Taken, rows_replaced
+from .places import StatePlaces
+from .sides import KeptSide, KeptSides
+from .source import EquationParts
+
+__all__ = ["Saltation"]
+
+_AGREE = 1e-6  # derivatives of a time by two conditions that are one
+_NOTICED = 1e-7  # of the rates: a smaller jump is rounding
+_FAR = 1e300
+_WAY = "way"  # the array that stands for the derivatives of the states
+_STILL = 1e-4  # of squares of what is known of a number: it does not move
+
+
+@dataclass(frozen=True, kw_only=True)
+class When:
+    """How the time at which something happens moves.
+
+    Attributes
+    ----------
+    moves : list of Expr
+        Its derivative by each quantity.
+    grazes : Expr
+        Whether what it depends on is there at a rate of 0.
+    apart : Expr
+        Whether two conditions say different things.
+    happens : Expr
+        Whether anything happens at a time that moves.
+    """
+
+    moves: list[Expr]
+    grazes: Expr
+    apart: Expr
+    happens: Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """A condition that may have been met.
+
+    Attributes
+    ----------
+    met : Expr
+        Whether it was.
+    moves : list of Expr
+        The derivative by each quantity of the time at which it was.
+    grazes : Expr
+        Whether it was at a rate of 0.
+    """
+
+    met: Expr
+    moves: list[Expr]
+    grazes: Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saltation:
+    """What becomes of derivatives at conditions and resets.
+
+    Attributes
+    ----------
+    source : EquationParts
+    sides : KeptSides
+    places : StatePlaces
+    seeds : sequence of Direction
+        In which direction everything goes by each quantity.
+    """
+
+    source: EquationParts
+    sides: KeptSides
+    places: StatePlaces
+    seeds: Sequence[Direction]
+
+    def at_conditions(self) -> list[SomeRows]:
+        """Return what follows the states where a side has been left."""
+        source, graph, places = self.source, self.source.graph, self.places
+        arriving = self.sides.earlier([e for e, _ in source.arriving])
+        sent = self._differ([*zip(arriving, source.arriving, strict=True)])
+        before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
+        behind = source.moving(source.flow, source.committed)
+        jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
+        when = self._when_left(graph.op("or", jumps, sent))
+        rows: list[SomeRows] = []
+        broken = graph.op("or", when.grazes, when.apart)
+        for j, move in enumerate(when.moves):
+            for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
+                if a is not b:
+                    s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
+                rows.append((graph.op("select", broken, graph.const(0.0), s), size))
+        rows += self.sides.now
+        rows.append((self._first(places.together, when.apart), 1))
+        rows.append((self._first(places.grazing, when.grazes), 1))
+        rows.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        return rows
+
+    def at_reset(
+        self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
+    ) -> list[SomeRows]:
+        """Return what follows the states where a block jumps.
+
+        Parameters
+        ----------
+        begin : int
+            The first of its states.
+        states : sequence
+            What they become.
+        guards : sequence of Expr
+            Its guards.
+        """
+        source, graph, places = self.source, self.source.graph, self.places
+        before = source.moving(source.flow, self.sides.kept(source.committed))
+        rows: dict[int, Expr] = {}
+        for expr, size in states:
+            rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
+        rows |= self._carried_after(rows)
+        behind = self._after(rows, source.moving(source.flow, source.committed))
+        later = self._after(rows, source.arriving)
+        sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
+        when = self._when_fallen(guards)
+        together = graph.op("lt", self.sides.margin, graph.const(0.0))
+        broken, found = graph.op("or", when.grazes, together), []
+        for j, move in enumerate(when.moves):
+            found += self._jumped(j, rows, before, behind, move, broken)
+        found.append((self._first(places.grazing, when.grazes), 1))
+        found.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        found.append((graph.leaf("t", 0, None), 1))
+        found.append((self._first(places.at_reset, together), 1))
+        kept = {m: rows.get(m, kept) for m, kept in self.sides.memories.items()}
+        return [*found, *((e, 1) for e in self.sides.kept(list(kept.values())))]
+
+    @cached_property
+    def turning(self) -> list[tuple[Expr, Expr]]:
+        """What falls through 0 where a level turns away from 0, and whether it has touched it.
+
+        That is where d(level^2) / dt rises through 0: at conditions that are met, and where one is
+        nearly met.  With memories that switch, what is at rest has levels that are noise, and
+        nothing is looked for.
+        """
+        graph, found = self.source.graph, []
+        for side in () if self.source.switched else self.sides.sides:
+            for k in range(0 if side.timed else side.rows):
+                level, extent = (graph.item(e, k) for e in (side.here.level, side.here.extent))
+                yes = self._jumps_at(side)
+                rate, cause = self._met(yes, level, extent, self.source.flow)
+                if rate is None:
+                    continue
+                noise = self._noise(extent)
+                still = graph.op("mul", graph.const(_STILL), graph.op("mul", noise, noise))
+                apart = graph.op("sub", still, graph.op("mul", level, rate))
+                near = graph.op("le", graph.op("absolute", level), noise)
+                touched = graph.op("and", near, cause.grazes)
+                found.append((apart, graph.op("and", touched, cause.met)))
+        return found
+
+    def _jumps_at(self, side: KeptSide) -> Expr:
+        """Return whether the flow would be another on the other side of a comparison."""
+        graph, node = self.source.graph, side.node
+        if node is None or node.kind != "b":
+            return graph.const(True)
+        flow = self.source.flow
+        exprs = replaced_parts(graph, [e for e, _ in flow], {node: graph.op("not", node)})
+        return self._differ([(e, piece) for e, piece in zip(exprs, flow, strict=True)])
+
+    def at_touch(self) -> Expr:
+        """Return when a condition was first touched, where a level has turned."""
+        graph, touched = self.source.graph, self.source.graph.const(False)
+        for _, each in self.turning:
+            touched = graph.op("or", touched, each)
+        return self._first(self.places.grazing, touched)
+
+    def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
+        """Return the derivative of an expression in a direction.
+
+        Parameters
+        ----------
+        level : Expr
+        seed : Direction
+        """
+        return self.source.slopes([level], seed)
+
+    def at_turns(self) -> dict[int, Expr]:
+        """Return what derivatives of memories become where these turn, by their states."""
+        places, carried = self.places, self.source.carried
+        return {
+            places.derivative(j) + m: self._kept(j, m, turned=True)
+            for j in range(places.by)
+            for m in carried
+        }
+
+    # -- states ----------------------------------------------------------------------------------
+
+    def _states(self, j: int) -> list[SomeRows]:
+        """Return the derivatives of all states by a quantity, in the pieces of the flow."""
+        graph, row, found = self.source.graph, self.places.derivative(j), []
+        for _, size in self.source.flow:
+            found.append((graph.leaf("x", row, size if size > 1 else None), size))
+            row += size
+        return rows_replaced(graph, found, {m: self._kept(j, m) for m in self.source.carried})
+
+    def _kept(self, j: int, m: int, turned: bool = False) -> Expr:
+        """Return the derivative of a memory, which while it is carried along nobody keeps.
+
+        A step ends a little behind where it has turned.
+        """
+        graph = self.source.graph
+        kept = self.sides.memories[m]
+        become = self.source.carried[m]
+        (change,) = self.change(become, self.seeds[j])
+        found = graph.const(0.0) if change is None else change
+        if turned and change is not None:
+            late, flowing = self._late(become), list(self.source.flow)
+            for i in range(self.places.by):
+                rates = self.source.slopes([e for e, _ in self.source.flow], self.seeds[i])
+                zero = graph.const(0.0)
+                sizes = (size for _, size in self.source.flow)
+                flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
+            forward = self.source.time(flowing, known=False)
+            (rate,) = self.source.slopes([change], forward)
+            if rate is not None:
+                found = graph.op("sub", found, graph.op("mul", late, rate))
+        (found,) = self.sides.kept([found])
+        moved = graph.op("ne", graph.leaf("x", m, None), kept)
+        own = graph.leaf("x", self.places.derivative(j) + m, None)
+        return graph.op("select", moved, found, own)
+
+    def _late(self, become: Expr) -> Expr:
+        """Return how long ago what carries a memory along has turned, 0 at a break.
+
+        Where it turns is located by a difference of rates: a little too early or too late.
+        """
+        graph, source = self.source.graph, self.source
+        zero = graph.const(0.0)
+        forward = source.time(source.flow, known=False)
+        (rate,) = self.source.slopes([become], forward)
+        (bend,) = self.source.slopes([rate or zero], forward)
+        if bend is None:
+            return zero
+        late = graph.op("div", rate or zero, bend)
+        longest = graph.leaf("p", source.extended.slot("late").offset, None)
+        recent = graph.op("le", graph.op("absolute", late), longest)
+        return graph.op("select", recent, late, zero)
+
+    def _jumped(
+        self,
+        j: int,
+        rows: dict[int, Expr],
+        before: Sequence[SomeRows],
+        behind: Sequence[SomeRows],
+        move: Expr,
+        broken: Expr,
+    ) -> list[SomeRows]:
+        """Return R' (S + f- t*') - f+ t*' of all states."""
+        graph, source = self.source.graph, self.source
+        arriving = [
+            (graph.op("add", s, graph.op("mul", a, move)), size)
+            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
+        ]
+        seed, moving = self.seeds[j], source.time(arriving, move)
+        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
+        changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
+        state, left = graph.joined(arriving), graph.joined(list(behind))
+        found = []
+        for k in range(self.places.states):
+            moved = changes[k] if k in changes else graph.item(state, k)
+            moved = graph.op("sub", moved, graph.op("mul", graph.item(left, k), move))
+            found.append((graph.op("select", broken, graph.const(0.0), moved), 1))
+        return found
+
+    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
+        """Return the derivatives of expressions, with memories as they are kept.
+
+        The derivatives of the states are put in last: what they say of memories stays.
+        """
+        graph, source = self.source.graph, self.source
+
+        def place(start: int, step: int, size: int | None) -> Expr | None:
+            if start >= self.places.states:
+                return None
+            return graph.node("leaf", data=(_WAY, start, step), size=size, varies=True)
+
+        made = source.slopes(exprs, Direction(of={**of, "x": place}))
+        zero = graph.const(0.0)
+        found = self.sides.kept([e or zero for e in made])
+        leaves = [e for e in needed(found) if e.op == "leaf" and e.data[0] == _WAY]
+        ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
+        return replaced_parts(graph, found, ways)
+
+    def _carried_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
+        """Return what becomes of memories that are carried along where other states jump.
+
+        First they are what has carried them until then.
+        """
+        carried = self.source.carried
+        return {
+            m: self.source.with_states([become], {**rows, m: become})[0]
+            for m, become in carried.items()
+        }
+
+    def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
+        """Return expressions behind a jump of some states, and what memories switch to by it."""
+        source, carried = self.source, self.source.carried
+        rows = {k: self.sides.kept([e])[0] if k in carried else e for k, e in rows.items()}
+        held = [
+            (m, c) for m, c in zip(source.program.memory, source.committed, strict=True)
+            if m in source.switched
+        ]  # fmt: skip
+        switched = source.with_states([c for _, c in held], rows)
+        instead = {**rows, **dict(zip((m for m, _ in held), switched, strict=True))}
+        made = source.with_states([e for e, _ in pieces], instead)
+        return [(e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+
+    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]]) -> Expr:
+        """Return whether expressions differ by more than rounding."""
+        graph = self.source.graph
+        apart = extent = graph.const(0.0)
+        for a, (b, size) in pairs:
+            if a is b:
+                continue
+            sizes = [graph.op("absolute", e) for e in (graph.op("sub", a, b), a, b)]
+            parts = [graph.sum(e, size) if size > 1 else e for e in sizes]
+            apart = graph.op("add", apart, parts[0])
+            extent = graph.op("add", extent, graph.op("add", *parts[1:]))
+        return graph.op("gt", apart, graph.op("mul", graph.const(_NOTICED), extent))
+
+    def _first(self, place: int, happens: Expr) -> Expr:
+        """Return when something has first happened, now at the latest if it does."""
+        graph = self.source.graph
+        known, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
+        return graph.op("select", happens, graph.op("minimum", known, now), known)
+
+    # -- when ------------------------------------------------------------------------------------
+
+    def _when_left(self, jumps: Expr) -> When:
+        """Return how the time moves at which sides have been left; a clock's does not."""
+        graph = self.source.graph
+        last = graph.leaf("x", self.places.last, None)
+        free = graph.op("and", graph.op("ne", graph.leaf("t", 0, None), last), jumps)
+        causes = []
+        for side in self.sides.sides:
+            for k in range(side.rows):
+                kept, now, level, extent = (
+                    graph.item(e, k)
+                    for e in (side.kept, side.before.now, side.before.level, side.before.extent)
+                )
+                left = graph.op("and", graph.op("ne", kept, now), free)
+                rate, made = self._met(left, level, extent, self.sides.flow_before)
+                causes += [made] if rate is not None else []
+        return self._of_causes(causes)
+
+    def _when_fallen(self, guards: Sequence[Expr]) -> When:
+        """Return how the time moves at which a guard has fallen: the nearest to 0."""
+        graph = self.source.graph
+        far = nearest = graph.const(_FAR)
+        yes, known = graph.const(True), []
+        for guard in guards:
+            size = graph.op("absolute", guard)
+            rate, made = self._met(yes, guard, size, self.source.flow)
+            if rate is not None:
+                fallen = graph.op("lt", guard, graph.const(0.0))
+                ago = graph.op("absolute", graph.op("div", guard, rate))
+                ago = graph.op("select", fallen, ago, far)
+                known.append((ago, made))
+                nearest = graph.op("minimum", nearest, ago)
+        return self._of_causes(
+            [replace(made, met=graph.op("le", ago, nearest)) for ago, made in known]
+        )
+
+    def _met(
+        self, met: Expr, level: Expr, extent: Expr, flow: Sequence[SomeRows]
+    ) -> tuple[Expr | None, Cause]:
+        """Return the rate of a level, None where it stands still, and what it is the cause of."""
+        graph, source = self.source.graph, self.source
+        forward = source.time(flow)
+        (rate,) = self.source.slopes([level], forward)
+        if rate is None:
+            return None, Cause(met=met, moves=[], grazes=graph.const(False))
+        (bend,) = self.source.slopes([rate], source.time(flow, known=False))
+        noise = self._noise(extent)
+        bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
+        least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)
+        grazes = graph.op("le", graph.op("mul", rate, rate), least)
+        moves = []
+        for seed in self.seeds:
+            (change,) = self.change(level, seed)
+            zero = graph.const(0.0)
+            moves.append(graph.op("neg", graph.op("div", change, rate)) if change else zero)
+        return rate, Cause(met=met, moves=moves, grazes=grazes)
+
+    def _noise(self, extent: Expr) -> Expr:
+        """Return how well a number of some size is known."""
+        graph, slot = self.source.graph, self.source.extended.slot
+        rtol, atol = (graph.leaf("p", slot(name).offset, None) for name in ("rtol", "atol"))
+        return graph.op("add", graph.op("mul", rtol, extent), atol)
+
+    def _of_causes(self, causes: Sequence[Cause]) -> When:
+        """Return how the time moves, by the first condition that was met at a rate.
+
+        What is left of a state at rest, such as a velocity that sticks, may change its sign where
+        something else sets it in motion.  That is met at no rate, and says nothing.
+        """
+        graph = self.source.graph
+        no, zero = graph.const(False), graph.const(0.0)
+        moves, grazes, moving = [zero] * self.places.by, no, no
+        for cause in reversed(causes):
+            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
+            pairs = zip(cause.moves, moves, strict=True)
+            moves = [graph.op("select", met, a, b) for a, b in pairs]
+            moving = graph.op("or", moving, met)
+            grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
+        grazes = graph.op("and", grazes, graph.op("not", moving))
+        apart = happens = no
+        for cause in causes:
+            met = graph.op("and", cause.met, graph.op("not", cause.grazes))
+            for a, b in zip(cause.moves, moves, strict=True):
+                gap = graph.op("absolute", graph.op("sub", a, b))
+                size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
+                differs = graph.op("gt", gap, graph.op("mul", graph.const(_AGREE), size))
+                apart = graph.op("or", apart, graph.op("and", met, differs))
+        for move in moves:
+            happens = graph.op("or", happens, graph.op("ne", move, zero))
+        return When(moves=moves, grazes=grazes, apart=apart, happens=happens)
+
+
+def _sum(graph: Graph, one: Taken, other: Taken) -> Taken:
+    """Return the sum of two directions."""
+
+    def both(start: int, step: int, size: int | None) -> Expr | None:
+        a, b = one(start, step, size), other(start, step, size)
+        return graph.op("add", a, b) if a is not None and b is not None else a or b
+
+    return both

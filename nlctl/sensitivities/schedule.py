@@ -1,0 +1,175 @@
+"""A diagram's schedule with room for derivatives: rates of inputs, and of what is delayed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..blocks import block
+from ..delays import TransportDelay
+from ..native import Compiled
+from ..native.diagram.nodes import Node
+from ..native.diagram.parameters import Slot, length
+from ..native.diagram.schedule import Schedule
+from ..native.diagram.wiring import Signal
+
+__all__ = ["Extended", "extended", "stand_in"]
+
+
+_OWNERS = 3  # blocks of the derivatives' own: see `Extended.owner`
+
+
+class ScheduleWithRates(Schedule):
+    """A schedule whose runs give the rates of all inputs, too."""
+
+    @property
+    def rates(self) -> int:
+        """Number of the inputs whose rates are given."""
+        return self.system.ninputs or 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extended:
+    """A schedule with a line for the derivatives of each delayed signal.
+
+    Attributes
+    ----------
+    schedule : Schedule
+    layout : mapping
+        StatePlaces of all parameters, behind those of the diagram.
+    owner : int
+        The block that conditions belong to; memories that turn belong to the next, and what
+        turns before a condition to the one behind.
+    lines : int
+        Number of delayed signals.
+    """
+
+    schedule: Schedule
+    layout: dict[int, dict[str, Slot]]
+    owner: int
+    lines: int
+
+    def line(self, j: int, i: int) -> int:
+        """Return which line the derivative by quantity `j` of delayed signal `i` has."""
+        return self.lines * (1 + j) + i
+
+    def slot(self, name: str) -> Slot:
+        """Return the place of a parameter of this."""
+        return self.layout[self.owner][name]
+
+
+def stand_in(system: Any, states: int, outputs: int) -> Any:
+    """Return a system that says how many states and outputs a program has."""
+    return ct.NonlinearIOSystem(
+        _nothing,
+        _nothing,
+        name=system.name,
+        states=states,
+        inputs=system.ninputs or 0,
+        outputs=outputs,
+        dt=system.dt,
+    )
+
+
+def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
+    """What a system computes that only says how large it is."""
+    return np.zeros(0)
+
+
+def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
+    """Return the schedule of a diagram with room for its derivatives by so many quantities.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    outputs : sequence of mapping
+        Combinations of signals that are wanted.
+    by : int
+    """
+    read = compiled.schedule
+    own, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
+    delays = [_derivative_of(read, i, j) for j in range(by) for i in range(len(read.lines))]
+    nothing = Node(
+        path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
+        inputs=(), direct=np.zeros((0, 0), dtype=bool),
+    )  # fmt: skip
+    nodes = (*read.nodes, *delays, *(nothing,) * _OWNERS)
+    given = {f.name: getattr(read, f.name) for f in fields(Schedule)}
+    given |= {
+        "system": stand_in(read.system, read.system.nstates or 0, len(outputs)),
+        "nodes": nodes,
+        "order": (*read.order, *range(own, len(nodes))),
+        "unknown": (*read.unknown, *(frozenset() for _ in range(own, len(nodes)))),
+        "outputs": (*outputs, *arriving),
+        "lines": (*read.lines, *(Signal(own + i, 0) for i in range(len(delays)))),
+        "watched": (),
+    }
+    return Extended(
+        schedule=ScheduleWithRates(**given), layout=_layout(compiled, len(delays), by),
+        owner=len(nodes) - _OWNERS, lines=len(read.lines),
+    )  # fmt: skip
+
+
+def _derivative_of(read: Schedule, i: int, j: int) -> Node:
+    """Return the delay of a derivative: like that of the signal, and 0 before the run."""
+    spec = read.nodes[read.lines[i].block or 0].system.current_spec
+    name = f"derivative_{j}_{i}"
+    made = TransportDelay(delay=spec.delay, varying=spec.varying)
+    return Node(
+        path=name, system=block(made, name), state_offset=read.system.nstates or 0,
+        inputs=({},), direct=np.zeros((1, 1), dtype=bool),
+    )  # fmt: skip
+
+
+def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slot]]:
+    """Return the places of all parameters: those of the diagram stay where they are."""
+    before, own = compiled.program.layout, len(compiled.schedule.nodes)
+    at, found = length(before), {i: dict(before[i]) for i in range(own)}
+    for i in range(own, own + delays):
+        found[i] = {
+            name: Slot(name=name, offset=at + k, shape=(), kind="f")
+            for k, name in enumerate(("delay", "before"))
+        }
+        at += 2
+    found[own + delays] = {
+        "scale": Slot(name="scale", offset=at, shape=(by,), kind="f"),
+        "rtol": Slot(name="rtol", offset=at + by, shape=(), kind="f"),
+        "atol": Slot(name="atol", offset=at + by + 1, shape=(), kind="f"),
+        "late": Slot(name="late", offset=at + by + 2, shape=(), kind="f"),
+    }
+    found |= {own + delays + k: {} for k in range(1, _OWNERS)}
+    for k in range(len(compiled.schedule.samplings)):
+        found[own + delays + _OWNERS + k] = dict(before[own + k])
+    return found
+
+
+def with_derivatives(
+    compiled: Compiled, made: Extended, states: int, outputs: int, by: int
+) -> Schedule:
+    """Return the schedule of the program: what arrives, and what leaves which line at once.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    made : Extended
+    states, outputs : int
+        Numbers of the program's.
+    by : int
+    """
+    from ..native.histories import direct_lines
+
+    direct, lines = direct_lines(compiled.schedule), made.schedule.lines
+    arriving = []
+    for j in range(-1, by):
+        for row in direct:
+            reached = [made.line(other, int(i)) for i in np.flatnonzero(row) for other in {-1, j}]
+            arriving.append({lines[k]: 1.0 for k in reached})
+    return replace(
+        made.schedule,
+        system=stand_in(compiled.system, states, outputs),
+        outputs=(*({} for _ in range(outputs)), *arriving),
+    )

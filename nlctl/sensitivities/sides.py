@@ -1,0 +1,183 @@
+"""The sides of all jumps of a diagram: which are kept, and the equations on these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+
+from ..expressions.graph import Expr, needed
+from ..native.sliding.pieces import replaced_parts
+from .branches import Branch, branch_of
+from .directions import SomeRows
+from .source import EquationParts
+
+__all__ = ["KeptSide", "KeptSides", "sides_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptSide:
+    """One jump, or as many as it has elements.
+
+    Attributes
+    ----------
+    kept : Expr
+        The side that is kept, a state.
+    here : Branch
+        By what everything is now.
+    before : Branch
+        By what everything was on the sides that are kept.
+    timed : bool
+        Whether it is of t alone.
+    node : Expr or None
+        The operation in the equations.
+    """
+
+    kept: Expr
+    here: Branch
+    before: Branch
+    timed: bool
+    node: Expr | None = None
+
+    @property
+    def rows(self) -> int:
+        """Number of its elements."""
+        return self.kept.size or 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptSides:
+    """The sides of all jumps.
+
+    Attributes
+    ----------
+    source : EquationParts
+    sides : tuple of KeptSide
+    memories : mapping
+        Of states of memories, what is kept of them: far away while they are carried along, and
+        where they stand otherwise.
+    before : mapping
+        What stands, on the sides that are kept, for parts of the equations.
+    """
+
+    source: EquationParts
+    sides: tuple[KeptSide, ...]
+    memories: dict[int, Expr]
+    before: dict[Expr, Expr]
+
+    @property
+    def rows(self) -> int:
+        """Number of all that is kept."""
+        return sum(side.rows for side in self.sides) + len(self.memories)
+
+    @property
+    def now(self) -> list[SomeRows]:
+        """What is to be kept from now on."""
+        memories = [(self.source.graph.leaf("x", m, None), 1) for m in self.memories]
+        return [*((side.here.now, side.rows) for side in self.sides), *memories]
+
+    @cached_property
+    def flow_before(self) -> list[SomeRows]:
+        """The derivatives of the states on the sides that are kept."""
+        flow = self.source.flow
+        made = self.earlier([e for e, _ in flow])
+        return [(e, size) for e, (_, size) in zip(made, flow, strict=True)]
+
+    def earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions on the sides that are kept."""
+        instead = self.source.leaves(exprs, self.memories)
+        return replaced_parts(self.source.graph, exprs, {**instead, **self.before})
+
+    def kept(self, exprs: Sequence[Expr]) -> list[Expr]:
+        """Return expressions with the memories that are kept."""
+        return self.source.with_states(exprs, self.memories)
+
+    @property
+    def watches(self) -> bool:
+        """Whether there is anything that may jump in the equations."""
+        return bool(self.sides or self.source.switched)
+
+    @property
+    def first_memory(self) -> int:
+        """Where, behind all sides, what is kept of memories begins."""
+        return sum(side.rows for side in self.sides)
+
+    @property
+    def carried(self) -> Expr:
+        """What is at least 0 as long as every memory that is carried along is where it was."""
+        graph, same = self.source.graph, self.source.graph.const(True)
+        for m, kept in self.memories.items():
+            if m not in self.source.switched:
+                same = graph.op("and", same, graph.op("eq", graph.leaf("x", m, None), kept))
+        return graph.op("select", same, graph.const(1.0), graph.const(-1.0))
+
+    @property
+    def margin(self) -> Expr:
+        """What is at least 0 as long as nothing has left the side that is kept."""
+        graph, found = self.source.graph, []
+        one, behind = graph.const(1.0), graph.const(-1.0)
+        for side in self.sides:
+            for k in range(side.rows):
+                kept, now = graph.item(side.kept, k), graph.item(side.here.now, k)
+                if side.timed:
+                    same = graph.op("eq", kept, now)
+                    found.append(graph.op("select", same, one, behind))
+                else:
+                    found.append(graph.item(side.here.margin, k))
+        for m in self.source.switched:
+            same = graph.op("eq", graph.leaf("x", m, None), self.memories[m])
+            found.append(graph.op("select", same, one, behind))
+        return reduce(lambda a, b: graph.op("minimum", a, b), found, one)
+
+
+def sides_of(source: EquationParts, first: int) -> KeptSides:
+    """Return the sides of all jumps of a diagram.
+
+    Parameters
+    ----------
+    source : EquationParts
+    first : int
+        State from which on they are kept.
+    """
+    graph = source.graph
+    wanted = [(node, node.op, node.args) for node in source.jumps]
+    wanted += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]
+    sizes = [next((a.size for a in args if a.size), None) for _, _, args in wanted]
+    behind = first + sum(size or 1 for size in sizes)
+    memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(source.program.memory)}
+    before: dict[Expr, Expr] = {}
+    found, timed = [], _timed([e for _, _, args in wanted for e in args])
+    for (node, op, args), size in zip(wanted, sizes, strict=True):
+        kept, first = graph.leaf("x", first, size), first + (size or 1)
+        leaves = source.leaves(args, memories)
+        earlier = replaced_parts(graph, list(args), {**leaves, **before})
+        there = branch_of(graph, op, earlier, kept)
+        found.append(KeptSide(
+            kept=kept, here=branch_of(graph, op, args, kept), before=there, node=node,
+            timed=all(a in timed or not a.varies for a in args),
+        ))  # fmt: skip
+        if node is not None:
+            before[node] = there.value
+    return KeptSides(source=source, sides=tuple(found), memories=memories, before=before)
+
+
+def _of_memories(source: EquationParts) -> list[Expr]:
+    """Return the switching functions of the blocks whose memories jump."""
+    nodes = source.extended.schedule.nodes
+    own = {
+        i for i, node in enumerate(nodes) for m in source.switched
+        if node.state_offset <= m < node.state_offset + node.size
+    }  # fmt: skip
+    pairs = zip(source.owners, source.switching, strict=True)
+    return [expr for i, expr in pairs if i in own and expr.varies]
+
+
+def _timed(exprs: Sequence[Expr]) -> set[Expr]:
+    """Return which parts vary with t and with nothing else."""
+    found: set[Expr] = set()
+    for node in needed(exprs):
+        own = node.op == "leaf" and node.data[0] == "t"
+        moved = [a for a in node.args if a.varies]
+        if own or (moved and all(a in found for a in moved) and node.op not in ("call", "solve")):
+            found.add(node)
+    return found

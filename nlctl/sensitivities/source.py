@@ -1,0 +1,244 @@
+"""What a diagram computes, in the parts that its derivatives are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..errors import CompileError
+from ..expressions.arrays import Tracer
+from ..expressions.continuity import may_jump
+from ..expressions.graph import Expr, Graph, Untraceable, needed
+from ..expressions.trace import trace
+from ..native import Compiled
+from ..native.diagram.nodes import Node
+from ..native.diagram.parameters import slots_of
+from ..native.diagram.program import Program, count_switching_functions, memory
+from ..native.diagram.trace import traced_arguments
+from ..native.equations.blocks import Equations, equations
+from ..native.sliding.pieces import replaced_parts
+from ..sliding.blocks import slides
+from .branches import jumping
+from .directions import (
+    Direction,
+    SomeRows,
+    from_time,
+    one_sided,
+    rows_replaced,
+    slopes,
+    taken,
+)
+from .kinks import only_bends
+from .schedule import Extended
+
+__all__ = ["EquationParts", "equation_parts"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquationParts:
+    """The equations of a diagram, row by row.
+
+    Attributes
+    ----------
+    found : Equations
+    extended : Extended
+    program : Program
+        Of the diagram itself.
+    inputs : int
+        Number of the diagram's inputs.
+    switching : list of Expr
+        Switching functions that blocks declare.
+    guards : list of Expr
+    committed : list of Expr
+        What each memory would become.
+    switched : frozenset of int
+        States of memories that jump, and are not carried along.
+    owners : tuple of int
+        The block of each switching function.
+    p : ndarray
+        Parameters near which the equations are looked at.
+    """
+
+    found: Equations
+    extended: Extended
+    program: Program
+    inputs: int
+    switching: list[Expr]
+    guards: list[Expr]
+    committed: list[Expr]
+    switched: frozenset[int]
+    owners: tuple[int, ...]
+    p: np.ndarray
+
+    @property
+    def graph(self) -> Graph:
+        """Where the expressions are kept."""
+        return self.found.graph
+
+    @property
+    def carried(self) -> dict[int, Expr]:
+        """What memories would become that are carried along, by their states."""
+        pairs = zip(self.program.memory, self.committed, strict=True)
+        return {m: expr for m, expr in pairs if m not in self.switched}
+
+    @cached_property
+    def flow(self) -> list[SomeRows]:
+        """The derivatives of the states; memories stand still."""
+        still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
+        return rows_replaced(self.graph, self.found.pieces("dx"), still)
+
+    @cached_property
+    def arriving(self) -> list[SomeRows]:
+        """What arrives at the delays."""
+        return _behind(self.graph, self.found.pieces("y"), len(self.extended.schedule.outputs)
+                       - self.extended.lines)  # fmt: skip
+
+    @cached_property
+    def jumps(self) -> list[Expr]:
+        """The operations at which the flow may jump.
+
+        Raises
+        ------
+        CompileError
+            If one is in an algebraic loop.
+        """
+        inside = [e for each in self.found.fixed_points.values() for e in each]
+        if jumping(inside):
+            raise CompileError(
+                "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
+                "on both sides; put a lag into the loop"
+            )
+        roots = [e for e, _ in (*self.flow, *self.arriving)]
+        roots += self.carried.values()
+        return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
+
+    def time(
+        self, pieces: Sequence[SomeRows], time: Expr | None = None, known: bool = True
+    ) -> Direction:
+        """Return the direction in which everything goes with these rates of the states.
+
+        By `time`, 1 if it is None.  If the rates of delayed signals need not be `known`, they
+        count as 0.
+        """
+        first = self.extended.schedule.ninputs - self.extended.schedule.rates
+        lines = range(self.inputs, first if known else self.inputs)
+        outside = from_time(self.graph, time, self.inputs, first, lines)
+        return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
+
+    def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
+        """Return the rates of all states, those of memories that are carried along included.
+
+        Parameters
+        ----------
+        flow : sequence
+            The rates of the others.
+        committed : sequence of Expr
+            What the memories would become.
+        """
+        pairs = zip(self.program.memory, committed, strict=True)
+        carried = {m: expr for m, expr in pairs if m not in self.switched}
+        if not carried:
+            return list(flow)
+        direction = self.time(flow)
+        ahead = one_sided(self.graph, list(carried.values()), direction)
+        rates = self.slopes(ahead, direction)
+        zero = self.graph.const(0.0)
+        return rows_replaced(self.graph, flow, dict(zip(carried, (r or zero for r in rates),
+                                                        strict=True)))  # fmt: skip
+
+    def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
+        """Return the derivatives of expressions along a direction, None where they are 0."""
+        return slopes(self.graph, exprs, direction, self.found.fixed_points)
+
+    def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
+        """Return expressions with others in the places of some states."""
+        return replaced_parts(self.graph, exprs, self.leaves(exprs, instead))
+
+    def leaves(self, exprs: Iterable[Expr], instead: Mapping[int, Expr]) -> dict[Expr, Expr]:
+        """Return what stands for the leaves of expressions that read some states."""
+        found = {}
+        for leaf in needed(exprs):
+            if leaf.op != "leaf" or leaf.data[0] != "x":
+                continue
+            _, start, step = leaf.data
+            rows = [start + step * i for i in range(leaf.size or 1)]
+            if not any(row in instead for row in rows):
+                continue
+            parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
+            found[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+        return found
+
+
+def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> EquationParts:
+    """Return what a diagram computes.
+
+    Parameters
+    ----------
+    compiled : Compiled
+    made : Extended
+    p : ndarray
+        All parameters, those of the derivatives included.
+    """
+    program = compiled.program
+    found = equations(made.schedule, made.layout, p, program.meetings)
+    graph, first = found.graph, program.switching + found.conditions.rows
+    rows = _single(graph, found.results["g"])
+    del graph.lengths["x"]  # there are more of them now
+    nodes = compiled.schedule.nodes
+    owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
+    jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
+    return EquationParts(
+        found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
+        switching=[rows[k] for k in range(program.switching)],
+        guards=[rows[first + k] for k in range(len(program.guards))],
+        committed=list(_single(graph, found.results["m"]).values()),
+        switched=frozenset(jump), owners=tuple(owners), p=p,
+    )  # fmt: skip
+
+
+def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Expr]:
+    """Return the expression of each row of some results."""
+    found: dict[int, Expr] = {}
+    for row, array in results:
+        for expr, size in array.pieces():
+            found |= {row + k: graph.item(expr, k) for k in range(size)}
+            row += size
+    return found
+
+
+def _jumps(node: Node) -> bool:
+    """Whether the memories of a block jump, whatever its inputs do.
+
+    Raises
+    ------
+    CompileError
+        If nobody can say.
+    """
+    graph, system = Graph(), node.system
+    if slides(system):
+        return True
+    try:
+        given = traced_arguments(graph, system, slots_of(system))
+        made = trace(graph, system.spec.commit, lambda: given)
+    except Untraceable as error:
+        raise CompileError(
+            f"block '{node.path}' has a memory that is not an expression ({error}): its "
+            "derivatives are not known; take differences of runs"
+        ) from None
+    return may_jump([e for e, _ in made.pieces()])
+
+
+def _behind(graph: Graph, pieces: Sequence[SomeRows], first: int) -> list[SomeRows]:
+    """Return the rows of pieces from one on."""
+    found, row = [], 0
+    for expr, size in pieces:
+        cut = min(max(first - row, 0), size)
+        if cut < size:
+            rest = size - cut
+            part = graph.item(expr, cut) if rest == 1 else graph.part(expr, cut, 1, rest)
+            found.append((part if expr.size else expr, rest))
+        row += size
+    return found
