@@ -5,7 +5,8 @@ form f(m) + f'(X)(X - m), and by both.  Where a comparison inside the equation s
 every branch is followed and the results are united: no branch is ever picked.
 
 A function that can be traced is enclosed by machine code instead, in floats that are rounded
-outwards, and the same forms; see `analysis.intervals.machine`.  `Proof` and `Range` say which.
+outwards, and the same forms; see `nlctl.analysis.intervals.machine`.  `Proof` and `Range` say
+which.
 
 What is proved is about the equation with its parameters as doubles; arithmetic between plain
 floats inside it (``2 * np.pi``) is rounded as in every run.
