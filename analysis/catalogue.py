@@ -33,13 +33,7 @@ def block_records() -> dict[str, type]:
 
 
 def named_block(name: str) -> type:
-    """Return the block record of that name.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest ones.
-    """
+    """Return the block record of that name."""
     from nlctl.names import unknown  # it imports python-control
 
     records = block_records()

@@ -15,17 +15,7 @@ NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 def as_json(value: Any, *, null: bool = False) -> Any:
-    """Return a value as JSON can hold it.
-
-    Parameters
-    ----------
-    value : object
-        Mappings, lists, tuples and arrays are gone through; what is none of these and no number
-        becomes text.
-    null : bool, optional
-        Whether numbers that are not finite become null.  By default they become text, which
-        `from_json` reads.
-    """
+    """Return a value as JSON can hold it."""
     if isinstance(value, Mapping):
         return {str(key): as_json(part, null=null) for key, part in value.items()}
     if isinstance(value, list | tuple):

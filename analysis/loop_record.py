@@ -54,19 +54,7 @@ _MOST = 4  # differences that a sentence names
 
 
 def loop_facts(system: ct.InputOutputSystem) -> dict[str, dict[str, str]]:
-    """Return what a diagram consists of.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        As it stands; it need not compile.
-
-    Returns
-    -------
-    dict
-        ``blocks`` (a key by path), ``wiring`` (a key by diagram), ``parameters`` (text by name)
-        and ``initial_state`` (text by name, where it is not 0).
-    """
+    """Return what a diagram consists of."""
     start = zip(state_names(system), initial_state(system).tolist(), strict=True)
     wired = [p for p in places(system) if isinstance(p.system, ct.InterconnectedSystem)]
     found = {
@@ -94,17 +82,7 @@ def short_key(*things: Any) -> str:
 
 
 def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
-    """Return what the keys of a diagram's blocks cannot see: they may differ in it unnoticed.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-
-    Returns
-    -------
-    dict
-        By path of the block, in words; only blocks of which there is something to say.
-    """
+    """Return what the keys of a diagram's blocks cannot see: they may differ in it unnoticed."""
     found = {p.path or p.system.name: unseen_in(*_parts(p.system)) for p in leaves(system)}
     return _steady(system, {path: told for path, told in found.items() if told})
 
@@ -177,20 +155,7 @@ def array_text(values: Any) -> str:
 
 
 def loop_values(system: Any, end: float) -> dict[str, float | str]:
-    """Return rates of states and outputs, each summed with weights over some points.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    end : float
-        PointValues are taken at times from 0 to this (s).
-
-    Returns
-    -------
-    dict
-        By name, a rate with a prime.  Points at which a function fails are left out, and told
-        under ``"raises"`` with what it raises.
-    """
+    """Return rates of states and outputs, each summed with weights over some points."""
     start, width, own = initial_state(system), system.ninputs or 0, overridden(system)
     reach = np.maximum(1.0, abs(start)) / 4
     rates, outputs, raised = np.zeros(start.size), np.zeros(system.noutputs or 0), []

@@ -85,48 +85,6 @@ def loop_report(
     Only spans of the response are simulated, to see that it is the loop's, and rows of a study
     that are drawn.
 
-    Parameters
-    ----------
-    loop : control.InputOutputSystem
-        A diagram, of nlctl's blocks or others; or a single system.
-    title : str
-    response : control.TimeResponseData, optional
-        A run of the loop.
-    signals : sequence of str, optional
-        Outputs that are drawn; by default the first six.
-    params : mapping, optional
-        The parameters that the run was made with; by default what the response says.
-    ledger : Ledger, optional
-        Of `nlctl.analysis.lyapunov.ledger`.
-    certificate : Certificate, ModelReferenceCertificate or SlidingModeCertificate, optional
-        Of `nlctl.analysis.lyapunov.certify`.
-    study : Result, optional
-        Of `nlctl.analysis.studies.run` or `nlctl.analysis.studies.load_result`.
-    sections : sequence of Section, optional
-        One's own, of `nlctl.analysis.report`; they stand behind the run.
-    claims : sequence of Claim, optional
-        One's own; those of the study follow.
-    question, verdict : str, optional
-        What was asked, and what was found; by default what the study, the ledger and the
-        certificate say.
-    author, revision, date : str, optional
-        For the title page.
-    references : sequence of str, optional
-    command : str, optional
-        Command that makes the page again.
-
-    Returns
-    -------
-    Report
-        For `nlctl.analysis.report.write_report`, and `nlctl.analysis.report.framed` in a notebook.
-
-    Raises
-    ------
-    DiagramError
-        If the response, the ledger, the certificate or the study is of another loop.
-    UnknownNameError
-        If the loop has no output that `signals` names.
-
     Examples
     --------
     A page of one's own loop, and what of it the page says:

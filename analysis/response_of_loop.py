@@ -31,18 +31,7 @@ _LOCAL = 1e-3  # of a state's largest sample so far: python-control's default to
 
 
 def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
-    """Return the parameters of a response that differ from those of its loop.
-
-    Parameters
-    ----------
-    loop : control.InputOutputSystem
-    response : control.TimeResponseData
-
-    Returns
-    -------
-    dict
-        By name, as they are given to `nlctl.input_output_response`.
-    """
+    """Return the parameters of a response that differ from those of its loop."""
     usual, given = dict(loop.params or {}), dict(response.params or {})
     return {k: v for k, v in given.items() if not np.array_equal(usual.get(k, np.nan), v)}
 
@@ -59,21 +48,6 @@ def check_response(
     simulated as a whole, and states and outputs at twelve samples are compared.  A loop that
     differs by less is not told from this one; a response that was simulated so coarsely that it
     is wrong by more is refused too.
-
-    Parameters
-    ----------
-    loop : control.InputOutputSystem
-    response : control.TimeResponseData
-        One trace, with states.
-    params : mapping, optional
-        The parameters that it was run with; by default what it says itself.
-    names : sequence of str, optional
-        Outputs that are compared; by default all, which must be the loop's then.
-
-    Raises
-    ------
-    DiagramError
-        If it is of another loop, with the first value that differs.
     """
     params = own_parameters(loop, response) if params is None else dict(params)
     check_shape(loop, response, names)
@@ -93,22 +67,7 @@ def check_response(
 def own_outputs(
     loop: Any, response: Any, params: Mapping[str, Any]
 ) -> Iterator[tuple[int, dict[str, float]]]:
-    """Yield a loop's outputs at samples of a response, as python-control evaluates them.
-
-    Parameters
-    ----------
-    loop : control.InputOutputSystem
-    response : control.TimeResponseData
-        With states.
-    params : mapping
-
-    Yields
-    ------
-    place : int
-        Of the sample.
-    outputs : dict
-        By name.
-    """
+    """Yield a loop's outputs at samples of a response, as python-control evaluates them."""
     x, u, evaluate = _states(response), _inputs(loop, response), rates_and_outputs(loop, params)
     for place in np.unique(np.linspace(0, len(response.time) - 1, _PLACES).astype(int)):
         with np.errstate(all="ignore"):
@@ -117,20 +76,7 @@ def own_outputs(
 
 
 def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
-    """Refuse a response with another number of states, other outputs, or several traces.
-
-    Parameters
-    ----------
-    loop : control.InputOutputSystem
-    response : control.TimeResponseData
-    names : sequence of str
-        Outputs that it must have; without any, those of the loop.
-
-    Raises
-    ------
-    DiagramError
-        Which says what both have.
-    """
+    """Refuse a response with another number of states, other outputs, or several traces."""
     if response.x is None or np.ndim(response.y) != 2:
         raise DiagramError(
             f"a response of '{loop.name}' needs states and one trace, got outputs of shape "

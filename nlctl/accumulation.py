@@ -65,21 +65,7 @@ class Crowd:
 
 
 def crowd_of(times: np.ndarray, row: int, end: float, rtol: float, most: float) -> Crowd | None:
-    """Return how switches at some times accumulate, if they do.
-
-    Parameters
-    ----------
-    times : ndarray
-        Of the last switches of one condition (s), in order.
-    row : int
-        Which condition.
-    end : float
-        Of the run (s).
-    rtol : float
-        Relative tolerance of the run.
-    most : float
-        Switches to come that are not too many.
-    """
+    """Return how switches at some times accumulate, if they do."""
     if times.size < AT_LEAST:
         return None
     periods = times[2:] - times[:-2]
@@ -113,16 +99,7 @@ def tolerance_of(value: StateValue, t: float, x: np.ndarray, away: np.ndarray) -
 
 
 def accumulation_words(which: tuple[str, str], crowd: Crowd, beyond: str) -> str:
-    """Return whose switches accumulate, and how.
-
-    Parameters
-    ----------
-    which : tuple of str
-        Block, "" for none, and name of the condition.
-    crowd : Crowd
-    beyond : str
-        Why that is the end of the run.
-    """
+    """Return whose switches accumulate, and how."""
     whose = f"block '{which[0]}' ({which[1]})" if which[0] else which[1]
     left = f"{crowd.more:.2g}" if np.isfinite(crowd.more) else "no end of them"
     where = f"near t = {crowd.end:.6g} s" if crowd.ratio < _FINITE else "ever faster"

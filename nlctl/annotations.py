@@ -47,20 +47,7 @@ def as_numbers(value: Any) -> np.ndarray | None:
 
 
 def as_annotated(function: _F) -> _F:
-    """Let a function say which argument is not what its annotation says, where a call fails.
-
-    Parameters
-    ----------
-    function : callable
-        A function, or a class whose constructor is meant.
-
-    Returns
-    -------
-    callable
-        Which raises `ParameterError` in the place of errors of Python and of libraries, if an
-        argument is of another type than its annotation has, or where numbers that libraries can
-        use are needed is not finite, or an integer beyond 64 bits.
-    """
+    """Let a function say which argument is not what its annotation says, where a call fails."""
     if isinstance(function, type):
         made: Any = function
         made.__init__ = reporting(made.__init__, made.__name__)
@@ -71,16 +58,7 @@ def as_annotated(function: _F) -> _F:
 def reporting(
     function: Any, who: str, rule: Callable[[Mapping[str, Any]], str | None] | None = None
 ) -> Any:
-    """Return a function that says which argument is not as annotated.
-
-    Parameters
-    ----------
-    function : callable
-    who : str
-        Its name.
-    rule : callable, optional
-        Says of arguments by name which rule they break together.
-    """
+    """Return a function that says which argument is not as annotated."""
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:

@@ -33,13 +33,7 @@ _T = TypeVar("_T")
 
 
 def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
-    """Return an option that is one of a few words.
-
-    Raises
-    ------
-    ParameterError
-        If it is another; the nearest one is named.
-    """
+    """Return an option that is one of a few words."""
     options = list(options)
     if isinstance(value, str) and value in options:
         return value
@@ -51,13 +45,7 @@ def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
 
 
 def pairs(who: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
-    """Check that a block's signals come in pairs, one before it for each behind it.
-
-    Raises
-    ------
-    ParameterError
-        If they do not, or there are none.
-    """
+    """Check that a block's signals come in pairs, one before it for each behind it."""
     if len(inputs) != len(outputs) or not inputs:
         raise ParameterError(f"{who} needs as many inputs as outputs, got {inputs} and {outputs}")
 
@@ -72,13 +60,7 @@ def number(
     at_least: float = -np.inf,
     at_most: float = np.inf,
 ) -> float:
-    """Return a finite number as a float.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a real number, NaN, infinite, or breaks a bound.
-    """
+    """Return a finite number as a float."""
     is_number = isinstance(value, int | float | np.integer | np.floating)
     if not is_number or isinstance(value, bool):
         raise ParameterError(f"{who} needs a number for {name}, got {value!r}")
@@ -104,25 +86,13 @@ def _rule(name: str, low: tuple[float, float], high: tuple[float, float]) -> str
 
 
 def tolerances(who: str, rtol: Any, atol: Any) -> None:
-    """Check the tolerances of an integrator: with rtol >= 1 no digit of a state need be right.
-
-    Raises
-    ------
-    ParameterError
-        If one is not a number, or out of its bounds.
-    """
+    """Check the tolerances of an integrator: with rtol >= 1 no digit of a state need be right."""
     number(who, "rtol", rtol, above=0, below=1)
     number(who, "atol", atol, above=0)
 
 
 def vector(who: str, name: str, value: Any) -> np.ndarray:
-    """Return finite numbers as a float array of shape (m,).
-
-    Raises
-    ------
-    ParameterError
-        If they are no real numbers, not in one row, or one is NaN or infinite.
-    """
+    """Return finite numbers as a float array of shape (m,)."""
     array = as_numbers(value)
     if array is None or (array.ndim != 1 and array.size):
         given = repr(value) if array is None else f"shape {array.shape}"
@@ -134,42 +104,19 @@ def vector(who: str, name: str, value: Any) -> np.ndarray:
 
 
 def fraction(who: str, name: str, value: Any) -> float:
-    """Return a number between 0 and 1, both excluded.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """Return a number between 0 and 1, both excluded."""
     return number(who, name, value, above=0, below=1)
 
 
 def flag(who: str, name: str, value: Any) -> bool:
-    """Return True or False.
-
-    Raises
-    ------
-    ParameterError
-        If it is anything else, such as the text "no".
-    """
+    """Return True or False."""
     if not isinstance(value, bool | np.bool_):
         raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
     return bool(value)
 
 
 def of_type(who: str, name: str, value: Any, kind: type[_T], how: str = "") -> _T:
-    """Return a value of the kind that a function works on.
-
-    Parameters
-    ----------
-    how : str, optional
-        How such a value is made.
-
-    Raises
-    ------
-    ParameterError
-        If it is of another type.
-    """
+    """Return a value of the kind that a function works on."""
     if not isinstance(value, kind):
         made = f" ({how})" if how else ""
         raise ParameterError(
@@ -179,13 +126,7 @@ def of_type(who: str, name: str, value: Any, kind: type[_T], how: str = "") -> _
 
 
 def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]:
-    """Return a sequence of values of one kind as a tuple.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a list or tuple, or an entry is of another type.
-    """
+    """Return a sequence of values of one kind as a tuple."""
     if not isinstance(values, list | tuple):
         raise ParameterError(
             f"{who} needs {name} to be a tuple of {kind.__name__}, got {type(values).__name__}"
@@ -196,26 +137,14 @@ def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]
 
 
 def text(who: str, name: str, value: Any) -> str:
-    """Return a text that is not empty.
-
-    Raises
-    ------
-    ParameterError
-        If it is empty, or no text.
-    """
+    """Return a text that is not empty."""
     if not (isinstance(value, str) and value):
         raise ParameterError(f"{who} needs a name for {name}, got {value!r}")
     return value
 
 
 def a_function(who: str, name: str, value: Any) -> Any:
-    """Return what can be called.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot.
-    """
+    """Return what can be called."""
     if not callable(value):
         raise ParameterError(f"{who} needs a function for {name}, got {type(value).__name__}")
     return value

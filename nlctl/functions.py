@@ -50,15 +50,7 @@ def nussbaum_integral(zeta):
 def gaussian(Z, centres, widths):
     """Gaussian basis of Example 1, psi_i(Z) = exp(-(Z - mu_i)^T (Z - mu_i) / nu_i^2).
 
-    Parameters
-    ----------
-    Z : ndarray of shape (n,)
-    centres : ndarray of shape (l, n)
-    widths : ndarray of shape (l,) or (1,)
-
-    Returns
-    -------
-    ndarray of shape (l,)
+    Shapes: `Z` (n,), `centres` (l, n), `widths` (l,); returns (l,).
     """
     squared = (centres[:, 0] - Z[0]) ** 2
     for i in range(1, centres.shape[1]):
@@ -88,28 +80,6 @@ def band_limited(
 
     The signal is a sum of `components` sines with equal amplitudes, frequencies drawn one from
     each of `components` equal parts of the band, and uniform phases.
-
-    Parameters
-    ----------
-    rms : float
-        Root mean square of the signal over long times, in the signal's unit; >= 0.
-    low, high : float
-        Band in rad/s, 0 <= low < high.
-    seed : int
-        Seed of the frequencies and phases.
-    components : int, optional
-        Number of sines, >= 1.
-
-    Returns
-    -------
-    equation
-        ``noise(t) -> float``, to be used in equations of one's own, for instance in the
-        disturbance d(x, t) of a plant.
-
-    Raises
-    ------
-    ParameterError
-        If an argument breaks its rule.
     """
     omega, phase = noise_spectrum(low, high, seed, components)
     if not (np.isfinite(rms) and rms >= 0):

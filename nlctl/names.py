@@ -53,15 +53,7 @@ def base_name(name: str) -> str:
 
 
 def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[str] = ()) -> str:
-    """Return the one key of `known` that `name` means: the full path, or the end of one path.
-
-    Raises
-    ------
-    UnknownNameError
-        If nothing has that name; the nearest names are given.
-    AmbiguousNameError
-        If several paths end in `name`, or two blocks share it.
-    """
+    """Return the one key of `known` that `name` means: the full path, or the end of one path."""
     matches = [name] if name in known else [k for k in known if k.endswith("." + name)]
     if not matches:
         raise unknown(kind, name, known)

@@ -39,20 +39,6 @@ _INTERNAL = ("r", "zeta", "delta_hat", "W_norm")  # a controller of another kind
 def paper_centres(layout: Any, order: int) -> Any:
     """Return the centres that a layout name stands for, on [-10, 10]^n.
 
-    Parameters
-    ----------
-    layout : str or array_like
-        ``"diagonal"``: 27 centres on the diagonal.  ``"3x9"``, ``"3x3x3"``: a grid with that many
-        points along x1, x2, ...; fewer factors than states leave the last states out.  An array
-        of shape (l, n) is returned as it is.
-    order : int
-        Order n of the plant.
-
-    Raises
-    ------
-    ParameterError
-        If the name is none of these.
-
     Examples
     --------
     >>> len(nlctl.paper.paper_centres("3x3x3", 3)), nlctl.paper.paper_centres("diagonal", 2)[0]
@@ -85,36 +71,6 @@ def example_1(
     name: str = "example_1",
 ) -> ct.InterconnectedSystem:
     """Example 1: forced oscillator with a dead zone, n = 2.
-
-    Parameters
-    ----------
-    plant, actuator, controller, reference : record or control.InputOutputSystem, optional
-        Replace a block by one with the same signals.  Defaults: `ForcedDuffing`, `DeadZone`,
-        the paper's controller, `SumOfSines`.
-    sensor : record or control.InputOutputSystem, optional
-        A block between the plant's x1, x2 and the controller, such as `BandLimitedNoise`.
-    centres : str or array_like, optional
-        Layout of the 27 centres, see `paper_centres`; ``"diagonal"`` by default.  The paper says
-        "evenly distributed in [-10, 10] x [-10, 10]", and 27 is not a square.
-    p1 : float, optional
-        Stiffness; -0.2 as printed by default (which makes the term +0.2 x1).
-    phase : {"product", "integral"}, optional
-        Reading of cos(w t) with time-varying w: ``"product"`` is w(t) t as printed, a chirp;
-        ``"integral"`` is the integral of w.
-    name : str, optional
-        Name of the diagram.
-
-    Returns
-    -------
-    control.InterconnectedSystem
-        Outputs y, yd, e, r, u, v, zeta, delta_hat, W_norm, x1, x2.  Start it from
-        `nlctl.initial_state`.
-
-    Raises
-    ------
-    ParameterError, DiagramError
-        If a value or a block does not fit, or a choice is given together with the block that
-        it belongs to.
 
     Examples
     --------
@@ -152,28 +108,6 @@ def example_2(
 ) -> ct.InterconnectedSystem:
     """Example 2: Genesio system with backlash, n = 3.
 
-    Parameters
-    ----------
-    plant, actuator, controller, reference, sensor, name
-        As in `example_1`.  Defaults: `Genesio`, `Backlash`, the paper's controller, `SumOfSines`.
-    centres : str or array_like, optional
-        Layout of the 27 centres, see `paper_centres`; ``"3x3x3"`` by default.
-    lambdas : tuple of 2 floats, optional
-        (lambda_1, lambda_2); (2, 1) as printed, so r = e1 + 2 e2 + e3.  (1, 2) is the other
-        reading, r = 2 e1 + e2 + e3.
-    v0 : float, optional
-        Memory v(0-) of the backlash, in [-0.6, 0.72]; not given in the paper, 0 by default.
-
-    Returns
-    -------
-    control.InterconnectedSystem
-        Outputs y, yd, e, r, u, v, zeta, delta_hat, W_norm, x1, x2, x3.
-
-    Raises
-    ------
-    ParameterError, DiagramError
-        As in `example_1`.
-
     Examples
     --------
     Another actuator in the paper's loop:
@@ -208,11 +142,6 @@ EXAMPLES = {make.__name__: make for make in (example_1, example_2)}
 @as_annotated
 def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
     """Return the example that the command line and study files call ``"example-1"``.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example.
 
     Examples
     --------

@@ -250,14 +250,7 @@ def _declared(cls: type) -> dict[str, Param]:
 
 
 def check_params(spec: Any) -> None:
-    """Normalise every parameter of `spec` (floats, nested tuples) and check its bounds.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not a finite number, has the wrong number of axes or leaves its bounds, or
-        if the record's own ``check`` refuses it.
-    """
+    """Normalise every parameter of `spec` (floats, nested tuples) and check its bounds."""
     who = type(spec).__name__
     types = {f.name: f.type for f in dataclasses.fields(spec)}
     for name, rule in declared_params(spec).items():
@@ -295,13 +288,7 @@ def _normalised(who: str, name: str, value: Any, rule: Param, kind: Any) -> Any:
 
 
 def integer(who: str, name: str, value: Any, at_least: int, at_most: float = math.inf) -> int:
-    """Return `value` as an int.
-
-    Raises
-    ------
-    ParameterError
-        If it is not an integer, below `at_least` or above `at_most`.
-    """
+    """Return `value` as an int."""
     is_integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (is_integer and value >= at_least):
         named = name if is_integer else f"an integer {name.removeprefix('an ')}"
@@ -312,13 +299,7 @@ def integer(who: str, name: str, value: Any, at_least: int, at_most: float = mat
 
 
 def checked_times(timepts: Any) -> np.ndarray:
-    """Return a time grid as a float array.
-
-    Raises
-    ------
-    ParameterError
-        If it has fewer than two times, or they are not finite and increasing.
-    """
+    """Return a time grid as a float array."""
     times = as_numbers(timepts)
     if times is None:
         raise ParameterError(f"timepts needs numbers, got {str(timepts)[:60]!r}")
@@ -345,17 +326,7 @@ def _check_bounds(who: str, name: str, value: Any, rule: Param) -> None:
 
 
 def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
-    """Return `spec` with parameters replaced, checked, and errors that name the block.
-
-    Parameters
-    ----------
-    spec : record
-    overrides : mapping
-        ``{"b_r": 0.6}``; an element of a vector as ``{"lambdas[0]": 2.0}``, of a matrix as
-        ``{"centres[3, 1]": 0.0}``.  Names must exist.
-    block : str
-        Name of the block, for messages.
-    """
+    """Return `spec` with parameters replaced, checked, and errors that name the block."""
     # A diagram hands every block all of its values each time: those that it has are checked.
     own = {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
     whole = {

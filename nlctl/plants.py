@@ -24,20 +24,7 @@ __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock", "integrator_c
 
 
 def integrator_chain(f: Callable, d: Callable) -> Callable:
-    """Make the update equation of (1) from the last equation's two terms.
-
-    Parameters
-    ----------
-    f : equation
-        ``f(x, v, p)``, the non-affine function; `x` is the tuple (x_1, ..., x_n).
-    d : equation
-        ``d(x, t, p)``, the disturbance.
-
-    Returns
-    -------
-    equation
-        ``update(t, x, u, p)`` with ``u = (v,)``.
-    """
+    """Make the update equation of (1) from the last equation's two terms."""
 
     @equation
     def update(t, x, u, p):

@@ -8,52 +8,17 @@ __all__ = ["counted", "some_of"]
 
 
 def counted(number: SupportsIndex, one: str, many: str = "") -> str:
-    """Return a number and its noun: ``"1 state"``, ``"2 states"``.
-
-    Parameters
-    ----------
-    number : int
-        At least 0.
-    one : str
-        The noun in the singular.
-    many : str, optional
-        In the plural; by default with an s at its end.
-
-    Returns
-    -------
-    str
-        Both, with a space in between.
-    """
+    """Return a number and its noun: ``"1 state"``, ``"2 states"``."""
     return f"{number} {one if number == 1 else many or f'{one}s'}"
 
 
 def some_of(count: SupportsIndex, total: SupportsIndex, one: str, verb: str, verbs: str) -> str:
-    """Return how many do something: ``"1 of 3 runs violates"``, ``"2 of 3 runs violate"``.
-
-    Parameters
-    ----------
-    count, total : int
-        How many do, and of how many.
-    one : str
-        The noun in the singular; its plural ends in s.
-    verb, verbs : str
-        What one does, and what several do.
-
-    Returns
-    -------
-    str
-        Without what the verb takes.
-    """
+    """Return how many do something: ``"1 of 3 runs violates"``, ``"2 of 3 runs violate"``."""
     return f"{count} of {counted(total, one)} {verb if 1 in (count, total) else verbs}"
 
 
 def numbered(what: str, count: int) -> list[str]:
     """Return so many names: one as it is, several with numbers from 1 on.
-
-    Parameters
-    ----------
-    what : str
-    count : int
 
     Examples
     --------

@@ -26,31 +26,7 @@ _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
 def random_start(
     diagram: Any, start: Mapping[str, float], count: int, spread: float, seed: int
 ) -> dict[str, Any]:
-    """Draw the plant's initial states, uniformly within `spread` of where it would start.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-    start : mapping
-        Initial states that replace the diagram's; the plant's are the centres.
-    count : int
-        Number of runs.
-    spread : float
-        Largest distance of each state, in its unit.
-    seed : int
-
-    Returns
-    -------
-    dict
-        `start` with an array of shape (count,) for each state of the plant.
-
-    Raises
-    ------
-    ParameterError
-        If `spread` is not positive and finite.
-    UnknownNameError, AmbiguousNameError
-        If `start` names no state, or several.
-    """
+    """Draw the plant's initial states, uniformly within `spread` of where it would start."""
     if not 0 < spread < np.inf:
         raise ParameterError(f"check needs a finite spread > 0, got {spread:g}")
     rng = np.random.default_rng(seed)
@@ -67,26 +43,7 @@ def random_start(
 def interpreted_runs(
     diagram: Any, horizon: float, start: Mapping[str, Any], params: Mapping[str, Any]
 ) -> list[Any]:
-    """Return runs of python-control, one for each member of an ensemble.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-    horizon : float
-        In s.
-    start : mapping
-        Initial states: a number, or an array with one entry per run.
-    params : mapping
-
-    Returns
-    -------
-    list of control.TimeResponseData
-
-    Raises
-    ------
-    ParameterError, UnknownNameError
-        If a value or a name is refused.
-    """
+    """Return runs of python-control, one for each member of an ensemble."""
     from ..lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of  # takes a second
 
     return [
@@ -113,22 +70,7 @@ def repeat_command(
     engine: str = "auto",
     k: tuple[float, float] | None = None,
 ) -> str:
-    """Return the command that repeats one run of an ensemble, to the last digit.
-
-    Parameters
-    ----------
-    example : str
-    horizon : float
-        In s.
-    settings : sequence of str
-        ``NAME=VALUE`` as given; those of initial states are in `start`.
-    start : mapping
-        Initial states: a number, or an array with one entry per run.
-    member : int
-    engine : str, optional
-    k : tuple of 2 floats, optional
-        Bounds of the actuator's gain, where they were given.
-    """
+    """Return the command that repeats one run of an ensemble, to the last digit."""
     params = [text for text in settings if not text.partition("=")[0].strip().endswith("(0)")]
     states = [
         f"{name}(0)={float(value if np.ndim(value) == 0 else value[member])!r}"

@@ -37,19 +37,7 @@ def show_all() -> None:
 
 
 def show(name: str) -> None:
-    """Print the parameters of a block, the keys of a kind of analysis, or the kinds.
-
-    Parameters
-    ----------
-    name : str
-        Of a block or a kind; ``kinds``; or ``path/to/file.py:NAME`` or ``module:NAME`` of one's
-        own, whose code is run.
-
-    Raises
-    ------
-    UsageError
-        If there is no such thing, or it is neither a block record nor a kind.
-    """
+    """Print the parameters of a block, the keys of a kind of analysis, or the kinds."""
     if ":" in name:
         from ..studies.file.resolve import named
 

@@ -12,19 +12,7 @@ _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
 
 def named_loop(name: str) -> Any:
-    """Return the diagram that a loop's name stands for.
-
-    Parameters
-    ----------
-    name : str
-        ``example-1``, ``example-2``, ``path/to/file.py:function`` or ``package.module:function``;
-        the function is called without arguments.
-
-    Raises
-    ------
-    UsageError
-        If there is no such loop, or the function returns no diagram.
-    """
+    """Return the diagram that a loop's name stands for."""
     from nlctl.upstream.control_internals import is_system
 
     if ":" in name:
@@ -47,13 +35,7 @@ _OWN = "a loop of your own is path/to/file.py:function or package.module:functio
 
 
 def sampled_times(until: float, step: float) -> Any:
-    """Return the times of a run, 0 to `until` in s.
-
-    Raises
-    ------
-    ParameterError
-        If not 0 < step < until, or there are too many.
-    """
+    """Return the times of a run, 0 to `until` in s."""
     import numpy as np
 
     if not (0 < step < until < float("inf")):
@@ -67,13 +49,7 @@ def sampled_times(until: float, step: float) -> Any:
 
 
 def input_values(diagram: Any, texts: Sequence[str]) -> Any:
-    """Return the constant value of each input of a diagram; 0 where none is given.
-
-    Raises
-    ------
-    UsageError
-        If a text is not ``NAME=NUMBER``, or the diagram has no such input.
-    """
+    """Return the constant value of each input of a diagram; 0 where none is given."""
     import numpy as np
 
     from nlctl.arguments import number
@@ -90,13 +66,7 @@ def input_values(diagram: Any, texts: Sequence[str]) -> Any:
 
 
 def assignments(diagram: Any, texts: Sequence[str]) -> tuple[dict[str, Any], dict[str, float]]:
-    """Sort ``NAME=VALUE`` texts into parameters and initial states; names must exist.
-
-    Raises
-    ------
-    UsageError
-        If a text is none, or a name does not exist.
-    """
+    """Sort ``NAME=VALUE`` texts into parameters and initial states; names must exist."""
     from nlctl.diagrams import parameter_names
     from nlctl.names import base_name, find_name
 
@@ -128,13 +98,7 @@ def _value(name: str, text: str) -> bool | float | tuple[float, ...]:
 
 
 def number_of(name: str, text: str) -> float:
-    """Return a number.
-
-    Raises
-    ------
-    ParameterError
-        If the text is none.
-    """
+    """Return a number."""
     try:
         return float(text)
     except ValueError:

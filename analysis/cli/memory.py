@@ -23,16 +23,6 @@ def check_memory(needed: int = TO_RUN) -> None:
 
     Compilers of C++ end the process where they get no memory, and its threads may wait for others
     that never began: neither can be told afterwards.
-
-    Parameters
-    ----------
-    needed : int, optional
-        Bytes; `TO_BEGIN` before libraries are imported.
-
-    Raises
-    ------
-    MemoryError
-        With how much that is.
     """
     try:
         import resource

@@ -199,14 +199,7 @@ def gallery(
 
 
 def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
-    """Refuse, before anything is computed, what could not be written afterwards.
-
-    Raises
-    ------
-    UsageError
-        If `out` cannot be written to or holds files that no report has made, or a PDF is wanted
-        and no browser is installed.
-    """
+    """Refuse, before anything is computed, what could not be written afterwards."""
     from ..report.page import check_report_folder
     from .terminal import check_writable
 
@@ -220,13 +213,7 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
 
 
 def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
-    """Print where the page is; print it to PDF and show it, as wanted.
-
-    Raises
-    ------
-    UsageError
-        If the PDF cannot be made; the page exists all the same.
-    """
+    """Print where the page is; print it to PDF and show it, as wanted."""
     from ..report.browser import open_page, write_pdf
     from ..studies.whole.page import recorded_print
 
@@ -243,11 +230,6 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 
     Two runs are compared by their results where one of them has no report.  The folder of a run
     has to be whole.
-
-    Raises
-    ------
-    UsageError, OSError
-        If a file is not a report, or cannot be read.
     """
     from ..report.compare import compare_contents
     from ..studies import origin_differences, run_differences
@@ -282,13 +264,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 
 
 def _check_run(path: Path) -> None:
-    """Refuse a run, or its page, of which something was lost or edited.
-
-    Raises
-    ------
-    UsageError
-        With what is wrong; nothing is raised for a report that is in no run's folder.
-    """
+    """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
     from ..studies.whole.page import check_page, is_run
 
@@ -317,13 +293,7 @@ def _no_report(path: Path) -> UsageError:
 
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
-    """Write the index page over the reports below a folder, and print where it is.
-
-    Raises
-    ------
-    UsageError
-        If there is no report, or the folder cannot be written to, or its page is not a gallery.
-    """
+    """Write the index page over the reports below a folder, and print where it is."""
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
     from ..studies.whole.page import check_page

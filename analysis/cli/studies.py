@@ -209,13 +209,7 @@ def verify_command(
 
 
 def asking(action: Callable[[bool], T], trust: bool) -> T:
-    """Return what `action` returns; where it needs trust, and somebody is there, ask for it.
-
-    Raises
-    ------
-    StudyError
-        If nobody is there, or the answer is no.
-    """
+    """Return what `action` returns; where it needs trust, and somebody is there, ask for it."""
     from ..studies import StudyError
 
     try:
@@ -238,13 +232,7 @@ def schema() -> None:
 
 
 def check_study_path(study: Path) -> None:
-    """Refuse a folder where a study file is wanted.
-
-    Raises
-    ------
-    UsageError
-        With what the folder is good for.
-    """
+    """Refuse a folder where a study file is wanted."""
     from nlctl.errors import UsageError
 
     from ..studies.whole.page import is_run
@@ -256,13 +244,7 @@ def check_study_path(study: Path) -> None:
 
 
 def check_run_path(run: Path) -> None:
-    """Refuse a file where the folder of a run is wanted.
-
-    Raises
-    ------
-    UsageError
-        With the folder that it lies in.
-    """
+    """Refuse a file where the folder of a run is wanted."""
     from nlctl.errors import UsageError
 
     if run.exists() and not run.is_dir():

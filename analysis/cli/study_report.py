@@ -29,34 +29,7 @@ def report_study(
     force: bool = False,
     trust: bool = False,
 ) -> tuple[Path, Result]:
-    """Write the report of a study.
-
-    Parameters
-    ----------
-    path : Path
-        A study file, which is run in ``reports/<name>`` or taken up there, or the folder of a run.
-    out : Path, optional
-        Folder of the report; by default that of the run.
-    threads : int, optional
-    watch : callable, optional
-        Shows how far the rows are, see `nlctl.analysis.studies.run.Watch`.
-    interactive : bool, optional
-        As in `nlctl.analysis.report.render_html`.
-    force : bool, optional
-        Whether files of others are replaced, see `nlctl.analysis.report.write_report`.
-    trust : bool, optional
-        As in `nlctl.analysis.studies.read_study`.
-
-    Returns
-    -------
-    page : Path
-    result : Result
-
-    Raises
-    ------
-    UsageError
-        If the study has mistakes, or the folder holds no run, or another one.
-    """
+    """Write the report of a study."""
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result

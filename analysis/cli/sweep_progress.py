@@ -26,11 +26,6 @@ def sweep_bar(
 
     Behind the bar stand the rows, the rate, the remaining time, the violations so far and, for
     independent draws, bounds of their probability that may be looked at any time.
-
-    Yields
-    ------
-    callable
-        What `nlctl.analysis.robustness.runs.sweep` takes as ``progress``.
     """
     console = console or Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))

@@ -38,13 +38,7 @@ def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder that cannot be written to, before anything is computed.
-
-    Raises
-    ------
-    ParameterError
-        With the path and the reason.
-    """
+    """Refuse a folder that cannot be written to, before anything is computed."""
     existing = next(p for p in (folder, *folder.absolute().parents) if p.exists())
     if not existing.is_dir():
         raise ParameterError(f"cannot write to '{folder}': '{existing}' is not a folder")
@@ -59,13 +53,7 @@ def check_writable(folder: Path) -> None:
 
 
 def check_file(path: Path) -> None:
-    """Refuse a file that could not be written, before anything is computed.
-
-    Raises
-    ------
-    ParameterError
-        With the path and the reason.
-    """
+    """Refuse a file that could not be written, before anything is computed."""
     if path.is_dir():
         raise ParameterError(f"cannot write '{path}': it is a folder")
     check_writable(path.parent)
@@ -74,13 +62,7 @@ def check_file(path: Path) -> None:
 
 
 def check_figure(path: Path) -> None:
-    """Refuse a figure format that cannot be written, or a folder that cannot be written to.
-
-    Raises
-    ------
-    ParameterError
-        With the path and the rule.
-    """
+    """Refuse a figure format that cannot be written, or a folder that cannot be written to."""
     if path.suffix.lower() not in FIGURE_FORMATS:
         raise ParameterError(
             f"cannot write figure '{path}': its name must end in {', '.join(FIGURE_FORMATS)}"

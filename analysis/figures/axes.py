@@ -61,17 +61,7 @@ def draw_lines(ax: Axes, t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Non
 def legend_above(
     ax: Axes | Figure, shown: Mapping[str, Any] | None = None, line: int = LINE
 ) -> None:
-    """Put the legend above axes, or above all of a figure, where it hides nothing.
-
-    Parameters
-    ----------
-    ax : Axes or Figure
-        A figure where the axes beside each other are narrower than the legend.
-    shown : mapping of str to artist, optional
-        What it shows; by default what the axes have labels for; a figure needs it.
-    line : int, optional
-        Characters that the axes have room for; those with long names at the left have less.
-    """
+    """Put the legend above axes, or above all of a figure, where it hides nothing."""
     if shown is None and isinstance(ax, Axes):
         handles, labels = ax.get_legend_handles_labels()
     else:

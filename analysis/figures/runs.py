@@ -291,11 +291,7 @@ def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
 def upper_envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return values at some samples so that the lines between them lie nowhere below `y`.
 
-    Parameters
-    ----------
-    y : ndarray of shape (m,)
-    nodes : ndarray of int, shape (k,)
-        Increasing from 0 to m - 1.
+    Shapes: `y` (m,), `nodes` (k,).
     """
     most = np.maximum.reduceat(y, nodes[:-1])
     most[-1] = max(most[-1], y[-1])

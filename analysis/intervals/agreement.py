@@ -44,21 +44,7 @@ _Refusal = Callable[[str], UsageError]
 
 
 def agreeing(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., Any]:
-    """Return a function that compares what it makes of balls with what it makes of floats.
-
-    Parameters
-    ----------
-    function : callable
-        Of numbers, tuples and arrays of them, and records.
-    refusal : callable
-        Takes what differs, and returns the error to be raised.
-
-    Raises
-    ------
-    UsageError
-        The refusal: now if the function asks what its arguments are, see `type_question`, and
-        when the function that is returned finds a difference.
-    """
+    """Return a function that compares what it makes of balls with what it makes of floats."""
     question = type_question(function)
     if question:
         raise refusal(_ASKED.format(question))
@@ -82,20 +68,6 @@ def on_balls(
     """Return a function of a user's for balls: where it fails on them, `refusal` says so.
 
     Wherever it does not fail it is also called with floats, see `agreeing`.
-
-    Parameters
-    ----------
-    function : callable
-    refusal : callable
-        Takes what has gone wrong, and returns the error to be raised.
-
-    Raises
-    ------
-    Undecided
-        When the function that is returned compares balls that decide nothing.
-    UsageError
-        The refusal, when it fails otherwise, gives what is not a number, or makes something else
-        of floats.
     """
     compared = agreeing(function, refusal)
 

@@ -103,18 +103,7 @@ class CodedClaim:
 def code_for(
     function: Any, on_balls: Callable[..., Any], box: Box, sign: int, bound: float = 0.0
 ) -> CodedClaim | None:
-    """Return code for sign f <= bound; None for a function that has none, or on no such machine.
-
-    Parameters
-    ----------
-    function : callable
-        Of a tuple of numbers, or `Readable`.
-    on_balls : callable
-        The same for balls, which says so where it fails.
-    box : Box
-    sign : {1, -1}
-    bound : float, optional
-    """
+    """Return code for sign f <= bound; None for a function that has none, or on no such machine."""
     if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
         return None
     known = function.codes if isinstance(function, Readable) else {}
@@ -193,14 +182,7 @@ def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
 
 
 def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
-    """Return what becomes of the claim; the same whatever the number of processors.
-
-    Parameters
-    ----------
-    found : CodedClaim
-    box : Box
-    max_boxes : int
-    """
+    """Return what becomes of the claim; the same whatever the number of processors."""
     low, high = _ends(box)
     threads = os.cpu_count() or 1
     return decide_claim(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
@@ -209,14 +191,6 @@ def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
 def supremum_by_code(
     found: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
 ) -> Supremum:
-    """Return the supremum of the least of the numbers.
-
-    Parameters
-    ----------
-    found : CodedClaim
-    box : Box
-    tol : float
-    max_boxes, hopeless : int
-    """
+    """Return the supremum of the least of the numbers."""
     low, high = _ends(box)
     return enclose_supremum(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)

@@ -144,13 +144,7 @@ class Sum(NumPyFunctions):
         return self.terms.get(product, Fraction(0))
 
     def on(self, values: Mapping[str, Any]) -> Any:
-        """Return the value where symbols have these values, balls by name.
-
-        Raises
-        ------
-        Undecided
-            If an atom may jump or has no value there.
-        """
+        """Return the value where symbols have these values, balls by name."""
         for atom in self.partial:
             if not as_ball(atom.on(values)).value.is_finite():
                 raise Undecided(f"{atom.name} has no value somewhere")
@@ -262,11 +256,6 @@ def _times(one: Product, two: Product) -> Product:
 
 def exact(number: Any) -> Fraction:
     """Return a number as the fraction that it is.
-
-    Raises
-    ------
-    ValueError, OverflowError
-        If it is not finite.
 
     Examples
     --------

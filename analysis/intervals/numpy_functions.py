@@ -175,13 +175,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, perio
 
 
 def checked_table(xp: Any, fp: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return break points and values of a table.
-
-    Raises
-    ------
-    TypeError
-        If they are not numbers of one size with increasing break points.
-    """
+    """Return break points and values of a table."""
     x, f = (tuple(map(float, np.ravel(a))) for a in (xp, fp))
     if len(x) != len(f) or not x or any(not a < b for a, b in pairwise(x)):
         raise TypeError("np.interp needs increasing break points, and as many values, of numbers")

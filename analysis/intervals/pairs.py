@@ -123,19 +123,7 @@ def _logistic(x: arb) -> arb:
 
 
 def real_power(x: arb, y: arb, from_zero: bool = False) -> Enclosed:
-    """Enclose x^y for x >= 0 and any y; not a number for x < 0, as NumPy has it.
-
-    Parameters
-    ----------
-    x, y : arb
-    from_zero : bool, optional
-        Whether x is known not to be below 0, where its rounding is.
-
-    Returns
-    -------
-    tuple of 3 arb
-        Value and partial derivatives.
-    """
+    """Enclose x^y for x >= 0 and any y; not a number for x < 0, as NumPy has it."""
     if x > 0:
         log = x.log()
         value = (log * y).exp()

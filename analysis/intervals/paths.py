@@ -98,17 +98,7 @@ def undecided() -> Iterator[None]:
 
 
 def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], what: str) -> bool:
-    """Return whether the order of two quantities is one of `holds`; or see `Undecided`.
-
-    Parameters
-    ----------
-    possible, holds : set of {-1, 0, 1}
-        Orders that are possible, below, equal and above, and those that are asked for.
-    key : tuple
-        The quantities: what was answered of them before restricts what is possible.
-    what : str
-        For the message.
-    """
+    """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:
         known = decisions.known(key)
@@ -133,13 +123,7 @@ def decided_so_far() -> int | None:
 
 
 def every_way(call: Callable[[], Any]) -> Iterator[Any]:
-    """Yield what a call returns on every way through it, with balls that cannot decide the way.
-
-    Raises
-    ------
-    Undecided
-        If a comparison has no answer at all, or there are too many ways.
-    """
+    """Yield what a call returns on every way through it, with balls that cannot decide the way."""
     scripts: list[tuple[bool, ...]] = [()]
     count = 0
     while scripts:

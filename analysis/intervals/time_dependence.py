@@ -36,13 +36,7 @@ UNREAD: Any = _Unread()
 
 
 def reads_time(function: Callable[[Any, Any], Any]) -> bool:
-    """Whether ``function(u, t)`` reads t for any u; what cannot be followed does.
-
-    Parameters
-    ----------
-    function : callable
-        Every way through it is followed, with u anywhere.
-    """
+    """Whether ``function(u, t)`` reads t for any u; what cannot be followed does."""
     everywhere = Ball(arb(0, "inf"), (arb(1),))
     try:
         return any(result is UNREAD for result in every_way(lambda: function(everywhere, UNREAD)))

@@ -57,16 +57,6 @@ _MOST = 2_000
 def type_question(function: Any) -> str | None:
     """Return what a function, or one that it calls, asks of its arguments; None for nothing.
 
-    Parameters
-    ----------
-    function : callable
-        Functions of nlctl and of libraries are not read, but those that they close over are.
-
-    Returns
-    -------
-    str or None
-        In words: function, line, and what it does.
-
     Examples
     --------
     >>> from nlctl.analysis.intervals.type_questions import type_question

@@ -151,20 +151,7 @@ class Written(NumPyFunctions):
 
 
 def operations(names: tuple[str, ...], function: Any) -> list[list[Any]]:
-    """Return what a function does with symbols, as a list of which the last entry is its value.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the symbols.
-    function : callable
-        ``function(symbols)`` with a dict of them by name.
-
-    Raises
-    ------
-    Undecided
-        If it compares, or calls what cannot be written.
-    """
+    """Return what a function does with symbols, as a list of which the last entry is its value."""
     nodes: list[list[Any]] = [["symbol", name] for name in names]
     start = Written(nodes, 0)
     value = start.lifted(function({name: Written(nodes, i) for i, name in enumerate(names)}))

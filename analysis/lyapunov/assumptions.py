@@ -12,22 +12,7 @@ __all__ = ["assumptions"]
 
 
 def assumptions(signals: Signals, given: Premises, box: Box, u_max: float) -> tuple[Margin, ...]:
-    """Evaluate what the proof supposes, along a response of an observed loop.
-
-    Parameters
-    ----------
-    signals : Signals
-    given : Premises
-    box : Box
-        The compact set, with sides x1, ..., xn and v.
-    u_max : float
-        Largest |u| for which the actuator's split is proved; it may be infinite.
-
-    Returns
-    -------
-    tuple of Margin
-        Omega, A1, A1 range, A2, A3, (10).
-    """
+    """Evaluate what the proof supposes, along a response of an observed loop."""
     t, split, u = signals.t, given.split, np.abs(signals["u"])
     eps_u = np.abs(split.eps_u(signals["u"], signals["v"]))
     psi = signals.vector("psi")[:, : given.W.size]

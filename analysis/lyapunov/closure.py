@@ -72,13 +72,7 @@ class StateReach:
     reference: SumOfSines
 
     def __call__(self, C: float) -> tuple[float, ...]:
-        """Return bounds of \\|x1\\|, ..., \\|xn\\| for \\|r\\| <= C.
-
-        Raises
-        ------
-        ParameterError
-            If the filter has roots that are not real and negative.
-        """
+        r"""Return bounds of \|x1\|, ..., \|xn\| for \|r\| <= C."""
         errors = error_bounds(self.lambdas, self.e0, arb(C))
         wanted = reference_bounds(self.reference)
         return tuple(float(e.upper()) + y for e, y in zip(errors, wanted, strict=False))
@@ -177,23 +171,7 @@ def _reach(run: MemberRun, given: Premises) -> StateReach | None:
 
 
 def closed_set(found: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:
-    """Look for a box that closes, and for a reason why none does.
-
-    Parameters
-    ----------
-    found : Constants
-        Of the loop on some box, for its parts, the split of its actuator and the side v.  Weights
-        that were given count; otherwise each box has its own.
-    gains : Gains
-        Of the controller.
-    reach : StateReach
-    Q : float, optional
-        Supremum of I(t), (33).
-
-    Returns
-    -------
-    Closure
-    """
+    """Look for a box that closes, and for a reason why none does."""
     W = _given(found)
     least, C_0, sides = 0.0, abs(float(gains.r_0)), reach(abs(float(gains.r_0)))
     for _ in range(_STEPS):
@@ -245,31 +223,13 @@ def least_bound(
     v: tuple[float, float],
     W: Any = None,
 ) -> float:
-    """Return what C_0 of (36) is at least on a box, for Q = 0.
+    r"""Return what C_0 of (36) is at least on a box, for Q = 0.
 
     G_max, d* and g are taken at points of the box.  Without `W` it is so for every W: by
-    \\|W^T psi\\| <= \\|W\\| \\|psi\\| the error at a point is at least \\|g\\| - \\|psi\\| \\|W\\|;
-    the least value of a convex function of \\|W\\| is left.
+    \|W^T psi\| <= \|W\| \|psi\| the error at a point is at least \|g\| - \|psi\| \|W\|;
+    the least value of a convex function of \|W\| is left.
 
-    Parameters
-    ----------
-    parts : Parts
-        Of the loop.
-    split : Decomposition
-        Of the actuator.
-    gains : Gains
-        Of the controller.
-    sides : sequence of n floats
-        Bounds of \\|x1\\|, ..., \\|xn\\|.
-    v : (float, float)
-        Ends of v.
-    W : array_like of shape (l,), optional
-        Weights that were chosen.
-
-    Returns
-    -------
-    float
-        In the unit of r.
+    Shapes: `W` (l,).
     """
     g, psi, points = _at_points(parts, sides)
     f, d = plant_terms(parts.plant)

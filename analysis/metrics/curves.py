@@ -153,12 +153,7 @@ def _limits(y):
 def turning_points(t, y, breaks):
     """Return extremes between samples: before which sample each is, when, and its value.
 
-    Parameters
-    ----------
-    t, y : ndarray, shape (n,)
-        Sample times (s), increasing, and finite samples.
-    breaks : ndarray, shape (m,)
-        Increasing times (s).
+    Shapes: `t, y` (n,), `breaks` (m,).
     """
     place, value = np.empty(y.size), np.empty(y.size)
     before = np.zeros(y.size, np.int64)
@@ -268,14 +263,6 @@ def path(t, y, breaks, apart=0.0):
 
     Where samples show that a piece is smooth, lines are within 2.5e-7 of the signal's range of its
     curve, where 32 parts of an interval are enough for that.
-
-    Parameters
-    ----------
-    t, y, breaks : ndarray
-        As in `turning_points`.
-    apart : float, optional
-        A jump begins and ends so long (s) before and after a break; 1e-12 of the time covered by
-        default.
     """
     apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
     tolerance = _LINE * (np.max(y) - np.min(y))

@@ -17,18 +17,7 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def of_samples(function: _F) -> _F:
-    """Mark a function of samples as an equation that says which argument is not as annotated.
-
-    Parameters
-    ----------
-    function : callable
-        With annotations of its arguments.
-
-    Returns
-    -------
-    callable
-        Of which compiled code takes the function itself.
-    """
+    """Mark a function of samples as an equation that says which argument is not as annotated."""
     plain = equation(function)
     called = reporting(plain, function.__name__, _lengths)
     overload(called, strict=False)(lambda *_, **__: plain)

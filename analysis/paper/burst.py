@@ -102,18 +102,7 @@ class Burst:
 
 
 def through_the_burst(run: LongRun) -> Burst | None:
-    """Carry a run of Example 2 on through its burst.
-
-    Parameters
-    ----------
-    run : LongRun
-        That was given up after zeta had left its lobe, with the state in which it ended.
-
-    Returns
-    -------
-    Burst or None
-        None if the run did not burst, or its last state is not known.
-    """
+    """Carry a run of Example 2 on through its burst."""
     if not np.isfinite(run.burst) or not run.last:
         return None
     exact, start = paper.example_2(), float(run.time[-1])
@@ -137,16 +126,7 @@ def through_the_burst(run: LongRun) -> Burst | None:
 
 
 def averaged(parts: Parts, start: float) -> ct.InterconnectedSystem:
-    """Return Example 2 with the mean of its ripple and the slope of its backlash, from a time on.
-
-    Parameters
-    ----------
-    parts : Parts
-        Of Example 2.
-    start : float
-        Time (s) at which its time begins: the burst lasts for too short a time to be counted
-        from 0.
-    """
+    """Return Example 2 from a time on, with the mean of its ripple and its backlash as a slope."""
     plant, mean = parts.plant, 1 + parts.plant.gain_v / 2
     smooth = dataclasses.replace(
         plant, gain_mean=mean * plant.gain_mean, gain_x=mean * plant.gain_x, gain_v=0.0

@@ -171,11 +171,6 @@ def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tu
     The least IAE with max |u| at most that of the paper's controller, both with the noise of
     `sensor`: without noise the gains would grow without end, since nothing in the model bounds
     them.  Nor may a run take more than 10,000 steps.
-
-    Returns
-    -------
-    dict
-        `Tuned` by label; a few minutes of computing.
     """
     build, times = _build(example), np.linspace(0, 20, 2001)
     by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}

@@ -85,15 +85,7 @@ class Evidence:
 
 
 def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
-    """Examine the proof for one of the paper's examples.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-        Of `nlctl.paper.example_1` or `nlctl.paper.example_2`.
-    horizon : float, optional
-        Length of the run along which the proof is checked (s).
-    """
+    """Examine the proof for one of the paper's examples."""
     study = examine(loop, horizon)
     run, found = study.runs.first, study.constants
     given, s = premises(found, run.gains), run.signals

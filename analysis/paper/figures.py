@@ -169,17 +169,7 @@ def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
 
 
 def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float) -> Figure:
-    """Largest late errors against the sampling time, a panel for each example.
-
-    Parameters
-    ----------
-    record : pandas.DataFrame
-        Of `nlctl.analysis.paper.sampling_limits`.
-    titles : mapping of str to str
-        Of the examples.
-    band : float
-        What is asked of the error.
-    """
+    """Largest late errors against the sampling time, a panel for each example."""
     figure, axes = stacked_axes(rows=len(titles), height=2.2)
     shown: dict[str, object] = {}
     for ax, (example, title) in zip(axes, titles.items(), strict=True):
@@ -210,15 +200,6 @@ def actuator_errors(
     """Largest late errors behind each actuator, a line for each and a dot for each controller.
 
     Hollow dots violate the spec; at the right are the runs that did not reach their end.
-
-    Parameters
-    ----------
-    record : pandas.DataFrame
-        Lines of one example of `nlctl.analysis.paper.limits.actuators`.
-    meets : callable
-        Says which lines meet the spec.
-    band : float
-        What is asked of the error.
     """
     figure = Figure(figsize=(6.2, 7.2), layout="constrained")
     ax = figure.subplots()

@@ -32,32 +32,7 @@ def example_1(
     limit: float = _WIDE,
     noise: float | None = None,
 ) -> ct.InterconnectedSystem:
-    """Example 1 with another controller, gain, saturation or noise.
-
-    Parameters
-    ----------
-    controller : str, record or control.InputOutputSystem, optional
-        A label of `controllers.compared_controllers`, or a controller.
-    actuator : record, optional
-        The ``body`` of the cascade; the example's by default.
-    gain : float, optional
-        Factor between the saturation and the body; -1 turns the sign of the input gain round.
-    limit : float, optional
-        Largest |u| that passes; none by default.
-    noise : float, optional
-        RMS of measurement noise on each state, see `controllers.sensor`; without it there is no
-        sensor, with 0 there is one whose ``sensor.rms`` and ``sensor.seed`` may be varied.
-
-    Returns
-    -------
-    control.InterconnectedSystem
-        As `nlctl.paper.example_1`.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such controller.
-    """
+    """Example 1 with another controller, gain, saturation or noise."""
     body = DeadZone() if actuator is None else actuator
     return _loop("example_1", body, controller, gain, limit, noise)
 
@@ -80,15 +55,6 @@ def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
 
     The output e is what the controller makes of its measurements: with a fault on one of them it
     is not an error of the plant.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}, optional
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example.
     """
     if example not in paper.EXAMPLES:
         raise unknown("example", example, paper.EXAMPLES)
@@ -103,19 +69,6 @@ def on_a_computer(
 
     What may be varied are ``sampling.dt``, ``sampling.delay``, ``sampling.jitter``, and, from 0 on,
     ``sampling.input_quantum`` and ``sampling.output_quantum``.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}, optional
-    controller : str, record or control.InputOutputSystem, optional
-        A label of `controllers.compared_controllers`, or a controller.
-    waiting : int, optional
-        How many sampling times the delay may take at most.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example or controller.
     """
     if example not in paper.EXAMPLES:
         raise unknown("example", example, paper.EXAMPLES)

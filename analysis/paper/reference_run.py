@@ -49,13 +49,7 @@ def thinned_run(run: LongRun) -> LongRun:
 
 
 def agreed(run: LongRun, other: LongRun) -> LongRun:
-    """Return a run with the burst that another one at another tolerance has.
-
-    Raises
-    ------
-    ValueError
-        If the two differ by `AGREE` or more.
-    """
+    """Return a run with the burst that another one at another tolerance has."""
     if not abs(run.burst - other.burst) < AGREE:
         raise ValueError(
             f"'{run.loop}' bursts at {run.burst:.1f} s at rtol {run.rtol:g} and at "
@@ -89,13 +83,7 @@ def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
 
 
 def continued(beginning: LongRun, record: LongRun) -> LongRun:
-    """Return a run that continues the record where it ends.
-
-    Raises
-    ------
-    ValueError
-        If zeta of the two differs by more than 1e-4 there: the record is of other equations.
-    """
+    """Return a run that continues the record where it ends."""
     end = beginning.time[-1]
     before = float(np.interp(end, record.time, record.signals["zeta"]))
     if not abs(before - beginning.signals["zeta"][-1]) < 1e-4:

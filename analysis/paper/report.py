@@ -92,18 +92,7 @@ class _Here(Executor):
 
 
 def reproduction(watch: ProgressWatch = _unwatched) -> list[Section]:
-    """Run both examples, and return the report's first part: their figures and numbers.
-
-    Parameters
-    ----------
-    watch : callable, optional
-        See `ProgressWatch`.
-
-    Raises
-    ------
-    nlctl.DivergedError
-        If a loop diverges.
-    """
+    """Run both examples, and return the report's first part: their figures and numbers."""
     with watch("simulating", len(CASES)) as advance:
         runs = run_all(CASES, done=lambda _: advance(1))
     return paper_sections(runs)
@@ -114,17 +103,7 @@ def proof(
     far: proofs.FarRuns | None = None,
     watch: ProgressWatch = _unwatched,
 ) -> list[Section]:
-    """Check the proof for both examples, and return the report's second part.
-
-    Parameters
-    ----------
-    horizon : float, optional
-        Length of the runs along which it is checked (s).
-    far : FarRuns, optional
-        Runs far beyond that, see `evidence.far_runs_in_background`.
-    watch : callable, optional
-        See `ProgressWatch`.
-    """
+    """Check the proof for both examples, and return the report's second part."""
     far = far or proofs.FarRuns()
     return lyapunov_sections(_proved(horizon, watch), far.runs, far.burst)
 
@@ -135,22 +114,7 @@ def robustness(
     threads: int | None = None,
     tell: Callable[[str], object] = _untold,
 ) -> list[Section]:
-    """Return runs of studies as the report's third part.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Of `nlctl.analysis.studies.run`, of any loops.
-    threads : int, optional
-        For the rows that are simulated again to be drawn.
-    tell : callable, optional
-        Takes a sentence on what the part will lack.
-
-    Raises
-    ------
-    RunFolderError
-        If a folder holds no run, or one that was computed from another loop than today's.
-    """
+    """Return runs of studies as the report's third part."""
     results = [load_result(folder) for folder in folders]
     found = [(r, rows_again(r, loop_again(r, tell=tell), threads)) for r in results]
     return study_part(found, published=PUBLISHED)
@@ -168,35 +132,7 @@ def compose(
     watch: ProgressWatch = _unwatched,
     tell: Callable[[str], object] = _untold,
 ) -> Composed:
-    """Reproduce the paper, check its proof, run the studies, and compose the report of it all.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the studies are run, each in a folder of its name; what is there is not replaced,
-        see `clear`.
-    studies : sequence of str, optional
-        Names of `nlctl.analysis.studies.shipped`; without any there is no part on robustness.
-    horizon : float, optional
-        Length of the runs along which the proof is checked (s).
-    far : bool, optional
-        Whether the loops are run far beyond 20 s, which takes some seconds.
-    whole : bool, optional
-        Whether Example 2 is then run to its burst, which takes minutes, instead of going on with
-        the kept record.
-    threads : int, optional
-    beside : concurrent.futures.Executor, optional
-        One other process, for the other core; by default all runs in this one.
-    watch, tell : callable, optional
-        See `ProgressWatch` and `robustness`.
-
-    Raises
-    ------
-    UsageError
-        If a folder of a study holds a run.
-    KeyboardInterrupt
-        If a study was interrupted; those after it are not begun.
-    """
+    """Reproduce the paper, check its proof, run the studies, and compose the report of it all."""
     other = _Here() if beside is None else beside
     ahead = [] if beside is None else [beside.submit(_compile_ahead, studies)]
     with _far_away(far, whole) as long_runs:
@@ -224,13 +160,7 @@ def compose(
 
 
 def clear(folder: Path, studies: Sequence[str] = QUICK, *, force: bool = False) -> None:
-    """Remove the runs of studies in a folder, to make them anew: runs and nothing else.
-
-    Raises
-    ------
-    UsageError
-        If a folder of such a name holds something else; with `force` that goes as well.
-    """
+    """Remove the runs of studies in a folder, to make them anew: runs and nothing else."""
     for name in studies:
         if (folder / name).exists():
             remove_run(folder / name, force=force)

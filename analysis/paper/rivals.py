@@ -244,34 +244,13 @@ RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
 
 
 def rival_controllers(example: str) -> dict[str, Any]:
-    """Return the controllers of an example by label, the paper's as printed first.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example.
-    """
+    """Return the controllers of an example by label, the paper's as printed first."""
     labels = ("paper", *_gains(example))
     return {label: rival_controller(example, label) for label in labels}
 
 
 def rival_controller(example: str, label: str) -> Any:
-    """Return one of `rival_controllers`.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}
-    label : str
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example or controller.
-    """
+    """Return one of `rival_controllers`."""
     gains = _gains(example)
     if label == "paper":
         return published_controller(example)
@@ -314,21 +293,7 @@ def behind(example: str, actuator: str) -> dict[str, str]:
 def rival_loop(
     example: str = "example_1", pair: str = "paper / dead zone", noise: float = 0.0
 ) -> ct.InterconnectedSystem:
-    """An example with one controller behind one actuator.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}, optional
-    pair : str, optional
-        ``"controller / actuator"``, see `rival_controllers` and `rival_actuators`.
-    noise : float, optional
-        RMS of the measurement noise.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such example, controller or actuator.
-    """
+    """An example with one controller behind one actuator."""
     label, _, actuator = pair.partition(" / ")
     controller, actuators = rival_controller(example, label), rival_actuators(example)
     if actuator not in actuators:
@@ -348,20 +313,6 @@ def tuned_rivals(
 
     The least mean IAE over `size` samples with the example's actuator, for max |u| at most that of
     the paper's controller as printed in the worst of these samples.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}
-    size : int, optional
-        Training samples; the study draws others.
-    candidates : int, optional
-        Sets of gains that are tried for each controller, to the nearest generation.
-    seed : int, optional
-
-    Returns
-    -------
-    dict
-        `Tuned` by label; some minutes of computing.
     """
     from ..studies import read_study, shipped
 

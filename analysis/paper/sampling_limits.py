@@ -91,14 +91,7 @@ QUANTITIES = (
 
 
 def controller_program(controller: Any, *, delays: bool = False) -> Any:
-    """Return a controller as a program with Euler's method, of which `QUANTITIES` may be varied.
-
-    Parameters
-    ----------
-    controller : control.InputOutputSystem or record
-    delays : bool, optional
-        Whether its outputs wait; otherwise there are converters.
-    """
+    """Return a controller as a program with Euler's method, of which `QUANTITIES` may be varied."""
     if delays:
         return sampled(controller, _STEP, method="euler", delay=_STEP, waiting=_WAITING)
     return sampled(controller, _STEP, method="euler", input_quantum=0.0, output_quantum=0.0)
@@ -107,23 +100,7 @@ def controller_program(controller: Any, *, delays: bool = False) -> Any:
 def sampling_runs(
     example: str, label: str, wanted: Mapping[str, np.ndarray] | None = None
 ) -> pd.DataFrame:
-    """Run an example with one controller on a computer.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}
-    label : str
-        Of `controllers.compared_controllers`.
-    wanted : mapping, optional
-        Values by key of the quantity; by default those of `QUANTITIES`, and finer ones where the
-        spec ends.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns example, controller, quantity, value, error (largest abs(y - yd) from 10 s on), peak
-        (largest abs(u)); both are NaN where a run does not end well.
-    """
+    """Run an example with one controller on a computer."""
     controller = compared_controllers(example)[label]
     loops: dict[bool, Compiled] = {}
     tables = []
@@ -183,14 +160,7 @@ def where_it_ends(table: pd.DataFrame) -> tuple[float, float]:
 
 
 def spec_ends(record: pd.DataFrame) -> pd.DataFrame:
-    """Return where each controller's spec ends.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Index example and controller, in the record's order; for each quantity two columns,
-        ``(key, "good")`` and ``(key, "bad")``, see `where_it_ends`.
-    """
+    """Return where each controller's spec ends."""
     rows: dict[Any, dict[tuple[str, str], float]] = {}
     for place, part in record.groupby(["example", "controller"], sort=False):
         rows[place] = {}
@@ -201,13 +171,7 @@ def spec_ends(record: pd.DataFrame) -> pd.DataFrame:
 
 
 def checked_record(path: Path = SAMPLING_RECORD) -> pd.DataFrame:
-    """Return the record, if the paper's own loops are those of which it was made.
-
-    Raises
-    ------
-    ValueError
-        If a run of today differs from its line: the record is of other equations.
-    """
+    """Return the record, if the paper's own loops are those of which it was made."""
     record = pd.read_csv(path)
     for example in paper.EXAMPLES:
         own = (record["example"] == example) & (record["controller"] == "paper")
@@ -217,13 +181,7 @@ def checked_record(path: Path = SAMPLING_RECORD) -> pd.DataFrame:
 
 
 def check_lines(kept: pd.DataFrame, today: pd.DataFrame) -> None:
-    """Compare lines of the record with runs of today, to 1e-3.
-
-    Raises
-    ------
-    ValueError
-        If they differ.
-    """
+    """Compare lines of the record with runs of today, to 1e-3."""
     columns = ["error", "peak"]
     a, b = (table[columns].to_numpy() for table in (kept, today))
     if not np.allclose(a, b, rtol=1e-3, atol=0, equal_nan=True):

@@ -59,29 +59,7 @@ def tune(
     By differential evolution (scipy.optimize.differential_evolution) over the logarithms of the
     gains; each generation is one ensemble.
 
-    Parameters
-    ----------
-    loop : Compiled
-        Run from its own initial state.
-    bounds : mapping
-        ``{qualified name: (low, high)}``, both > 0.
-    timepts : ndarray of shape (m,)
-        Times in s.
-    cost, limited : Metric
-        What is made small, and what has to stay at or below `limit`.
-    limit : float
-    generations : int, optional
-    max_steps : int, optional
-        Steps of a simulation beyond which gains are refused as too stiff.
-    seed : int, optional
-    samples : mapping, optional
-        ``{qualified name: values}`` of parameters and, as ``"plant.x1(0)"``, initial states, all of
-        equal length; every candidate is run with each sample.  By default the loop as it is.
-
-    Raises
-    ------
-    ParameterError
-        If bounds are not positive and increasing, or no gains were found that keep the limit.
+    Shapes: `timepts` (m,).
     """
     names = list(bounds)
     for name, (low, high) in bounds.items():

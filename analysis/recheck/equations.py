@@ -130,19 +130,7 @@ def _of_two(operation: str, one: _Slopes, two: _Slopes) -> _Slopes:
 
 
 def stays(enclosed: Callable[[_Box], Interval], box: _Box, low: Any, high: Any, line: str) -> None:
-    """Prove low <= f <= high on a box, by halving it across the side that matters most.
-
-    Parameters
-    ----------
-    enclosed : callable
-        Encloses f on a box.
-    box : mapping
-        Sides by name; those without an end are not halved.
-    low, high : Fraction
-        Bounds.
-    line : str
-        Of the proof, for the answer no.
-    """
+    """Prove low <= f <= high on a box, by halving it across the side that matters most."""
     waiting, cells = [box], 0
     while waiting:
         cell, cells = waiting.pop(), cells + 1

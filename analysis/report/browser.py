@@ -27,13 +27,7 @@ FLAGS = (
 
 
 def find_browser() -> str:
-    """Return the path of an installed Chromium or Chrome.
-
-    Raises
-    ------
-    UsageError
-        If there is none, with what to install.
-    """
+    """Return the path of an installed Chromium or Chrome."""
     for name in BROWSERS:
         path = shutil.which(name)
         if path:

@@ -101,15 +101,7 @@ def compare_contents(
 
 
 def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Return the content of a ``report.json``, given as file or as its folder.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    UsageError
-        If it is not a report.
-    """
+    """Return the content of a ``report.json``, given as file or as its folder."""
     path = Path(path)
     path = path / "report.json" if path.is_dir() else path
     try:

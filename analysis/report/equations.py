@@ -13,21 +13,7 @@ __all__ = ["block_items", "equations_of"]
 
 
 def equations_of(diagram: Any, blocks: Collection[str], number: str = "") -> list[Item]:
-    """Return the equations of some blocks of a diagram, with values in the places of parameters.
-
-    Parameters
-    ----------
-    diagram : control.InputOutputSystem
-    blocks : collection of str
-        Names of the blocks, with the diagrams around them.
-    number : str, optional
-        Printed beside the first equation of each block.
-
-    Raises
-    ------
-    CompileError
-        If a block has no formula.
-    """
+    """Return the equations of some blocks of a diagram, with values in the places of parameters."""
     return [
         item
         for block in native.typeset(diagram, values=True)

@@ -47,11 +47,6 @@ def entries(
 
     A ``report.json`` that cannot be read, has no page beside it, or that `check` refuses is listed
     as such.
-
-    Raises
-    ------
-    UsageError
-        If there is no report.
     """
     folder = Path(folder)
     files = sorted(p for p in folder.rglob("report.json") if p.parent != folder)

@@ -38,16 +38,7 @@ def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
     signal in each of some stretches, and its first sample there that is not finite, so that
     neither a peak nor a gap is lost.
 
-    Parameters
-    ----------
-    signals : ndarray of shape (n, m)
-    count : int, optional
-        How many at most; or half of them and three of each signal, where that is more.
-
-    Returns
-    -------
-    ndarray of int
-        Places in increasing order; all of them where there are not more than `count`.
+    Shapes: `signals` (n, m).
     """
     number, length = signals.shape
     if length <= count:

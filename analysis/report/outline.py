@@ -224,16 +224,7 @@ def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
 
 
 def summary(claims: Sequence[Claim]) -> tuple[str, str]:
-    """Return the report's traffic light, and the sentence that it stands for.
-
-    Parameters
-    ----------
-    claims : sequence of Claim
-
-    Returns
-    -------
-    look, sentence : str
-    """
+    """Return the report's traffic light, and the sentence that it stands for."""
     statuses = [claim_status(claim) for claim in claims]
     looks = [look for _, look in statuses]
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))

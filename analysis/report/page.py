@@ -119,13 +119,7 @@ def generator(template: str) -> str:
 
 
 def check_report_folder(folder: str | os.PathLike[str]) -> None:
-    """Refuse a folder whose files a report would replace, unless a report has made them.
-
-    Raises
-    ------
-    UsageError
-        With the file, and what to do.
-    """
+    """Refuse a folder whose files a report would replace, unless a report has made them."""
     folder = Path(folder)
     page, content, print_ = (folder / n for n in ("index.html", "report.json", "report.pdf"))
     is_own = _maker(page) == generator("report.html")
@@ -135,13 +129,7 @@ def check_report_folder(folder: str | os.PathLike[str]) -> None:
 
 
 def check_gallery_folder(folder: str | os.PathLike[str]) -> None:
-    """Refuse a folder whose ``index.html`` is not that of a gallery.
-
-    Raises
-    ------
-    UsageError
-        With the file, and what to do.
-    """
+    """Refuse a folder whose ``index.html`` is not that of a gallery."""
     page = Path(folder) / "index.html"
     if page.exists() and _maker(page) != generator("gallery.html"):
         _refuse([page], "move it away")

@@ -66,14 +66,7 @@ def svg_files(
 
 
 def draw_ahead(sections: Iterable[Section], until: Callable[[], bool]) -> Drawn:
-    """Draw figures while there is nothing else to do; return them as SVG files, see `svg_files`.
-
-    Parameters
-    ----------
-    sections : iterable of Section
-    until : callable
-        Asked before each figure whether to end.
-    """
+    """Draw figures while there is nothing else to do; return them as SVG files, see `svg_files`."""
     items = (item for section in sections for item in section.items)
     figures = (item.figure for item in items if isinstance(item, Figure))
     return {figure: _svg_file(figure) for figure in takewhile(lambda _: not until(), figures)}
@@ -93,16 +86,6 @@ def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup
     ids only those that are referred to stay, with `key` in front.  Styles become attributes,
     because the page's content policy forbids inline styles; ink, grey and fill take the page's
     colours, so that dark pages work.
-
-    Parameters
-    ----------
-    figure : Figure
-    file : bytes
-        What `svg_files` made of it.
-    key : str
-        Unique on the page.
-    shapes : dict
-        Definition of each shape, and its id; new ones are added.
     """
     root = ElementTree.fromstring(file)
     for element in root.iter():
@@ -207,15 +190,7 @@ FRAME = {"x", "y", "transform", "href", "clip-path"}  # of a mark: where it is; 
 
 
 def compact(root: Element, shapes: dict[str, str]) -> None:
-    """Shorten a drawing in place.
-
-    Parameters
-    ----------
-    root : Element
-        Without namespaces; styles are attributes, letters refer to `shapes`.
-    shapes : dict
-        Definition of each shape of the page, and its id; words and marks are added.
-    """
+    """Shorten a drawing in place."""
     for element in root.iter():
         for name, value in INITIAL.items():
             if element.get(name) == value:

@@ -55,25 +55,13 @@ SIGNALS = ("error", "control", "actuated", "weights", "gain")
 
 
 def loop(study: Study, folder: Path) -> partial[Any]:
-    """Return the function that builds the diagram, with the study's options set.
-
-    Raises
-    ------
-    UsageError
-        If it does not exist, or an option is refused.
-    """
+    """Return the function that builds the diagram, with the study's options set."""
     options = {key: option(value, folder) for key, value in study.options.items()}
     return partial(loop_function(study.loop, folder), **options)
 
 
 def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path) -> Choice:
-    """Return the choice that a table under ``[choices]`` describes.
-
-    Raises
-    ------
-    UsageError
-        If an option is refused, or nominal label or weights do not fit.
-    """
+    """Return the choice that a table under ``[choices]`` describes."""
     options = {
         label: _default(name, build) if value == DEFAULT else option(value, folder)
         for label, value in choices.options.items()
@@ -82,13 +70,7 @@ def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path)
 
 
 def labels(name: str, choices: Choices) -> Choice:
-    """Return a choice with its options as they stand in the file.
-
-    Raises
-    ------
-    UsageError
-        If nominal label or weights do not fit.
-    """
+    """Return a choice with its options as they stand in the file."""
     for label in choices.weights:
         if label not in choices.options:
             raise unknown("option", label, choices.options, f"in the weights of '{name}'")
@@ -109,13 +91,7 @@ def _default(name: str, build: Callable[..., Any]) -> Any:
 
 
 def times(study: Study) -> np.ndarray:
-    """Return the sample times 0, step, ..., end.
-
-    Raises
-    ------
-    ParameterError
-        If the step is not a whole part of the end, or far too short.
-    """
+    """Return the sample times 0, step, ..., end."""
     end, step = study.time.end, study.time.step
     if end / step > _MOST_SAMPLES:
         raise ParameterError(
@@ -128,13 +104,7 @@ def times(study: Study) -> np.ndarray:
 
 
 def requirement(study: Study, key: str) -> Requirement:
-    """Return a requirement of the study.
-
-    Raises
-    ------
-    UsageError
-        If the formula cannot be read, or looks beyond its end.
-    """
+    """Return a requirement of the study."""
     rule = study.spec[key]
     until = study.time.end if rule.until is None else rule.until
     return Requirement(
@@ -143,13 +113,7 @@ def requirement(study: Study, key: str) -> Requirement:
 
 
 def metrics_of(study: Study, folder: Path, signals: frozenset[str]) -> tuple[Metric, ...]:
-    """Return the metrics of the study; names that it leaves to us must be among `signals`.
-
-    Raises
-    ------
-    UsageError
-        If another metric of the study is refused, or is none.
-    """
+    """Return the metrics of the study; names that it leaves to us must be among `signals`."""
     if study.metrics is None:
         return ()
     asked = study.metrics
@@ -175,13 +139,7 @@ def _metric(value: Any, folder: Path) -> Metric:
 
 
 def inputs_of(study: Study, diagrams: Iterable[ct.InputOutputSystem]) -> tuple[float, ...]:
-    """Return the value of each input of the diagrams, in their order.
-
-    Raises
-    ------
-    UsageError
-        If the study names an input that a diagram lacks, or leaves one out, or the order differs.
-    """
+    """Return the value of each input of the diagrams, in their order."""
     labels = [list(diagram.input_labels) for diagram in diagrams]
     for known in labels:
         for name in study.inputs:
@@ -203,23 +161,7 @@ def inputs_of(study: Study, diagrams: Iterable[ct.InputOutputSystem]) -> tuple[f
 def experiment(
     study: Study, folder: Path, signals: frozenset[str], inputs: Sequence[float] = ()
 ) -> Experiment:
-    """Return what is simulated for each row.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        Of the study file.
-    signals : frozenset of str
-        Outputs that all diagrams of the study have.
-    inputs : sequence of float, optional
-        Values of their inputs, see `inputs_of`.
-
-    Raises
-    ------
-    UsageError
-        As in the functions above.
-    """
+    """Return what is simulated for each row."""
     build = loop(study, folder)
     space = Space(
         quantities=tuple(uncertain(name, law) for name, law in study.space.items()),
@@ -238,13 +180,7 @@ def experiment(
 
 
 def faults_of(signal: str, faulty: Faulty) -> dict[str, Fault]:
-    """Return the faults that a table under ``[faults]`` describes, by name, all from 0 s on.
-
-    Raises
-    ------
-    UsageError
-        If a magnitude is refused.
-    """
+    """Return the faults that a table under ``[faults]`` describes, by name, all from 0 s on."""
     found = {}
     for kind, size in faulty.model_dump(exclude_none=True).items():
         lasts = size if kind == "dropout" else None
@@ -268,13 +204,7 @@ def size_mistakes(rows: Rows) -> dict[str, str]:
 
 
 def main_design(rows: Rows, space: Space, seed: int) -> Design:
-    """Return the rows of the main table.
-
-    Raises
-    ------
-    ParameterError
-        If a size is missing, or one is given that the design does not take.
-    """
+    """Return the rows of the main table."""
     for mistake in size_mistakes(rows).values():
         raise ParameterError(mistake)
     if rows.size is not None:

@@ -113,20 +113,7 @@ def run_differences(first: Path, second: Path) -> list[str]:
 
 
 def long_table_differences(first: Path, second: Path, rtol: float = 0.0) -> list[str]:
-    """Return what differs between tables of two runs that are too long for their pages.
-
-    Parameters
-    ----------
-    first, second : pathlib.Path
-        Run folders.
-    rtol : float, optional
-        Numbers closer than this, relative to the larger, count as equal.
-
-    Raises
-    ------
-    RunFolderError
-        If a folder holds no results, or what does not belong together.
-    """
+    """Return what differs between tables of two runs that are too long for their pages."""
     one, other = (load_result(folder) for folder in (first, second))
     return _table_differences(one, other, rtol, longer_than=LISTED)
 

@@ -90,13 +90,7 @@ def save_finding(folder: Path, finding: Finding, origin: str) -> None:
 
 
 def load_finding(folder: Path, key: str, origin: str) -> Finding | None:
-    """Return the finding in ``folder / key``; None if that analysis is not done.
-
-    Raises
-    ------
-    RunFolderError
-        If its files are damaged or edited, or it was computed from something else than `origin`.
-    """
+    """Return the finding in ``folder / key``; None if that analysis is not done."""
     path = folder / key / "finding.json"
     if not path.exists():
         return None
@@ -123,24 +117,12 @@ def load_finding(folder: Path, key: str, origin: str) -> Finding | None:
 
 
 def load_run(folder: Path) -> dict[str, Any]:
-    """Return what ``run.json`` holds.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder holds no run, or the file is damaged.
-    """
+    """Return what ``run.json`` holds."""
     return shaped(folder / "run.json", RunFile)
 
 
 def remove_run(folder: Path, *, force: bool = False) -> None:
-    """Remove the folder of a run, with its page.
-
-    Raises
-    ------
-    RunFolderError
-        If it holds something else, and `force` is False.
-    """
+    """Remove the folder of a run, with its page."""
     if not force:
         known = {*_OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
         others = sorted(p.name for p in folder.iterdir() if p.name not in known)
@@ -153,20 +135,7 @@ def remove_run(folder: Path, *, force: bool = False) -> None:
 
 
 def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
-    """Return the study of a run, as it was begun.
-
-    Parameters
-    ----------
-    folder : Path
-    own : mapping of str to Kind, optional
-        Kinds of analysis of one's own, as the study calls them; any others that it has take the
-        tables as they stand, and cannot be run.
-
-    Raises
-    ------
-    RunFolderError
-        If its file is missing, damaged, or edited since.
-    """
+    """Return the study of a run, as it was begun."""
     path = folder / "study.toml"
     try:
         text = study_text(file_bytes(path))
@@ -182,15 +151,7 @@ def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
 
 
 def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep | None:
-    """Return the rows in ``folder / rows``; None if there are none.
-
-    Raises
-    ------
-    StoreError
-        If the folder is damaged.
-    RunFolderError
-        If they were computed from something else than `origin`.
-    """
+    """Return the rows in ``folder / rows``; None if there are none."""
     here = folder / "rows"
     if not (here / "study.json").exists():
         return None
@@ -203,13 +164,7 @@ def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep 
 
 
 def checked(folder: Path) -> None:
-    """Refuse a folder that is not whole, before anything of it is believed.
-
-    Raises
-    ------
-    RunFolderError
-        With what is wrong, in the words of whoever reads the part that is.
-    """
+    """Refuse a folder that is not whole, before anything of it is believed."""
     try:
         check_whole(folder)
     except RunFolderError:
@@ -218,13 +173,7 @@ def checked(folder: Path) -> None:
 
 
 def read_through(folder: Path) -> None:
-    """Read every part and every table, for what their readers say of them; nothing is imported.
-
-    Raises
-    ------
-    UsageError
-        If a part is damaged, or parts do not go together.
-    """
+    """Read every part and every table, for what their readers say of them; nothing is imported."""
     result = _result_in(folder, {}, ())
     with as_written(f"'{folder}'"):
         if result.rows is not None:
@@ -268,13 +217,7 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
 
 
 def _result_in(folder: Path, own: Mapping[str, Kind], gone: Sequence[str]) -> Result:
-    """Return what is in a folder that is whole, or say why its parts do not go together.
-
-    Raises
-    ------
-    UsageError
-        If a part is damaged, or parts do not go together.
-    """
+    """Return what is in a folder that is whole, or say why its parts do not go together."""
     study, run = load_study(folder, own), load_run(folder)
     content = shaped(folder / "results.json", ResultsFile, "continue with --resume")
     origin = origin_key(run["origin"])
@@ -320,13 +263,7 @@ def _put_together(
 
 
 def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
-    """Refuse parts that are each as they were written, and do not go together.
-
-    Raises
-    ------
-    RunFolderError
-        With what contradicts what.
-    """
+    """Refuse parts that are each as they were written, and do not go together."""
     folder, rows = result.folder, result.rows
     expected, done = list(keyed(result.study)), [finding.key for finding in result.findings]
     if expected[: len(done)] != done or (result.complete and done != expected):
@@ -363,11 +300,6 @@ def received(folder: Path, *, trust: bool = False) -> Grant:
     """Return what code of a run folder may run: what this user has run or trusted, and nlctl's own.
 
     The folder says where the code was, and nothing of who trusts it.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder holds no run, or it is damaged.
     """
     home = folder / load_run(folder)["study_folder"]
     load_study(folder)
@@ -376,13 +308,7 @@ def received(folder: Path, *, trust: bool = False) -> Grant:
 
 
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
-    """Return the kinds of one's own that the study of a run names, and what is said of the others.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder holds no run, or its study is damaged.
-    """
+    """Return the own kinds that the study of a run names, and what is said of the others."""
     found, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
     return found, [f"what it found is told without its figures: {p}" for p in problems]
 

@@ -403,20 +403,7 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
 
 def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
-    """Run one analysis.
-
-    Returns
-    -------
-    Finding
-        None if its rows are incomplete.
-
-    Raises
-    ------
-    UsageError
-        If the rows do not admit the analysis, such as a regional one where all rows pass.
-    KeyboardInterrupt
-        If Ctrl-C ended a search.
-    """
+    """Run one analysis."""
     found = kind_of(asked).run(asked, ground)
     if found is None:
         return None

@@ -38,19 +38,7 @@ __all__ = [
 
 
 def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
-    """Return what the results of a study follow from, as data for a JSON file.
-
-    Parameters
-    ----------
-    file : StudyFile
-    prepared : Prepared
-        Its experiment.
-
-    Raises
-    ------
-    UsageError
-        If what a comparison compares cannot be made.
-    """
+    """Return what the results of a study follow from, as data for a JSON file."""
     end = float(file.experiment.timepts[-1])
     facts = experiment_facts(prepared)
     values = {labels_text(labels): loop_values(p.system, end) for labels, p in prepared.loops}
@@ -103,15 +91,7 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
 
 
 def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
-    """Return in words how a diagram differs from those of a record; nothing if it is one of them.
-
-    Parameters
-    ----------
-    origin : mapping
-        Of `origin_of`.
-    diagram : control.InputOutputSystem
-        With the values that it has by itself.
-    """
+    """Return in words how a diagram differs from those of a record; nothing if it does not."""
     now = from_json(as_json(loop_facts(diagram)))
     found = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
     return difference_text(min(found, key=len, default=["the study kept no record of its loop"]))

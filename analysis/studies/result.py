@@ -125,13 +125,7 @@ class Result:
         return table_html(heading, ("analysis", "claim", "answer", "found"), rows)
 
     def __getitem__(self, key: str) -> Finding:
-        """Return the finding with this key.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest ones.
-        """
+        """Return the finding with this key."""
         found = {finding.key: finding for finding in self.findings}
         if key not in found:
             raise unknown("finding", key, found)

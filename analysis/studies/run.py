@@ -330,15 +330,7 @@ def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[s
 
 
 def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
-    """Return the study of a run folder, validated against the loop of today; see `reopened`.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder holds no run.
-    StudyError
-        If the loop has changed so that the study no longer fits.
-    """
+    """Return the study of a run folder, validated against the loop of today; see `reopened`."""
     checked(folder)
     place = load_run(folder)["study_folder"]
     load_study(folder)
@@ -364,21 +356,7 @@ class Reopened:
 
 
 def reopened(folder: Path, *, trust: bool = False) -> Reopened:
-    """Return the study of a run with its loop, to draw from it.
-
-    Parameters
-    ----------
-    folder : Path
-    trust : bool, optional
-        As in `read_study`.
-
-    Raises
-    ------
-    StudyError
-        If the loop has changed so that the study no longer fits.
-    RunFolderError
-        If the folder holds no run, or one that was computed from another loop.
-    """
+    """Return the study of a run with its loop, to draw from it."""
     file, before = rerun_file(folder, trust=trust), load_run(folder)["origin"]
     prepared = prepare(file.experiment)
     now = origin_of(file, prepared)

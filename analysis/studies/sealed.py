@@ -58,19 +58,7 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def read_json(path: Path, remedy: str = ANEW) -> Any:
-    """Read a file of a run folder that `write_json` has written.
-
-    Parameters
-    ----------
-    path : Path
-    remedy : str, optional
-        What is to be done where the file is not what was written.
-
-    Raises
-    ------
-    RunFolderError
-        If it is missing, damaged or edited.
-    """
+    """Read a file of a run folder that `write_json` has written."""
     try:
         content = json.loads(file_bytes(path))
     except FileNotFoundError:
@@ -96,13 +84,7 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
 
 
 def file_bytes(path: Path) -> bytes:
-    """Return what is in a file of a run folder.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read, is not a file, or is larger than any of a run.
-    """
+    """Return what is in a file of a run folder."""
     if path.exists() and not path.is_file():  # a pipe would never end
         raise OSError(errno.EINVAL, "it is not a file")
     if path.stat().st_size > LARGEST:
@@ -112,13 +94,7 @@ def file_bytes(path: Path) -> bytes:
 
 @contextmanager
 def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
-    """Refuse content that fits together and that no run writes: of other versions, or made up.
-
-    Raises
-    ------
-    RunFolderError
-        Where the body stumbles over it.
-    """
+    """Refuse content that fits together and that no run writes: of other versions, or made up."""
     try:
         yield
     except UsageError:
@@ -135,13 +111,7 @@ def digest_of(content: Any) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Return a key of a file's bytes.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
+    """Return a key of a file's bytes."""
     if not path.is_file():
         raise FileNotFoundError(errno.ENOENT, "there is no such file", str(path))
     with path.open("rb") as file:

@@ -31,13 +31,7 @@ def started(name: str, v0: Any, count: int) -> dict[str, float]:
 
 
 def checked_start(spec: Any, count: int) -> np.ndarray:
-    """Return a record's v0 as an array.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither one finite number nor `count` of them.
-    """
+    """Return a record's v0 as an array."""
     who = type(spec).__name__
     given = vector(who, "v0", np.atleast_1d(spec.v0))
     if given.size not in (1, count):

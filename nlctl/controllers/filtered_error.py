@@ -36,11 +36,6 @@ def is_hurwitz(coefficients: Sequence[float]) -> bool:
     """Whether all roots of a polynomial lie in the open left half plane.
 
     By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
-
-    Parameters
-    ----------
-    coefficients : sequence of float
-        Highest power first, the first one positive.
     """
     numbers = [Fraction(c) for c in coefficients]
     above, row = numbers[::2], numbers[1::2]

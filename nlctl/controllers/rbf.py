@@ -281,23 +281,7 @@ class AdaptiveWeights(NetworkWeights):
 def fitting_network(
     who: str, basis: Any, weights: Any, default: Callable[..., Any]
 ) -> tuple[ct.InputOutputSystem, Any]:
-    """Return a regressor as a block, and its weights.
-
-    Parameters
-    ----------
-    who : str
-        What connects them, for the error.
-    basis : record or control.InputOutputSystem
-        With outputs ``psi[0]``, ``psi[1]``, ...
-    weights : record, control.InputOutputSystem or None
-    default : callable
-        ``default(nodes=...)`` makes weights where there are none.
-
-    Raises
-    ------
-    ParameterError
-        If the weights are not as many as the outputs psi.
-    """
+    """Return a regressor as a block, and its weights."""
     regressor = as_system(basis, "basis")
     nodes = sum(label.startswith("psi[") for label in regressor.output_labels)
     weights = default(nodes=nodes) if weights is None else weights

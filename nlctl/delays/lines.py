@@ -15,11 +15,5 @@ def is_delayed(system: Any) -> bool:
 
 
 def delayed_blocks(system: Any) -> list[Block]:
-    """Return the transport delays of a diagram, in the order of its blocks.
-
-    Raises
-    ------
-    DiagramError
-        If one is in discrete time, is sampled, or stands in the diagram twice.
-    """
+    """Return the transport delays of a diagram, in the order of its blocks."""
     return continuous_blocks(system, is_delayed, f"needs continuous time: {PAST.discrete}", "past")

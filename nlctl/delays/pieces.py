@@ -49,20 +49,6 @@ def smooth_pieces(
 
     A piece is halved until it is a polynomial to rounding, also at those of 1000 places that lie
     in it.
-
-    Parameters
-    ----------
-    values : callable
-        ``values(t)`` is an array of shape (count,).
-    begin, end : float
-        Times (s).
-    count : int
-        Number of functions; of none there is one piece.
-
-    Yields
-    ------
-    SmoothPiece
-        In order.
     """
     if not count:
         yield SmoothPiece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))

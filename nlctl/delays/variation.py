@@ -34,20 +34,7 @@ class Variation:
     kinks: np.ndarray
 
     def extreme(self, order: int, sign: int) -> tuple[float, float]:
-        """Return where V, or its slope, is greatest or least, and how large it is there.
-
-        Parameters
-        ----------
-        order : {0, 1}
-            V itself, or its slope.
-        sign : {1, -1}
-            The greatest value, or the least.
-
-        Returns
-        -------
-        tuple of float
-            Time (s) and value.
-        """
+        """Return where V, or its slope, is greatest or least, and how large it is there."""
         own = self.powers
         if order:
             own = own[:, 1:] * np.arange(1, own.shape[1]) * (2.0 / self.lengths)[:, None]
@@ -65,21 +52,7 @@ class Variation:
 
 
 def variation(spec: Any, begin: float, end: float, path: str) -> Variation | None:
-    """Return how the delay of a `TransportDelay` varies during a run, None where it does not.
-
-    Parameters
-    ----------
-    spec : TransportDelay
-    begin, end : float
-        First and last time of the run (s).
-    path : str
-        Name of the block.
-
-    Raises
-    ------
-    ParameterError
-        If the variation jumps, or grows as fast as time: signals would overtake each other.
-    """
+    """Return how the delay of a `TransportDelay` varies during a run, None where it does not."""
     if spec.varying is None:
         return None
     try:
@@ -129,18 +102,7 @@ def _check_continuous(made: Variation, fits: np.ndarray, path: str) -> None:
 def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> None:
     """Refuse delays that a variation makes 0 or negative.
 
-    Parameters
-    ----------
-    made : Variation or None
-    delays : ndarray of shape (lanes,)
-        Constant parts (s).
-    path : str
-        Name of the block.
-
-    Raises
-    ------
-    ParameterError
-        With the block, the time and the value.
+    Shapes: `delays` (lanes,).
     """
     t, least = (0.0, 0.0) if made is None else made.extreme(0, -1)
     if not delays.min() + least > 0:
@@ -151,19 +113,7 @@ def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> Non
 
 
 def variation_table(made: list[Variation | None]) -> dict[str, np.ndarray]:
-    """Return the variations of all lines as arrays of an integration.
-
-    Parameters
-    ----------
-    made : list of Variation or None
-        One for each line.
-
-    Returns
-    -------
-    dict
-        ``varied`` (lines,): numbers of pieces, 0 where a delay is constant; ``vary_t`` and
-        ``vary_h`` (pieces, lines), ``vary`` (pieces, lines, 6), ``kinks`` (lines, kinks), then inf.
-    """
+    """Return the variations of all lines as arrays of an integration."""
     most = max([1, *(one.starts.size for one in made if one)])
     kinks = max([1, *(one.kinks.size + 1 for one in made if one)])
     table = {

@@ -42,26 +42,7 @@ class Divided:
 
 
 def divided(system: Any, params: Mapping[str, Any] | None) -> Divided:
-    """Divide a user's overrides.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-    params : mapping or None
-        Overrides by name.
-
-    Returns
-    -------
-    Divided
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError
-        If nobody reads a parameter of that name, or more than one block is meant.
-    ParameterError
-        If a name is not text.
-    """
+    """Divide a user's overrides."""
     found = Divided()
     if not params:
         return found

@@ -34,14 +34,7 @@ PointFunction = Callable[[float, np.ndarray, np.ndarray], PointValues]
 
 
 def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
-    """Return rates and outputs at a point, with the parameters that a system has now.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    point : tuple
-        Time (s), states, inputs.
-    """
+    """Return rates and outputs at a point, with the parameters that a system has now."""
     if isinstance(system, ct.StateSpace):  # connected linear systems have one matrix for all
         rates, outputs = system.dynamics(*point), system.output(*point)
     else:
@@ -50,25 +43,7 @@ def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rates_and_outputs(system: Any, params: Mapping[str, Any] | None = None) -> PointFunction:
-    """Return what computes python-control's rates and outputs, with parameters of its own.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        It stays as it is; a copy of it is evaluated.
-    params : mapping, optional
-        Overrides by name.
-
-    Returns
-    -------
-    callable
-        ``function(t, x, u)`` returns rates and outputs.
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError, ParameterError
-        If a name or a value is refused.
-    """
+    """Return what computes python-control's rates and outputs, with parameters of its own."""
     own = overridden(system, params)
     return lambda t, x, u: values_now(own, (t, x, u))
 
@@ -78,13 +53,7 @@ def agree(
 ) -> np.ndarray:
     """Return where values are equal to rounding; NaN equals nothing.
 
-    Parameters
-    ----------
-    a, b : array_like of shape (m,)
-    absolute : array_like, optional
-        What may be added to a relative difference, see `explained`.
-    relative : float, optional
-        Of the larger one.
+    Shapes: `a, b` (m,).
     """
     a, b = np.asarray(a), np.asarray(b)
     with np.errstate(invalid="ignore"):
@@ -96,13 +65,6 @@ def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
     """Yield points as far as rounding may move one.
 
     Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
-
-    Parameters
-    ----------
-    point : tuple
-        Time (s), states, inputs.
-    later : float, optional
-        By how much time is moved (s); never earlier, since what begins at t has begun.
     """
     t, x, u = point
     places = np.arange(x.size + u.size)
@@ -114,19 +76,7 @@ def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
 def explained(
     function: PointFunction, point: Point, base: PointValues, later: float = 0.0
 ) -> PointValues:
-    """Return by how much rounded states and inputs explain that values are not `base`.
-
-    Parameters
-    ----------
-    function : callable
-        ``function(t, x, u)`` returns the values.
-    point : tuple
-        Time (s), states, inputs.
-    base : tuple of ndarray
-        The values there.
-    later : float, optional
-        As for `rounded_points`.
-    """
+    """Return by how much rounded states and inputs explain that values are not `base`."""
     moved = [np.zeros_like(values) for values in base]
     for near in rounded_points(point, later):
         for place in (near, _opposite(near, point)):

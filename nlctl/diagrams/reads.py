@@ -18,21 +18,7 @@ _CONTAINERS = (tuple, list, set, frozenset)
 
 
 def may_read(block: Any, key: str) -> bool:
-    """Whether the functions of a third-party block may read a parameter of that name.
-
-    Parameters
-    ----------
-    block : control.NonlinearIOSystem
-    key : str
-        Name of the parameter in the block.
-
-    Returns
-    -------
-    bool
-        True if the block declares it, its text stands in the code of its functions or of what
-        they reach, or they read it when they are called.  False is said only of functions that
-        were called, and did not look at all names.
-    """
+    """Whether the functions of a third-party block may read a parameter of that name."""
     functions = [f for f in (block.updfcn, block.outfcn) if f is not None]
     if key in declared_keys(block) or any(key in texts_of(f) for f in functions):
         return True

@@ -131,13 +131,7 @@ def _again(kind: type, base: type) -> Any:
 
 
 def with_own_values(system: Any) -> Any:
-    """Return a system whose third-party blocks have values of their own; itself if all have.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        It stays as it is.  What a diagram of plain python-control gives its blocks, they keep.
-    """
+    """Return a system whose third-party blocks have values of their own; itself if all have."""
     if not any(_lacks_own(within(leaf.system)) for leaf in leaves(system)):
         return system
     given = apart(system)

@@ -101,19 +101,7 @@ class Layout:
 
 
 def bundle(names: Sequence[str], letters: int = 14) -> str:
-    """Write many names short: ``psi1 ... psi27`` for numbers in sequence, then a count.
-
-    Parameters
-    ----------
-    names : sequence of str
-    letters : int
-        Length at which a line is broken, if there is more than one name in it.
-
-    Returns
-    -------
-    str
-        One line or several, separated by newlines.
-    """
+    """Write many names short: ``psi1 ... psi27`` for numbers in sequence, then a count."""
     runs: list[list[str]] = []
     for name in dict.fromkeys(names):
         follows = runs and _successor(runs[-1][-1]) == name

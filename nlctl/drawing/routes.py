@@ -187,20 +187,7 @@ def _dots(plan: LayoutPlan, heights: HeightMap, gutters: Sequence[_Gutter]):
 
 
 def arrange(nodes: Sequence[LayoutNode], wires: Sequence[Wire], page: float = 624.0) -> Layout:
-    """Place the blocks of a diagram and route its wires.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-    wires : sequence of Wire
-        Sources and targets are indices into `nodes`.
-    page : float
-        Width available, in points; a diagram wider than that is broken into several bands.
-
-    Returns
-    -------
-    Layout
-    """
+    """Place the blocks of a diagram and route its wires."""
     if not nodes:
         return Layout(0.0, 0.0, (), (), ())
     links = {(wire.source, t) for wire in wires for t in wire.targets}

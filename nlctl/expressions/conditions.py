@@ -24,20 +24,7 @@ _OF_QUOTIENTS = ("remainder", "fmod")
 
 
 def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
-    """Return all that expressions switch at, parts first.
-
-    Parameters
-    ----------
-    exprs : iterable of Expr
-    known : collection of Expr, optional
-        What is not looked into.
-
-    Returns
-    -------
-    tuple of Expr
-        Operations whose value or slope jumps.  Those that are equal or not equal are none: what
-        differs at one point only is never seen by an integral.
-    """
+    """Return all that expressions switch at, parts first."""
     nodes = needed(exprs, known)
     return tuple(node for node in nodes if node.varies and node not in known and _switches(node))
 
@@ -54,12 +41,7 @@ def _switches(node: Expr) -> bool:
 
 
 def at_integers(node: Expr) -> bool:
-    """Return whether an operation jumps where something is an integer, as `floor` and `%` do.
-
-    Parameters
-    ----------
-    node : Expr
-    """
+    """Return whether an operation jumps where something is an integer, as `floor` and `%` do."""
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
 
 
@@ -68,21 +50,7 @@ def _of_truths(node: Expr) -> bool:
 
 
 def switching_function(graph: Graph, condition: Expr) -> Expr:
-    """Return what changes its sign where a condition switches.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where it is kept.
-    condition : Expr
-        One of `conditions`.
-
-    Returns
-    -------
-    Expr
-        A number, or a vector of as many as the condition has elements.  Of `floor` and its
-        relatives a sine that is 0 at the integers.
-    """
+    """Return what changes its sign where a condition switches."""
     op, args = condition.op, [graph.number(arg) for arg in condition.args]
     if op in _OF_DIFFERENCES:
         return _difference(graph, *args)

@@ -27,19 +27,7 @@ _UNKNOWN = ("call", "solve")  # what they do is not written in the expression
 
 
 def may_jump(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> bool:
-    """Whether expressions have jumps of their own, as far as can be read off.
-
-    Parameters
-    ----------
-    exprs : iterable of Expr
-    known : collection of Expr, optional
-        What they are made of: it is not looked into.
-
-    Returns
-    -------
-    bool
-        False only if they are continuous functions of `known`, of states and of time.
-    """
+    """Whether expressions have jumps of their own, as far as can be read off."""
     own = [node for node in needed(exprs, known) if node not in known]
     return any(
         node.op in _JUMPING

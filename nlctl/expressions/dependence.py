@@ -16,19 +16,7 @@ _WHOLE = ("sum", "call", "solve")  # each element of the result depends on all t
 def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:
     """Return which results are made of which entries of an array, whatever the values are.
 
-    Parameters
-    ----------
-    results : sequence of tuple
-        Expressions, one after the other, each with its length.
-    array : str
-        The array that leaves read: ``"x"``, for instance.
-    count : int
-        Its entries.
-
-    Returns
-    -------
-    ndarray of bool, shape (rows, count)
-        False only where a derivative is 0 for all values.
+    returns (rows, count).
     """
     found: dict[Expr, np.ndarray] = {}
     for node in needed([expr for expr, _ in results]):

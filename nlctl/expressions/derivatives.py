@@ -25,45 +25,13 @@ def tangents(
     fixed_points: Mapping[str, Sequence[Expr]] | None = None,
     differences: bool = False,
 ) -> list[Expr | None]:
-    """Return the derivatives of expressions along a direction in what they are made of.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where the expressions are kept, and the derivatives, too.
-    results : iterable of Expr
-    seed : callable
-        Takes what is read from an array (a leaf) and returns its own derivative, an expression of
-        the same size, or None for 0.
-    fixed_points : mapping, optional
-        For what is searched for, by the name of the search: the numbers F(z), as expressions of
-        the solution z, that are equal to it.  Its derivative is that of the implicit function.
-    differences : bool, optional
-        Whether opaque functions are differentiated by `difference`, or refused.
-
-    Returns
-    -------
-    list of Expr or None
-        None where the derivative is 0 whatever the values are.  At kinks and jumps: the
-        derivative of the side that the value belongs to.  The derivative of NaN is NaN.
-
-    Raises
-    ------
-    Untraceable
-        If an opaque function, which has no expressions, is among what results are made of.
-    """
+    """Return the derivatives of expressions along a direction in what they are made of."""
     reader = _Reader(graph, seed, fixed_points or {}, differences=differences)
     return reader.read(list(results))
 
 
 def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
-    """Return what gives the partial derivatives of a function of the table, by argument.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where they are kept.
-    """
+    """Return what gives the partial derivatives of a function of the table, by argument."""
     return _Reader(graph, lambda _: None, {}).partial
 
 

@@ -21,21 +21,7 @@ RELATIVE_STEP = float(
 
 
 def opaque_difference(graph: Graph, call: Expr, tangents: Sequence[Expr | None]) -> Expr:
-    """Return the derivative of an opaque call along the derivatives of its arguments.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where it is kept.
-    call : Expr
-    tangents : sequence of Expr or None
-        Of each argument, None where it is 0.
-
-    Returns
-    -------
-    Expr
-        A vector as long as the result; 0 where no argument moves.
-    """
+    """Return the derivative of an opaque call along the derivatives of its arguments."""
     op, const = graph.op, graph.const
     sizes = call.data[1]
     speed = op("sqrt", _squares(graph, call.args, tangents, sizes))

@@ -16,28 +16,7 @@ def evaluate_expressions(
     arrays: Mapping[str, np.ndarray],
     searches: Mapping[str, Callable[[np.ndarray], np.ndarray]] | None = None,
 ) -> list[np.ndarray]:
-    """Return the values of expressions.
-
-    Parameters
-    ----------
-    results : iterable of Expr
-    arrays : mapping
-        What is read, by name: ``"t"``, ``"x"``, ``"u"``, ``"p"``, of shape (rows, points).
-    searches : mapping, optional
-        What finds the signals of algebraic loops, by name: from all that it is given, of shape
-        (rows, points), in as many columns.
-
-    Returns
-    -------
-    list of ndarray
-        Of shape (points,) for numbers, (size, points) for vectors; without the last axis, or with
-        1 in its place, where nothing depends on the point.
-
-    Raises
-    ------
-    Untraceable
-        If an opaque function, which has no expressions, is among what results are made of.
-    """
+    """Return the values of expressions."""
     values: dict[Expr, np.ndarray] = {}
     results = list(results)
     with np.errstate(all="ignore"):  # infinity and NaN travel, as they do in machine code

@@ -11,17 +11,7 @@ _EVERYTHING = (-math.inf, math.inf)
 
 
 def integer_range(expr: Expr) -> _Range:
-    """Return bounds of a number, infinite where none is known.
-
-    Parameters
-    ----------
-    expr : Expr
-
-    Returns
-    -------
-    tuple of float
-        The least and the largest value that it may have.
-    """
+    """Return bounds of a number, infinite where none is known."""
     known: dict[Expr, _Range] = {}
     waiting = [expr]
     while waiting:

@@ -32,9 +32,9 @@ def symbol(name: str) -> str:
     Examples
     --------
     >>> symbol("delta_hat")
-    '\\\\hat{\\\\delta}'
+    '\\hat{\\delta}'
     >>> symbol("x1"), symbol("p_mean")
-    ('x_{1}', 'p_{\\\\mathrm{mean}}')
+    ('x_{1}', 'p_{\\mathrm{mean}}')
     """
     found = re.fullmatch(r"(.*?)\[(\d+)\]", name)
     if found:
@@ -107,16 +107,7 @@ class LatexWriter:
     tables: dict[Expr, str] = field(default_factory=dict)
 
     def formula(self, expr: Expr, index: Index | None = None, *, by_name: bool = True) -> str:
-        """Return an expression, or the element of a vector at an index, as a formula.
-
-        Parameters
-        ----------
-        expr : Expr
-        index : tuple, optional
-            (start, step, letter) of the element; step 0 for a fixed one.
-        by_name : bool, optional
-            False to write out an expression that has a name itself.
-        """
+        """Return an expression, or the element of a vector at an index, as a formula."""
         return self._written(expr, index, 0, by_name=by_name)[0]
 
     def _written(

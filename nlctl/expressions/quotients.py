@@ -23,24 +23,6 @@ def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
     """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative.
 
     Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where the expression is kept, and the quotient, too.
-    result : Expr
-        A number, made of numbers.
-    variable : Expr
-        The leaf v.
-
-    Returns
-    -------
-    Expr
-
-    Raises
-    ------
-    Untraceable
-        If it takes the quotient of another function than sums, products and quotients.
     """
     found: dict[Expr, _Quantity] = {}
     for node in needed([result]):

@@ -26,22 +26,6 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
     A condition that depends on tracers is followed both ways: the function runs again for every
     way through it, and the results are combined by ``select``, which takes the branch that Python
     takes, also for NaN.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where the expressions are kept.
-    function : callable
-        A block's function of plain Python; its code runs as it stands.
-    arguments : callable
-        Makes the arguments, anew for every run, since a function may change them.
-
-    Raises
-    ------
-    Untraceable
-        If the function does what expressions cannot say, fails, or has too many ways through it.
-    Ambiguous
-        If it does what machine code would understand in another way than Python.
     """
     graph.limit = len(graph.nodes) + BUDGET
     assumptions = dict(graph.assumptions)

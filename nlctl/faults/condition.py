@@ -29,11 +29,6 @@ def parse_condition(text: str) -> Condition:
 
     ``>`` and ``>=`` say the same: the instant at which a signal reaches a level is that at which
     it passes it.
-
-    Raises
-    ------
-    ParameterError
-        If it is another text.
     """
     found = TEXT.fullmatch(text) if isinstance(text, str) else None
     if found is None or found[1] != found[3]:

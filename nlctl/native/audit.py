@@ -107,22 +107,7 @@ class _Audited:
 
 
 def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
-    """Compare a run's program with python-control, if that has not been done.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    trial : Trial
-    wanted : bool or "every run"
-
-    Raises
-    ------
-    AuditError
-        If they differ by more than rounding, or if python-control's own values differ from call to
-        call.
-    ParameterError
-        If `wanted` is something else.
-    """
+    """Compare a run's program with python-control, if that has not been done."""
     if not (isinstance(wanted, bool | np.bool_) or (isinstance(wanted, str) and wanted == _EVERY)):
         raise ParameterError(f"audit must be True, False or 'every run', got {wanted!r}")
     if not wanted:
@@ -390,23 +375,7 @@ def _with_every_output(compiled: Compiled) -> Schedule:
 def rounding(
     compiled: Compiled, trial: Trial, point: Any, schedule: Schedule | None = None
 ) -> PointValues:
-    """Return how far results may be moved by what the operations before them round.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    trial : Trial
-    point : tuple
-        Time, states and inputs of the program.
-    schedule : Schedule, optional
-        With other outputs than those of the diagram.
-
-    Returns
-    -------
-    tuple of ndarray
-        For the rates, the outputs, the states after each meeting, what is declared of jumps, and
-        the states behind resets.
-    """
+    """Return how far results may be moved by what the operations before them round."""
     schedule = schedule or compiled.schedule
     found = equations(schedule, compiled.program.layout, trial.p, trial.meetings)
     t, x, u = point

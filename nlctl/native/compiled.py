@@ -171,28 +171,7 @@ class Compiled(Reading, StandIn):
     ) -> np.ndarray:
         """Return the outputs, as ``system.output`` does.
 
-        Parameters
-        ----------
-        t : float
-            Time (s).
-        x : array_like of shape (nstates,)
-            State.
-        u : array_like of shape (ninputs,), optional
-            Inputs; by default there are none.
-        params : mapping, optional
-            Overrides by qualified name.
-
-        Returns
-        -------
-        ndarray of shape (noutputs,)
-            In the outputs' units.
-
-        Raises
-        ------
-        UsageError
-            If the diagram has a transport delay: its past is known in a run only.
-        ParameterError, UnknownNameError
-            If x or u has another length, or an override is refused.
+        Shapes: `x` (nstates,), `u` (ninputs,); returns (noutputs,).
         """
         return self._call(self.native[1], self.system.noutputs, t, x, u, params)
 

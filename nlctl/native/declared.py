@@ -56,16 +56,7 @@ def declared_labels(schedule: Schedule) -> tuple[list[str], list[str]]:
 def declared_now(
     schedule: Schedule, system: Any, point: tuple[Any, Any, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return switching functions, watched ones, guards and commits, and what resets return.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    system : InputOutputSystem
-        The diagram with its current parameters.
-    point : tuple
-        Time, states and inputs of the diagram.
-    """
+    """Return switching functions, watched ones, guards and commits, and what resets return."""
     t, x, u = point
     parts = dict(zip(map(id, schedule.nodes), parts_now(system, t, x, u), strict=True))
 

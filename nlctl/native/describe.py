@@ -27,12 +27,7 @@ _SHOWN = 8  # names that are listed before the rest is only counted
 
 
 def described(reading: Reading) -> str:
-    """Return what was compiled, block by block in the order of evaluation.
-
-    Parameters
-    ----------
-    reading : Reading
-    """
+    """Return what was compiled, block by block in the order of evaluation."""
     schedule, program, p = reading.schedule, reading.program, reading.parameter_vector()
     system, nodes = schedule.system, schedule.nodes
     lines = [

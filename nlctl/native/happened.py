@@ -23,11 +23,6 @@ def with_log(task: Any, work: Any) -> Any:
     """Return a workspace with room for what happens next, in a single run.
 
     What has been noted stays; the room grows with it.
-
-    Parameters
-    ----------
-    task, work : Task, Work
-        See `workspace`.
     """
     free = work.log.t.size - int(work.lanes["noted"][0])
     least = log_room(task, work.events.g.shape[0])
@@ -38,14 +33,7 @@ def with_log(task: Any, work: Any) -> Any:
 
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
-    """Return block and name of each row of g that is noted.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    conditions : Conditions
-        Those of the program that runs.
-    """
+    """Return block and name of each row of g that is noted."""
     labels: list[tuple[str, str]] = []
     nodes = compiled.schedule.nodes
     for node in nodes:
@@ -62,13 +50,7 @@ def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
 
 
 def happened(compiled: Compiled, run: Any) -> EventLog:
-    """Return what has happened in a single run.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    run : Run
-    """
+    """Return what has happened in a single run."""
     rows = row_labels(compiled, run.machine.lowered.conditions)
     labels = [(*row, direction) for row in rows for direction in ("falling", "rising")]
     count = int(run.lanes["noted"][0])

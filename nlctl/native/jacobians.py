@@ -76,13 +76,7 @@ def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
 
 
 def tangent(reading: Reading) -> Tangent:
-    """Return a diagram's equations differentiated by states, inputs and parameters.
-
-    Raises
-    ------
-    CompileError
-        If there are transport delays, or ideal relays slide as inputs' rates say.
-    """
+    """Return a diagram's equations differentiated by states, inputs and parameters."""
     known = reading.cache.of(Tangent)
     if not known:
         known.append(_tangent(reading))
@@ -115,26 +109,7 @@ def _tangent(reading: Reading) -> Tangent:
 def along(
     equations: Equations, name: str, starts: Mapping[str, int]
 ) -> list[tuple[Expr | None, int]]:
-    """Return the derivative of a diagram's results along a direction.
-
-    Parameters
-    ----------
-    equations : Equations
-    name : str
-        ``"dx"`` or ``"y"``.
-    starts : mapping
-        By which arrays is differentiated: where in the direction each begins.
-
-    Returns
-    -------
-    list of tuple
-        Of each piece the expression, None where it is 0, and its length.
-
-    Raises
-    ------
-    CompileError
-        If a search for the signals of an algebraic loop has no derivative.
-    """
+    """Return the derivative of a diagram's results along a direction."""
     graph = equations.graph
     pieces = equations.pieces(name)
 
@@ -160,15 +135,7 @@ def jacobian(
 ) -> dict[str, np.ndarray]:
     """Return the derivatives of the right-hand side and of the outputs along directions.
 
-    Parameters
-    ----------
-    directions : ndarray of shape (nstates + inputs of the program + parameters, k)
-
-    Returns
-    -------
-    dict
-        ``"dx"`` of shape (nstates, k) and ``"y"`` of shape (noutputs, k), and of next states of
-        sampled blocks ``"sample0"`` and so on.
+    Shapes: `directions` (nstates + inputs of the program + parameters, k).
     """
     system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
     p = reading.parameter_vector(params)
@@ -279,11 +246,7 @@ def over_a_period(reading: Reading, found: Mapping[str, np.ndarray]) -> tuple[An
     States are taken before what happens at the beginning of a period, outputs after it; inputs
     are constant over it.  Between instants the map is a matrix exponential.
 
-    Returns
-    -------
-    states, outputs : ndarray of shape (nstates, nstates + ninputs), (noutputs, ...)
-    period : float
-        Common period of the clocks (s).
+    returns (nstates, nstates + ninputs).
     """
     n, width = found["dx"].shape
     meetings = reading.program.meetings
@@ -360,13 +323,7 @@ def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
 
 
 def check_enters_alone(node: Node, name: str) -> None:
-    """Refuse a parameter that numbers follow from: these are constants to the equations.
-
-    Raises
-    ------
-    CompileError
-        If `name` is one.
-    """
+    """Refuse a parameter that numbers follow from: these are constants to the equations."""
     spec: Any = node.system.current_spec if isinstance(node.system, Block) else None
     field, _, place = name.removeprefix(f"{node.path}.").partition("[")
     if not hasattr(spec, "derived") or field not in declared_params(spec):

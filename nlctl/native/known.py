@@ -24,18 +24,7 @@ from .timed.ahead import ahead
 def known_conditions(
     system: Any, params: Any, times: np.ndarray, watched: tuple[Watched, ...] = ()
 ) -> Known:
-    """Return what is known of the conditions of a diagram; nothing where it cannot be read.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    params : mapping or None
-        Overrides of the run.
-    times : ndarray
-        Of the run (s).
-    watched : tuple of Watched, optional
-        Functions of the run, whose own conditions are some too.
-    """
+    """Return what is known of the conditions of a diagram; nothing where it cannot be read."""
     if not ct.isctime(system):
         return Known()
     try:

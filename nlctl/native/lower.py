@@ -107,22 +107,7 @@ class Lowered:
 def lower(
     schedule: Schedule, program: Program, lanes: int = 8, found: Equations | None = None
 ) -> Lowered:
-    """Plan a diagram as a program over batched members.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    program : Program
-        Its arrays.
-    lanes : int, optional
-        Number of members.
-    found : Equations, optional
-        What the schedule computes, where that has been read already.
-
-    Returns
-    -------
-    Lowered
-    """
+    """Plan a diagram as a program over batched members."""
     if found is None:
         found = equations(schedule, program.layout, meetings=program.meetings)
     stores = stores_of(found, found.results)
@@ -140,24 +125,7 @@ def lower_along(
     derivatives: Sequence[tuple[Expr | None, int]],
     lanes: int = 8,
 ) -> Lowered:
-    """Plan the derivative of the right-hand side along a direction, one in each lane.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    program : Program
-    equations : Equations
-        What was differentiated; its graph keeps the derivatives.
-    derivatives : sequence
-        Of the rows of dx one after the other: an expression, None where it is 0, and its length.
-        They read the direction in an array ``"v"``.
-    lanes : int, optional
-        Number of directions.
-
-    Returns
-    -------
-    Lowered
-    """
+    """Plan the derivative of the right-hand side along a direction, one in each lane."""
     stores, row = [], 0
     for expr, size in derivatives:
         expr = equations.graph.const(0.0) if expr is None else expr

@@ -72,11 +72,6 @@ class Members:
 
         nlctl's blocks check and derive their own parameters, and only those that vary do;
         third-party parameters go through python-control, member by member.
-
-        Raises
-        ------
-        ParameterError
-            If a value is refused; the message names the member.
         """
         owners = self._owners
         if owners is None:
@@ -149,15 +144,7 @@ class Members:
 
 
 def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, Any]) -> Members:
-    """Gather the members of an ensemble.
-
-    Raises
-    ------
-    ParameterError
-        If arrays have different lengths, or an initial state is not a finite number.
-    UnknownNameError
-        If a state does not exist.
-    """
+    """Gather the members of an ensemble."""
     if not isinstance(states, Mapping):
         raise ParameterError(
             "initial_state of an ensemble goes by name, {'plant.x1': array of shape (members,)}, "

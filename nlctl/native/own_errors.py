@@ -28,16 +28,7 @@ class _Enough(BaseException):
 def own_error(
     reading: Reading, made: Trajectory, params: Mapping[str, Any] | None
 ) -> Exception | None:
-    """Return what python-control's functions raise just behind the end of a run, if they do.
-
-    Parameters
-    ----------
-    reading : Reading
-    made : Trajectory
-        It ended before its last time.
-    params : mapping or None
-        Parameters of the run.
-    """
+    """Return what python-control's functions raise just behind the end of a run, if they do."""
     finite = np.flatnonzero(np.isfinite(made.states).all(axis=0))
     if reading.schedule.lines or reading.program.sampled or reading.schedule.loops:
         return None  # what these do depends on more than the present

@@ -39,26 +39,7 @@ def respond(
     watched: tuple[Watched, ...] = (),
     **form: Any,
 ) -> Response:
-    """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments.
-
-    Parameters
-    ----------
-    settings : Settings
-    watched : tuple of Watched
-        Functions whose changes of sign are events.
-    **form
-        ``squeeze``, ``transpose`` and ``return_states`` of the response.
-
-    Raises
-    ------
-    DivergedError, ChatteringError
-        If the run does not reach the last time, unless `ignore_errors`: then the response ends
-        where the run did, with ``success = False``.
-    KeyboardInterrupt
-        After Ctrl-C, unless `ignore_errors`.
-    ParameterError
-        If an argument has a wrong shape, or times do not fit a discrete-time diagram.
-    """
+    """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments."""
     system = compiled.system
     compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
     wanted = evaluation_array(evaluation_times, times)

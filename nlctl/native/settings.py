@@ -103,24 +103,7 @@ def solver_settings(
     solve_ivp_kwargs: Mapping[str, Any] | None,
     **settings: Any,
 ) -> Settings:
-    """Return the settings of a run in machine code.
-
-    Parameters
-    ----------
-    method : str, Tableau or None
-        Of `Settings`.
-    solve_ivp_method, solve_ivp_kwargs
-        As python-control takes them: of the keywords ``rtol`` and ``atol`` have a meaning here.
-    **settings
-        Others of `Settings`; None where they are not given.
-
-    Raises
-    ------
-    ParameterError
-        If an argument has no meaning in machine code; the message says what comes nearest.
-    UnknownNameError
-        If there is no such keyword or method.
-    """
+    """Return the settings of a run in machine code."""
     keywords = dict(solve_ivp_kwargs or {})
     asked = keywords.pop("method", None) or solve_ivp_method
     if asked:

@@ -47,20 +47,7 @@ def first_event(
 ) -> Event | None:
     """Return the first event in a step.
 
-    Parameters
-    ----------
-    look : callable
-        ``look(t)``: guards, switching functions, and what memories would become, in this order.
-    ends : tuple of float
-        Where the step begins and ends (s).
-    before : ndarray of shape (n,)
-        What is seen where it begins; its state is not the polynomial's to the last digit.
-    kinds : tuple of int
-        Numbers of guards, and of switching functions.
-    small : callable
-        ``small(size)``: by how much a memory of that size may go back without reversing.
-    places : ndarray
-        Where it is looked at, from 0 to 1.
+    Shapes: `before` (n,).
     """
     begin, end = ends
     t = begin + places * (end - begin)

@@ -51,21 +51,6 @@ def python_control_response(
 
     In discrete time, and where functions do not declare their sizes, by
     `control.input_output_response`; otherwise by the `Driver`.
-
-    Parameters
-    ----------
-    run : RunArguments
-    known : callable, optional
-        ``known(system, params, times, watched)``: what is known of the conditions of its equations.
-
-    Raises
-    ------
-    DivergedError, ChatteringError, ZenoError
-        If the run does not reach its last time, unless errors are to be ignored.
-    ParameterError
-        If inputs, initial state, times or a keyword are refused.
-    UsageError
-        If a block is an ideal relay.
     """
     system, times = apart(run.system).system, run.times
     params = override(system, run.params)
@@ -95,15 +80,7 @@ def python_control_response(
 
 
 def _integrator(run: RunArguments) -> tuple[Any, dict[str, Any]]:
-    """Return the class of the integrator and its arguments.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such method or keyword.
-    ParameterError
-        If a keyword has no meaning.
-    """
+    """Return the class of the integrator and its arguments."""
     solver, keywords = run.solver, run.solver["solve_ivp_kwargs"]
     method = solver["method"] or solver["solve_ivp_method"] or "LSODA"
     if not (isinstance(method, type) and issubclass(method, integrate.OdeSolver)):

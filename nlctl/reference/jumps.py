@@ -163,25 +163,7 @@ class Jumps:
         Clocks first, then memories; then all guards that have fallen jump, from the values before,
         and so on until none falls.
 
-        Parameters
-        ----------
-        t : float
-            The instant (s).
-        x : ndarray of shape (nstates,)
-            The state before.
-        what : frozenset of Moment
-            What clocks do.
-        sides : ndarray of bool, or None
-            Which guards were >= 0 before; None at the first instant, at which none falls.
-
-        Raises
-        ------
-        ZenoError
-            If there is no end of jumps.
-        BlockError
-            If a reset does not return all states of its block.
-        DivergedError
-            If a guard is NaN.
+        Shapes: `x` (nstates,).
         """
         if what:
             with happening(what):

@@ -49,20 +49,7 @@ class Switches:
         self._times: defaultdict[int, list[float]] = defaultdict(list)
 
     def note(self, i: int, t: float) -> None:
-        """Note that something has happened.
-
-        Parameters
-        ----------
-        i : int
-            Which row of what is looked at.
-        t : float
-            When (s).
-
-        Raises
-        ------
-        ChatteringError
-            If it happens all the time.
-        """
+        """Note that something has happened."""
         self._last.append(t)
         if len(self._last) == _CROWD and t - self._last[0] < _CROWDED * np.ptp(self._ends):
             block, which = self._label(i)
@@ -75,21 +62,7 @@ class Switches:
     ) -> None:
         """Note that a condition has been at 0.
 
-        Parameters
-        ----------
-        i : int
-            Which one.
-        t : float
-            When (s).
-        value : callable
-            ``value(t, x)``: what is compared.
-        x, rates : ndarray of shape (nstates,)
-            State behind that, and its derivatives.
-
-        Raises
-        ------
-        ChatteringError
-            If there is no end of it, or none that this engine comes to.
+        Shapes: `x, rates` (nstates,).
         """
         times, end = self._times[i], self._ends[1]
         times.append(t)

@@ -43,13 +43,7 @@ class RunArguments:
 
 
 def checked_params(params: Any) -> Mapping[str, Any] | None:
-    """Return the parameters of a run.
-
-    Raises
-    ------
-    ParameterError
-        If they are not given by name.
-    """
+    """Return the parameters of a run."""
     if not isinstance(params, Mapping | None):
         raise ParameterError(
             f"params needs values by name, {{'law.beta': 4.0}}, got {type(params).__name__}"
@@ -60,24 +54,7 @@ def checked_params(params: Any) -> Mapping[str, Any] | None:
 def with_aliases(
     given: Mapping[str, Any], aliases: Mapping[str, Any], defaults: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return arguments by their full names.
-
-    Parameters
-    ----------
-    given : mapping
-        Those that have a short name as well, by their full names.
-    aliases : mapping
-        Those that were given by another name.
-    defaults : mapping
-        Of all arguments, by their full names.
-
-    Raises
-    ------
-    UnknownKeywordError
-        If there is no such name.
-    ParameterError
-        If an argument is given twice, or there are no times.
-    """
+    """Return arguments by their full names."""
     found = dict(given)
     for name, value in aliases.items():
         full = ALIASES.get(name)
@@ -118,25 +95,7 @@ def unified(run: RunArguments) -> RunArguments:
 def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) -> np.ndarray:
     """Return the inputs of a run over its times.
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    inputs : array_like or float
-        A number for all inputs at all times; an array of shape (ninputs, m), or (m,) for one
-        input; or a list, whose entries follow each other: a number is one input, an array of
-        shape (m,) one input over time, one of another length as many constant inputs, one of
-        shape (k, m) k inputs.
-    times : ndarray of shape (m,)
-
-    Returns
-    -------
-    ndarray of shape (ninputs, m)
-
-    Raises
-    ------
-    ParameterError
-        If the shape does not fit, or a value is not a finite number; the message names the input
-        and the time.
+    Shapes: `times` (m,); returns (ninputs, m).
     """
     count = system.ninputs or 0
     shape = (count, times.size)
@@ -181,28 +140,7 @@ def _stacked(entries: Sequence[Any], samples: int) -> np.ndarray:
 def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.ndarray:
     """Return the initial state of a run.
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    initial_state : mapping or array_like, optional
-        By name, as in `nlctl.initial_state`; None for the blocks' own.  A number holds for all
-        states; an array, or a list of numbers and arrays behind each other, for the first ones:
-        the others start at 0.
-
-    Returns
-    -------
-    ndarray of shape (nstates,)
-
-    Raises
-    ------
-    ParameterError
-        If there are more values than states, or one is not a finite number; the message names
-        the state.
-
-    Warns
-    -----
-    UserWarning
-        If there are fewer values than states and the last one is not 0.
+    returns (nstates,).
     """
     if initial_state is None or isinstance(initial_state, Mapping):
         return state_of(system, initial_state)
@@ -231,13 +169,7 @@ def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.n
 
 
 def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
-    """Return the times at which a response is wanted: those of the inputs if it is "T".
-
-    Raises
-    ------
-    ParameterError
-        If they are not finite and increasing, or lie outside of `times`.
-    """
+    """Return the times at which a response is wanted: those of the inputs if it is "T"."""
     if isinstance(evaluation_times, str) and evaluation_times == "T":
         return times
     wanted = as_numbers(evaluation_times)

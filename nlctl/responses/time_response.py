@@ -92,20 +92,7 @@ def response_of(
     form: Mapping[str, Any],
     **more: Any,
 ) -> Response:
-    """Return a response of a system.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    signals : sequence of ndarray
-        Times (s) of shape (k,), then outputs, states and inputs of shapes (..., k).
-    params : mapping or None
-        Parameters of the run.
-    form : mapping
-        ``squeeze``, ``transpose`` and ``return_states`` as in `control.TimeResponseData`.
-    **more
-        Further arguments of it.
-    """
+    """Return a response of a system."""
     return Response(
         *signals,
         issiso=system.issiso(),

@@ -52,13 +52,7 @@ class Watched:
         return self.direction == 0 or (self.direction > 0) == rises
 
     def value(self, t: float, x: np.ndarray, u: np.ndarray, params: Any) -> float:
-        """Return its value.
-
-        Raises
-        ------
-        ParameterError
-            If it is not one number.
-        """
+        """Return its value."""
         with np.errstate(all="ignore"):  # what is NaN is reported
             found = np.asarray(self.function(t, x, u, dict(params or {})))
         if found.size != 1 or found.dtype.kind not in "bfiu":
@@ -73,21 +67,7 @@ def nan_error(name: str, time: float) -> DivergedError:
 
 
 def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
-    """Return what is watched in a run.
-
-    Parameters
-    ----------
-    stop_when : callable or None
-        Where its value changes its sign the run ends.
-    events : callable, sequence of callables, mapping or None
-        Further functions, by name in a mapping; otherwise they are called by their own names.
-        ``direction`` and ``terminal`` of a function are as in `scipy.integrate.solve_ivp`.
-
-    Raises
-    ------
-    ParameterError
-        If one is not a function, two have the same name, or `terminal` is a number of events.
-    """
+    """Return what is watched in a run."""
     given: list[tuple[str, Any]] = [] if stop_when is None else [(STOP, stop_when)]
     if isinstance(events, Mapping):
         given += [(str(name), function) for name, function in events.items()]
@@ -110,21 +90,7 @@ def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
 
 
 def check_numbers(watched: Sequence[Watched], begin: Any, params: Any) -> None:
-    """End a run before it begins whose functions are NaN at its start.
-
-    Parameters
-    ----------
-    watched : sequence of Watched
-    begin : tuple
-        First time (s), states and inputs there.
-    params : mapping or None
-        Overrides of the run.
-
-    Raises
-    ------
-    DivergedError
-        If one is NaN.
-    """
+    """End a run before it begins whose functions are NaN at its start."""
     for one in watched:
         t, x, u = begin
         if np.isnan(one.value(t, x, u, params)):
@@ -132,12 +98,7 @@ def check_numbers(watched: Sequence[Watched], begin: Any, params: Any) -> None:
 
 
 def nan_watchers(watched: Sequence[Watched]) -> tuple[Watched, ...]:
-    """Return functions that fall through 0, and end a run, where those of a run become NaN.
-
-    Parameters
-    ----------
-    watched : sequence of Watched
-    """
+    """Return functions that fall through 0, and end a run, where those of a run become NaN."""
 
     def sides(each: Watched) -> Callable[..., Any]:
         def side(t: Any, x: Any, u: Any, params: Any) -> Any:
@@ -158,13 +119,7 @@ def watches_nan(name: str) -> bool:
 
 
 def not_a_number(happened: Iterable[tuple[float, str, str, str]]) -> DivergedError | None:
-    """Return the error of a run that one of the `numbers` has ended, None if none has.
-
-    Parameters
-    ----------
-    happened : iterable of tuple
-        Its events.
-    """
+    """Return the error of a run that one of the `numbers` has ended, None if none has."""
     for time, block, which, _ in happened:
         if not block and watches_nan(which):
             return nan_error(which.removesuffix(_IS_NAN), time)
@@ -172,21 +127,7 @@ def not_a_number(happened: Iterable[tuple[float, str, str, str]]) -> DivergedErr
 
 
 def check_moves(watched: Sequence[Watched], run: Any, params: Any) -> None:
-    """Refuse functions that are 0 all the time.
-
-    Parameters
-    ----------
-    watched : sequence of Watched
-    run : tuple of ndarray
-        Times, states and inputs of a run.
-    params : mapping or None
-        Its overrides.
-
-    Raises
-    ------
-    ParameterError
-        If one is 0 at each time and between any two.
-    """
+    """Refuse functions that are 0 all the time."""
     parts = [np.atleast_1d(np.asarray(part, dtype=float)) for part in run]
     between = [0.5 * (part[..., 1:] + part[..., :-1]) for part in parts]
     for one in watched:

@@ -146,22 +146,7 @@ def _meet(one: _Series, other: _Series) -> bool:
 def instants(
     clocks: Clocks, begin: float, end: float, known: Sequence[frozenset[Moment]] = ()
 ) -> Instants:
-    """Return what happens from `begin` on, and before `end`.
-
-    Parameters
-    ----------
-    clocks : mapping
-        Each clock by its owner.
-    begin, end : float
-        Times (s).
-    known : sequence of frozenset, optional
-        Patterns that come first, in this order.
-
-    Raises
-    ------
-    ParameterError
-        If there are too many.
-    """
+    """Return what happens from `begin` on, and before `end`."""
     patterns = {pattern: i for i, pattern in enumerate(known)}
     alike: dict[_Series, frozenset[Moment]] = {}
     for moment in moments(clocks):
@@ -182,13 +167,7 @@ def instants(
 
 
 def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
-    """Return the beginning and end of a period that repeats, and its length (s).
-
-    Raises
-    ------
-    ParameterError
-        If samples are late at random, or the period has too many of them.
-    """
+    """Return the beginning and end of a period that repeats, and its length (s)."""
     for clock in clocks:
         if clock.jitter:
             raise ParameterError(

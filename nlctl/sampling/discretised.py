@@ -60,20 +60,7 @@ def discretise(system: Any, dt: float, method: str = "euler") -> Any:
 
 
 def with_equations(who: str, system: Any) -> Any:
-    """Return a system whose blocks have equations: of a transfer function its state space.
-
-    Parameters
-    ----------
-    who : str
-        Who asks, for the error.
-    system : control.InputOutputSystem
-
-    Raises
-    ------
-    ParameterError
-        If a block has no equations, does not say how many signals or states it has, or is sampled
-        already.
-    """
+    """Return a system whose blocks have equations: of a transfer function its state space."""
     if isinstance(system, ct.TransferFunction):
         return ct.ss(
             system, name=system.name, inputs=system.input_labels, outputs=system.output_labels

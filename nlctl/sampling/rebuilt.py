@@ -12,15 +12,7 @@ from ..diagrams import reconnected
 
 
 def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
-    """Return a diagram whose inputs go through a block of as many, and its outputs as well.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-        It stays as it is.
-    first, last : control.InputOutputSystem, optional
-        Blocks with as many outputs as inputs: one for each input, or output, of the diagram.
-    """
+    """Return a diagram whose inputs go through a block of as many, and its outputs as well."""
     connect, given, shown = diagram.connect_map, diagram.input_map, diagram.output_map
     parts = list(diagram.syslist)
     if last is not None:  # it takes what the outputs were made of
@@ -41,17 +33,7 @@ def staged(diagram: Any, first: Any = None, last: Any = None) -> Any:
 
 
 def rebuilt(diagram: Any, change: Callable[[Any], Any], dt: Any) -> Any:
-    """Return a diagram of changed blocks, connected as those of another one are.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-        Nested to any depth; it stays as it is.
-    change : callable
-        Takes a block and returns one with the same inputs and outputs.
-    dt : float
-        Timebase of the result.
-    """
+    """Return a diagram of changed blocks, connected as those of another one are."""
     parts = [
         rebuilt(part, change, dt) if isinstance(part, ct.InterconnectedSystem) else change(part)
         for part in diagram.syslist

@@ -208,21 +208,7 @@ class Sampled(Around):
     ) -> list[Any]:
         """Return the parts of the states after what happens, one behind the other.
 
-        Parameters
-        ----------
-        now : frozenset of Moment
-            What happens.
-        x : array_like of shape (nstates,)
-            Numbers, or what stands for them.
-        due : array_like of shape (noutputs,)
-            Outputs that follow if any do, see `oldest`.
-        computed : callable
-            Returns what a sample makes: the block's own next states, and its outputs.
-
-        Returns
-        -------
-        list of array_like
-            The block's own states, outputs that wait where there is a delay, outputs held.
+        Shapes: `x` (nstates,), `due` (noutputs,).
         """
         own, waiting, held = self.parts(x)
         held = due if self.releases(now) else held

@@ -47,28 +47,13 @@ class Branch:
 
 
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
-    """Return the operations that may jump in expressions, parts first.
-
-    Parameters
-    ----------
-    exprs : iterable of Expr
-    """
+    """Return the operations that may jump in expressions, parts first."""
     nodes = needed(exprs)
     return [n for n in nodes if n.varies and n.op in _JUMPS and any(a.varies for a in n.args)]
 
 
 def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:
-    """Return the side of an operation.
-
-    Parameters
-    ----------
-    graph : Graph
-    op : str
-        One that `jumping` returns.
-    args : sequence of Expr
-    kept : Expr
-        The side that is kept.
-    """
+    """Return the side of an operation."""
     numbers = [graph.number(arg) for arg in args]
     if op in _ORDERS:
         return _of_order(graph, op, numbers, kept)

@@ -42,13 +42,7 @@ def slopes(
     direction: Direction,
     solutions: Mapping[str, Sequence[Expr]],
 ) -> list[Expr | None]:
-    """Return the derivatives of expressions along a direction, None where they are 0.
-
-    Raises
-    ------
-    CompileError
-        If a search for the signals of an algebraic loop has no derivative.
-    """
+    """Return the derivatives of expressions along a direction, None where they are 0."""
     try:
         return tangents(graph, list(exprs), direction, solutions, differences=True)
     except Untraceable as error:
@@ -68,19 +62,7 @@ def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
 
 
 def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: range) -> Direction:
-    """Return where time and inputs go while time goes by `time`, by 1 if that is None.
-
-    Parameters
-    ----------
-    graph : Graph
-    time : Expr or None
-    inputs : int
-        Number of the diagram's inputs.
-    first : int
-        Place, among the program's inputs, from which on their rates follow.
-    lines : range
-        StatePlaces of delayed signals, whose rates nobody keeps.
-    """
+    """Return where time and inputs go while time goes by `time`, by 1 if that is None."""
 
     def of_time(*_: object) -> Expr:
         return graph.const(1.0) if time is None else time

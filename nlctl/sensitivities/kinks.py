@@ -25,18 +25,7 @@ _SAME = 1e-12
 
 
 def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
-    """Return whether nothing that expressions are made of jumps at a condition.
-
-    Parameters
-    ----------
-    graph : Graph
-    roots : sequence of Expr
-        The expressions.
-    condition : Expr
-        A comparison.
-    p : ndarray
-        Parameters.
-    """
+    """Return whether nothing that expressions are made of jumps at a condition."""
     if condition.op not in _ORDERS or condition.size is not None:
         return False
     one, other = map(graph.number, condition.args)

@@ -33,17 +33,7 @@ def missing(
     found: Trajectory,
     given: tuple[np.ndarray, ...],
 ) -> list[NoDerivative]:
-    """Return why there are no derivatives from some time on, in the order of time.
-
-    Parameters
-    ----------
-    made : Differentiated
-    of_whom : tuple
-        The diagram, and by what is differentiated.
-    found : Trajectory
-    given : tuple of ndarray
-        Times, initial state, parameters and inputs of the run.
-    """
+    """Return why there are no derivatives from some time on, in the order of time."""
     compiled, names = of_whom
     run = _Run(made=made, compiled=compiled, names=names, found=found, given=given)
     first = sorted(run.later(), key=lambda each: each.time)[:1]

@@ -47,21 +47,7 @@ class VariedQuantity:
 
 
 def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> list[Observed]:
-    """Return signals by their names; None for the outputs of the diagram.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    names : sequence of str, str or None
-        Outputs of the diagram or of blocks in it, and states.
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError
-        If a name is not that of exactly one of them.
-    ParameterError
-        If there are none, or one twice.
-    """
+    """Return signals by their names; None for the outputs of the diagram."""
     system, read = compiled.system, compiled.schedule
     own: list[str] = list(system.output_labels or [])
     known = {
@@ -83,23 +69,7 @@ def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> l
 
 
 def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[VariedQuantity]:
-    """Return parameters and initial states by their names.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    names : sequence of str or str
-        ``"law.beta"``, ``"law.K[1]"``; ``"plant.x1(0)"``.
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError
-        If a name is not that of exactly one of them.
-    ParameterError
-        If there are none, or one twice.
-    CompileError
-        If it does not enter by the equations alone.
-    """
+    """Return parameters and initial states by their names."""
     states = {name: i for i, name in enumerate(state_names(compiled.system))}
     parameters = float_parameters(compiled)
     found = []

@@ -62,20 +62,7 @@ def parameters_with(
     settings: Any,
     span: float,
 ) -> np.ndarray:
-    """Return all parameters of a program with derivatives.
-
-    Parameters
-    ----------
-    made : Extended
-    quantities : sequence of VariedQuantity
-    p : ndarray
-        Those of the diagram.
-    scale : ndarray
-        By how much of each quantity is with_its_derivatives.
-    settings : Settings
-    span : float
-        How long the run is (s).
-    """
+    """Return all parameters of a program with derivatives."""
     size, late = made.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
     found = np.concatenate([p, np.zeros(size - p.size)])
     layout = made.layout
@@ -100,24 +87,7 @@ def with_its_derivatives(
     p: np.ndarray,
     settings: Any,
 ) -> Differentiated:
-    """Compile a diagram with its derivatives.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    signals : sequence of Observed
-        What is wanted.
-    quantities : sequence of VariedQuantity
-        By what is with_its_derivatives.
-    p : ndarray
-        Parameters, whose integers may steer equations.
-    settings : Settings
-
-    Raises
-    ------
-    CompileError
-        If something has no derivative.
-    """
+    """Compile a diagram with its derivatives."""
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
     made = extended(compiled, combinations, by)

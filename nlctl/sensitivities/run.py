@@ -54,13 +54,7 @@ class RunWithDerivatives:
 
 
 def differentiated_run(compiled: Compiled, asked: RunWithDerivatives) -> SensitivityResponse:
-    """Integrate a diagram with its derivatives.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    asked : RunWithDerivatives
-    """
+    """Integrate a diagram with its derivatives."""
     if not ct.isctime(compiled.system):
         raise CompileError(
             f"'{compiled.system.name}' is in discrete time: derivatives of runs are for diagrams "

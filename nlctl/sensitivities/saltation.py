@@ -117,17 +117,7 @@ class Saltation:
     def at_reset(
         self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
     ) -> list[SomeRows]:
-        """Return what follows the states where a block jumps.
-
-        Parameters
-        ----------
-        begin : int
-            The first of its states.
-        states : sequence
-            What they become.
-        guards : sequence of Expr
-            Its guards.
-        """
+        """Return what follows the states where a block jumps."""
         source, graph, places = self.source, self.source.graph, self.places
         before = source.moving(source.flow, self.sides.kept(source.committed))
         rows: dict[int, Expr] = {}
@@ -190,13 +180,7 @@ class Saltation:
         return self._first(self.places.grazing, touched)
 
     def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
-        """Return the derivative of an expression in a direction.
-
-        Parameters
-        ----------
-        level : Expr
-        seed : Direction
-        """
+        """Return the derivative of an expression in a direction."""
         return self.source.slopes([level], seed)
 
     def at_turns(self) -> dict[int, Expr]:

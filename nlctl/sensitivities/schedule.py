@@ -81,15 +81,7 @@ def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
 
 
 def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
-    """Return the schedule of a diagram with room for its derivatives by so many quantities.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    outputs : sequence of mapping
-        Combinations of signals that are wanted.
-    by : int
-    """
+    """Return the schedule of a diagram with room for its derivatives by so many quantities."""
     read = compiled.schedule
     own, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
     delays = [_derivative_of(read, i, j) for j in range(by) for i in range(len(read.lines))]
@@ -150,16 +142,7 @@ def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slo
 def with_derivatives(
     compiled: Compiled, made: Extended, states: int, outputs: int, by: int
 ) -> Schedule:
-    """Return the schedule of the program: what arrives, and what leaves which line at once.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    made : Extended
-    states, outputs : int
-        Numbers of the program's.
-    by : int
-    """
+    """Return the schedule of the program: what arrives, and what leaves which line at once."""
     from ..native.histories import direct_lines
 
     direct, lines = direct_lines(compiled.schedule), made.schedule.lines

@@ -131,14 +131,7 @@ class KeptSides:
 
 
 def sides_of(source: EquationParts, first: int) -> KeptSides:
-    """Return the sides of all jumps of a diagram.
-
-    Parameters
-    ----------
-    source : EquationParts
-    first : int
-        State from which on they are kept.
-    """
+    """Return the sides of all jumps of a diagram."""
     graph = source.graph
     wanted = [(node, node.op, node.args) for node in source.jumps]
     wanted += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]

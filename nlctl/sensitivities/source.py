@@ -98,13 +98,7 @@ class EquationParts:
 
     @cached_property
     def jumps(self) -> list[Expr]:
-        """The operations at which the flow may jump.
-
-        Raises
-        ------
-        CompileError
-            If one is in an algebraic loop.
-        """
+        """The operations at which the flow may jump."""
         inside = [e for each in self.found.fixed_points.values() for e in each]
         if jumping(inside):
             raise CompileError(
@@ -129,15 +123,7 @@ class EquationParts:
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
     def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
-        """Return the rates of all states, those of memories that are carried along included.
-
-        Parameters
-        ----------
-        flow : sequence
-            The rates of the others.
-        committed : sequence of Expr
-            What the memories would become.
-        """
+        """Return the rates of all states, those of memories that are carried along included."""
         pairs = zip(self.program.memory, committed, strict=True)
         carried = {m: expr for m, expr in pairs if m not in self.switched}
         if not carried:
@@ -173,15 +159,7 @@ class EquationParts:
 
 
 def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> EquationParts:
-    """Return what a diagram computes.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    made : Extended
-    p : ndarray
-        All parameters, those of the derivatives included.
-    """
+    """Return what a diagram computes."""
     program = compiled.program
     found = equations(made.schedule, made.layout, p, program.meetings)
     graph, first = found.graph, program.switching + found.conditions.rows
@@ -210,13 +188,7 @@ def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Ex
 
 
 def _jumps(node: Node) -> bool:
-    """Whether the memories of a block jump, whatever its inputs do.
-
-    Raises
-    ------
-    CompileError
-        If nobody can say.
-    """
+    """Whether the memories of a block jump, whatever its inputs do."""
     graph, system = Graph(), node.system
     if slides(system):
         return True

@@ -20,11 +20,5 @@ def slides(system: Any) -> bool:
 
 
 def sliding_blocks(system: Any) -> list[Block]:
-    """Return the ideal relays of a diagram, in the order of its blocks.
-
-    Raises
-    ------
-    DiagramError
-        If one is in discrete time, is sampled, or stands in the diagram twice.
-    """
+    """Return the ideal relays of a diagram, in the order of its blocks."""
     return continuous_blocks(system, slides, _WHY, "output")

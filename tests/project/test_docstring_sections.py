@@ -4,7 +4,9 @@ import ast
 import importlib
 import inspect
 import textwrap
+from pathlib import Path
 
+from places import ROOT
 from reference import entries, methods, offered
 from rows import each_row
 
@@ -116,3 +118,28 @@ EXAMPLES = [  # by a private function of its module, by a function that makes it
 @each_row(("made", "errors"), EXAMPLES)
 def test_exceptions_are_found(made, errors):
     assert raises(made) == errors
+
+
+def functions_of(path):
+    """Functions and methods of a file, by their first lines, with their docstrings."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(each.lineno for each in node.decorator_list)])
+            yield first, node.name, ast.get_docstring(node) or ""
+
+
+def test_what_is_not_offered_says_it_in_lines_and_not_in_sections():
+    """Sections of functions that no page shows are read by nobody, and cost as much as code."""
+    known = {
+        (Path(code.co_filename).resolve(), code.co_firstlineno)
+        for _, made in WITH_METHODS
+        if (code := getattr(inspect.unwrap(made), "__code__", None))
+    }
+    found = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for package in ("nlctl", "analysis")
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for first, name, text in functions_of(path)
+        if "\nParameters\n---" in text and (path.resolve(), first) not in known
+    ]
+    assert found == []

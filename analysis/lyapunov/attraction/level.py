@@ -123,17 +123,7 @@ class ProvedLevel:
 
 
 def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedLevel:
-    """Return the largest level that is proved, to a relative tolerance.
-
-    Parameters
-    ----------
-    V : Quadratic
-    box : Box
-        Every set looked at lies in it.
-    tol : float
-    max_boxes : int
-        For each level.
-    """
+    """Return the largest level that is proved, to a relative tolerance."""
     fits = V.largest_in(box) * _INSIDE
     low, boxes = _floor(V, fits, box), 0
     nothing = {"V": V, "level": 0.0, "floor": low, "above": fits, "refuted": None}

@@ -82,24 +82,7 @@ class StateRates:
 def motion_of(
     who: str, system: Any, box: Box, params: Mapping[str, Any] | None = None
 ) -> StateRates:
-    """Return the rates of a diagram or of a function as expressions.
-
-    Parameters
-    ----------
-    who : str
-        For messages.
-    system : control.InputOutputSystem, Compiled or callable
-        Or ``function((x1, ..., xn)) -> (x1', ..., xn')``.
-    box : Box
-        With a side for every state, in their order.
-    params : mapping, optional
-        Overrides of a diagram.
-
-    Raises
-    ------
-    ParameterError
-        If the rates are not a function of the states that can be read, or the box has other sides.
-    """
+    """Return the rates of a diagram or of a function as expressions."""
     try:
         if isinstance(system, ct.InputOutputSystem | Compiled):
             compiled = system if isinstance(system, Compiled) else native.compile(system)

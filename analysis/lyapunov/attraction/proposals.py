@@ -18,10 +18,7 @@ _RATE = 1e-3  # V' <= -1e-3 |x|^2 at samples, for P >= 1
 def from_linear_part(A: np.ndarray) -> np.ndarray:
     """Return P of A^T P + P A = -1, symmetric.
 
-    Parameters
-    ----------
-    A : ndarray of shape (n, n)
-        All its eigenvalues have negative real parts.
+    Shapes: `A` (n, n).
     """
     P = solve_continuous_lyapunov(A.T, -np.eye(len(A)))
     return 0.5 * (P + P.T)
@@ -34,12 +31,7 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
     samples and along the linear part, the one with the largest set is taken, as measured by the
     trace of P times that of the set before.
 
-    Parameters
-    ----------
-    motion : StateRates
-    at : ndarray of shape (n,)
-    P : ndarray of shape (n, n)
-    level : float
+    Shapes: `at` (n,), `P` (n, n).
     """
     import cvxpy as cp
 

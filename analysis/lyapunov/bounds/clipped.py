@@ -69,17 +69,6 @@ def eps_range(
     """Return the ranges of eps_u along both edges, for all t >= 0.
 
     It grows with v, so that these are its ends.
-
-    Parameters
-    ----------
-    k : tuple of float
-        Bounds of k.
-    edges : tuple of callable
-        The least and the greatest output.
-    u_max : float
-        Largest |u|.
-    tol : float
-        How far the ranges are from values that are attained.
     """
     part = clipped_split(*k)
 

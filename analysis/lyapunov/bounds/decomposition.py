@@ -131,12 +131,7 @@ class Decomposable(Protocol):
 
 
 def check_gain(who: str, k: Any) -> None:
-    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none."""
     bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
     if bounds is not None and (bounds.size != 2 or not 0 < bounds[0] <= bounds[1]):
         raise ParameterError(f"{who} needs k = (k_1, k_2) with 0 < k_1 <= k_2, got {k}")

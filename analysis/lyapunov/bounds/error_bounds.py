@@ -29,11 +29,6 @@ def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
     """Return p_1, ..., p_{n-1} > 0 of s^(n-1) + lambda_1 s^(n-2) + ... = prod_j (s + p_j).
 
     As balls, from the exact values of the lambdas.
-
-    Raises
-    ------
-    ParameterError
-        If a root is not real and negative: a chain of first-order filters needs real ones.
     """
     coefficients = [Fraction(c) for c in (*reversed(lambdas), 1.0)]
     common = math.lcm(*(c.denominator for c in coefficients))
@@ -55,25 +50,6 @@ def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) ->
 
     With z_0 = r and z_k' = -p_k z_k + z_{k-1}, e_1 = z_{n-1}: |z_k| <= max(|z_k(0)|, C_{k-1}/p_k),
     and every e_i is a combination of the z_k.
-
-    Parameters
-    ----------
-    lambdas : sequence of float
-        Of the filtered error (14).
-    e0 : sequence of n numbers or balls
-        e_1(0), ..., e_n(0).
-    C : arb
-        Bound of |r|.
-
-    Returns
-    -------
-    tuple of n arb
-        Upper bounds.
-
-    Raises
-    ------
-    ParameterError
-        If the filter has roots that are not real and negative.
     """
     poles = filter_poles(lambdas)
     n = len(poles) + 1
@@ -113,16 +89,6 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     exceeds the nearer one by at most |y'| h/2 + sup|y''| h^2/8.  Otherwise, and at most, the sum of
     the amplitudes: 0.5 and 1 have a period, and so have 0.1 and 0.2, but 0.1 and 0.3 have none,
     since the double next to 0.3 is not three times that next to 0.1 and their phases drift apart.
-
-    Parameters
-    ----------
-    reference : SumOfSines
-    samples : int, optional
-        Samples per period of the slowest sine.
-
-    Returns
-    -------
-    tuple of n + 1 floats
     """
     a, w = np.abs(reference.amplitudes), np.array(reference.frequencies)
     n = reference.order

@@ -66,16 +66,7 @@ def alpha_1(gains: Gains) -> float:
 
 
 def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
-    """Return alpha_0 = 0.2785 (tau delta* + b) + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31).
-
-    Parameters
-    ----------
-    gains : Gains
-    delta : float, Ball or cvxpy expression
-        delta*.
-    W_squared : float, Ball or cvxpy expression
-        |W|^2.
-    """
+    """Return alpha_0 = 0.2785 (tau delta* + b) + sigma_1 |W|^2 / 2 + sigma_2 delta*^2 / 2, (31)."""
     return (
         KAPPA * gains.tau * delta
         + KAPPA * gains.b
@@ -85,15 +76,7 @@ def alpha_0(gains: Gains, delta: Any, W_squared: Any) -> Any:
 
 
 def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N802
-    """Return V(0) = r^2/2 + |W - W_hat|^2 / (2 Gamma) + (delta* - delta_hat)^2 / (2 gamma), (21).
-
-    Parameters
-    ----------
-    gains, delta
-        As in `alpha_0`.
-    W_error_squared : float, Ball or cvxpy expression
-        |W - W_hat(0)|^2.
-    """
+    """Return V(0) of (21): r^2/2 + |W - W_hat|^2/(2 Gamma) + (delta* - delta_hat)^2/(2 gamma)."""
     return (
         0.5 * gains.r_0**2
         + (0.5 / gains.Gamma) * W_error_squared

@@ -252,22 +252,6 @@ class Shown:
 
         ``python -m nlctl.analysis.recheck FILE`` answers yes or no, with integer arithmetic of its
         own.  Bounds are rounded up, as a rule by less than a thousandth.
-
-        Parameters
-        ----------
-        file : path
-            Where to write.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        UsageError
-            If nothing is proved, or the proof needs functions or tighter enclosures than the
-            recheck has.
         """
         if not self.holds:
             raise UsageError(

@@ -91,14 +91,7 @@ class Sector:
 
 
 def plant_terms(plant: Any) -> tuple[Callable[[Any, Any], Any], Callable[[Any, Any], Any]]:
-    """Return f(x, v) and d(x, t) of a plant record of the class (1).
-
-    Raises
-    ------
-    DiagramError
-        If the record has no f and d, or, when these are called, they make of balls what they do
-        not make of floats.
-    """
+    """Return f(x, v) and d(x, t) of a plant record of the class (1)."""
     if not (hasattr(plant, "f") and hasattr(plant, "d")):
         raise DiagramError(
             f"{type(plant).__name__} is not a plant of the class (1): it lacks f and d; see "
@@ -166,16 +159,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
 def quotient_range(
     function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
 ) -> Sector:
-    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v.
-
-    Parameters
-    ----------
-    function : callable
-        ``function(x, v)``, x the coordinates of the other sides.
-    box : Box
-    tol, max_boxes
-        As for `sector`.
-    """
+    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v."""
     return range_of_quotient(quotient_function(function), box, tol=tol, max_boxes=max_boxes)
 
 
@@ -183,15 +167,7 @@ def quotient_function(
     function: Callable[[tuple[Any, ...], Any], Any],
     expression: Callable[[Graph, tuple[Tracer, ...]], Expr] | None = None,
 ) -> Readable:
-    """Return (q(x, v) - q(x, 0)) / v as a function of x and v together.
-
-    Parameters
-    ----------
-    function : callable
-        ``function(x, v)``, x the coordinates of the other sides.
-    expression : callable, optional
-        ``expression(graph, sides)``: q of symbols, v being the last.
-    """
+    """Return (q(x, v) - q(x, 0)) / v as a function of x and v together."""
 
     def gain(point: tuple[Any, ...]) -> Any:
         *x, v = point

@@ -159,27 +159,7 @@ def _side(name: str, count: int, low: float, high: float) -> str:
 def read_starts(
     loop: Any, starts: Any, *, free: tuple[str, ...] = (), kept: tuple[str, ...] = ()
 ) -> Starts:
-    """Return the set of initial states that `certify` was asked for.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    starts : mapping or Box or None
-        By state, or vector of states: a number, or both ends.  What is not named starts where the
-        loop starts; None is the loop's own initial state.  ``"V"`` bounds V(0).
-    free : tuple of str, optional
-        States that V bounds: where ``"V"`` is given they may start anywhere in its level set, and
-        where this is empty ``"V"`` is refused.
-    kept : tuple of str, optional
-        States of memories.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a mapping, an end is not a finite number, or low > high.
-    UnknownNameError, AmbiguousNameError
-        If a name is not that of a state.
-    """
+    """Return the set of initial states that `certify` was asked for."""
     names, x0 = tuple(state_names(loop)), initial_state(loop)
     ends = {name: (float(x), float(x)) for name, x in zip(names, x0, strict=True)}
     given = dict(zip(starts.names, starts.cell, strict=True)) if isinstance(starts, Box) else starts

@@ -59,17 +59,7 @@ class Network:
 
 
 def network_on_grid(plant: Any, basis: Any, box: Box, per_side: int | None = None) -> Network:
-    """Evaluate the basis and g on a full grid over a box.
-
-    Parameters
-    ----------
-    plant, basis : record
-        Plant of the class (1) and `nlctl.GaussianBasis`; the basis takes the first states.
-    box : Box
-        Sides x1, ..., xn.
-    per_side : int, optional
-        Grid points along each side; 61 for n = 2, 15 for n = 3.
-    """
+    """Evaluate the basis and g on a full grid over a box."""
     n = len(box.names)
     per_side = max(3, round(3500 ** (1 / n)) + 2 * (n == 2)) if per_side is None else per_side
     axes = [np.linspace(a, b, per_side) for a, b in box.cell]

@@ -98,23 +98,7 @@ def read_loop(
     inputs: Mapping[str, float] | None = None,
     starts: Any = None,
 ) -> KnownSignLoop:
-    """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    params : mapping, optional
-        Overrides by qualified name, as in a run.
-    inputs : mapping, optional
-        Bound of |w| for every external input w that is added to the plant's v, by name.
-    starts : mapping or Box, optional
-        Initial states, by default the loop's own.
-
-    Raises
-    ------
-    DiagramError
-        As `read_parts` and `read_checked` do.
-    """
+    """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
     parts = read_parts(loop, params=params, inputs=True)
     checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs, starts)
     return KnownSignLoop(

@@ -92,22 +92,7 @@ class Demand:
 
 
 def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
-    """Bound what the plant asks of the controller while |r| <= C.
-
-    Parameters
-    ----------
-    loop : FilteredLoop
-    split : Decomposition
-        Of the loop's actuator.
-    C : float
-        Bound of |r|.
-    tol : float, optional
-        The suprema are proved to this, relative to their size.
-
-    Returns
-    -------
-    Demand
-    """
+    """Bound what the plant asks of the controller while |r| <= C."""
     errors = error_bounds(loop.lambdas, loop.e0, arb(C))
     wanted = reference_bounds(loop.reference)
     reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))

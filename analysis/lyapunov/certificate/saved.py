@@ -48,22 +48,7 @@ Content = dict[str, Any]
 def save_certificate(
     path: str | os.PathLike[str], kind: str, name: str, attempts: Callable[[], Iterator[Content]]
 ) -> Path:
-    """Write the first of some attempts that the recheck answers with yes.
-
-    Parameters
-    ----------
-    path : path
-        Of the file.
-    kind, name : str
-        Of the proof, and of the loop.
-    attempts : callable
-        Yields premises and proof, from the narrowest to the widest.
-
-    Raises
-    ------
-    UsageError
-        If there is none.
-    """
+    """Write the first of some attempts that the recheck answers with yes."""
     why = "there is nothing to be written"
     try:
         for made in attempts():
@@ -104,20 +89,7 @@ def filtered_attempts(
     gains: Mapping[str, float],
     states: Mapping[str, Any],
 ) -> Iterator[Content]:
-    """Yield premises and proof of a loop with a filtered error, with more and more room.
-
-    Parameters
-    ----------
-    loop : FilteredLoop
-        With its starts.
-    need : Demand
-        Of the last step of the proof.
-    split : Decomposition
-    gains : mapping
-        Numbers of the controller, by name.
-    states : mapping
-        Names of the states that start somewhere, by part.
-    """
+    """Yield premises and proof of a loop with a filtered error, with more and more room."""
     premises = {
         "equation": _equation(loop),
         "reference": {

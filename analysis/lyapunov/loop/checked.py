@@ -57,31 +57,7 @@ def read_checked(
     starts: Any = None,
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
-    """Read a loop by its wiring, in a copy whose blocks have the parameters of the run.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    pieces : mapping
-        By what a block of each part is known, as for `read_roles`.
-    kinds : mapping
-        Types of records that the proof is about, by part.
-    params : mapping or None
-        Overrides by qualified name, as in a run.
-    inputs : mapping or None
-        Bound of |w| for every external input w that is added to the plant's v, by name.
-    starts : mapping or Box, optional
-        As for `read_starts`.
-    free : tuple of str, optional
-        Parts whose states a level of V bounds.
-
-    Raises
-    ------
-    DiagramError
-        If a block is missing, or is none of those that the proof is about; if the wiring, or a
-        block's function, is another one; if the plant is not a chain of integrators; if an
-        external input has no bound.
-    """
+    """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         loop = overridden(loop, params)
     roles = read_roles(loop, pieces)

@@ -24,17 +24,7 @@ ADDED = "declared bounds of external inputs, times their gains"
 
 
 def bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
-    """Return the bound of what external inputs add to v.
-
-    Raises
-    ------
-    DiagramError
-        If an external input has no bound.
-    ParameterError
-        If a bound is not a number >= 0.
-    UnknownNameError
-        If a bound is given for what is not added to v.
-    """
+    """Return the bound of what external inputs add to v."""
     for name, value in inputs.items():
         if name not in roles.disturbances:
             raise unknown("external input", name, loop.input_labels, "that is added to v")

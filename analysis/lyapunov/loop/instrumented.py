@@ -34,16 +34,6 @@ def input_gain(f: Callable) -> Callable:
 
     For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
     order of the rounding, 1e-11, for a twice differentiable F.
-
-    Parameters
-    ----------
-    f : equation
-        ``f(x, v, p)`` of a plant.
-
-    Returns
-    -------
-    equation
-        ``G(x, v, p)``.
     """
 
     @equation

@@ -24,18 +24,6 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
 
     The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
     samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem or Compiled
-    response : control.TimeResponseData
-        With its states, and the outputs zeta, r and u.
-
-    Raises
-    ------
-    DiagramError
-        If the loop is not the one that the proof is about, has no Nussbaum law, or its law is not
-        (23), (24); if the response is not one of the loop.
     """
     loop = known_system("slow_drift", loop)
     check_shape(loop, response, _SIGNALS)

@@ -66,13 +66,7 @@ class _Acceleration:
 
 
 def on_intervals(path: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a block's function; that intervals cannot go through it is said with its name.
-
-    Raises
-    ------
-    DiagramError
-        When the function that is returned fails.
-    """
+    """Return a block's function; that intervals cannot go through it is said with its name."""
 
     def refusal(why: str) -> DiagramError:
         return DiagramError(
@@ -95,11 +89,6 @@ def check_chain(plant: Place) -> None:
 
     For all x and v and all t >= 0: on every way through the function each is the coordinate itself,
     or, where there is one way only, it has the coordinate's gradient everywhere and its value at 0.
-
-    Raises
-    ------
-    DiagramError
-        If one is something else, or cannot be decided.
     """
     system, n = plant.system, plant.system.nstates
     states, outputs = coordinate_names(n), list(system.current_spec.outputs)

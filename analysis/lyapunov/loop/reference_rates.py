@@ -32,19 +32,7 @@ SHIFT = 0.381966  # of a sampling interval: corners of a function of time lie on
 def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Margin | None:
     """Return how far the reference's derivatives are from those of its own outputs.
 
-    Parameters
-    ----------
-    place : Place
-        Of the reference, with the parameters of the run.
-    time : ndarray of shape (m,)
-        In s.
-    states : ndarray of shape (n, m)
-        Of the whole loop.
-
-    Returns
-    -------
-    Margin or None
-        An equality; None where the reference depends on other signals, or has one output only.
+    Shapes: `time` (m,), `states` (n, m).
     """
     names, block = declared(place, "outputs"), place.system
     order = sum(name in names for name in derivative_names(len(names))) - 1

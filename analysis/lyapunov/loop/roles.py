@@ -76,40 +76,14 @@ def record_of(place: Place) -> Any:
 
 
 def declared(place: Place, kind: str) -> list[str]:
-    """Return the names of a block's signals as its record declares them, not as it was renamed.
-
-    Parameters
-    ----------
-    place : Place
-    kind : {"inputs", "outputs"}
-    """
+    """Return the names of a block's signals as its record declares them, not as it was renamed."""
     spec = record_of(place)
     labels = place.system.input_labels if kind == "inputs" else place.system.output_labels
     return list(labels if spec is None else getattr(spec, kind))
 
 
 def read_roles(loop: Any, pieces: Pieces = PIECES) -> Roles:
-    """Find the blocks of a closed loop and check every wire between them.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-        In continuous time, nested to any depth, its signals called whatever they are.
-    pieces : mapping, optional
-        By what a block of each part is known, those of the paper's controller by default.
-
-    Returns
-    -------
-    Roles
-
-    Raises
-    ------
-    DiagramError
-        If a part is missing, does not have what the proof needs, or there is a block that the proof
-        does not know; if an input of a block is not fed by the one signal that the proof supposes,
-        with gain 1; if an output of the diagram has the name of a signal and is another one; if a
-        block's function does not depend on its arguments alone.
-    """
+    """Find the blocks of a closed loop and check every wire between them."""
     diagram = isinstance(loop, ct.InterconnectedSystem)
     if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
         raise DiagramError("the proof needs a closed loop, a diagram with the output r")
@@ -300,21 +274,7 @@ def _signal(wiring: Wiring, signal: Signal) -> str:
 def joined_again(
     loop: ct.InterconnectedSystem, roles: Roles, remade: Callable[[str, Any, str], Any]
 ) -> list[Any]:
-    """Return copies of a loop's blocks that are connected by the names that the records declare.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    roles : Roles
-        Of the loop; with them its wiring is known to be the one by name.
-    remade : callable
-        ``remade(part, record, name)`` makes a block of a part.
-
-    Returns
-    -------
-    list of control.InputOutputSystem
-        For `nlctl.interconnect`; nested diagrams stay nested, all their signals are outputs.
-    """
+    """Return copies of a loop's blocks that are connected by the names that the records declare."""
     parts = {place.path: part for part, place in roles.places.items()}
 
     def copied(diagram: Any, path: str) -> Iterator[Any]:
@@ -335,12 +295,7 @@ def joined_again(
 
 
 def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
-    """Check that a block is of a kind that the proof knows.
-
-    Raises
-    ------
-    DiagramError
-    """
+    """Check that a block is of a kind that the proof knows."""
     spec = record_of(place)
     if type(spec) not in kinds:
         wanted = " or ".join(kind.__name__ for kind in kinds)

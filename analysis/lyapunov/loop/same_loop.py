@@ -26,10 +26,7 @@ LATEST = 1e4  # s
 def points_around(x: np.ndarray, *, seed: int = 0) -> list[_Point]:
     """Return times and states at which loops are compared: the start, and points around it.
 
-    Parameters
-    ----------
-    x : ndarray of shape (n,)
-    seed : int, optional
+    Shapes: `x` (n,).
     """
     rng = np.random.default_rng(seed)
     points = [(0.0, x)]
@@ -48,24 +45,7 @@ def check_same(
     params: Mapping[str, Any] | None = None,
     own: Mapping[str, Any] | None = None,
 ) -> None:
-    """Compare a loop with the proof's reading of it, at points.
-
-    Parameters
-    ----------
-    given : control.InterconnectedSystem
-        The diagram as it stands; its external inputs are 0.
-    understood : control.InterconnectedSystem
-        Its states begin with those of `given`; outputs of one name are compared.
-    points : iterable of (t, x)
-        Times (s) and states of `given`.
-    params, own : mapping, optional
-        Parameters of the run, for `given` and for `understood`.
-
-    Raises
-    ------
-    DiagramError
-        At the first difference: it names the state or output and shows both numbers.
-    """
+    """Compare a loop with the proof's reading of it, at points."""
     names, u = state_names(given), np.zeros(given.ninputs or 0)
     more = np.zeros((understood.nstates or 0) - (given.nstates or 0))
     shared = [label for label in given.output_labels if label in understood.output_labels]

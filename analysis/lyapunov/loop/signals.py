@@ -43,18 +43,7 @@ class Signals:
         return self.values[name]
 
     def vector(self, name: str) -> np.ndarray:
-        """Return name[0], name[1], ... as the columns of an array of shape (m, l).
-
-        Parameters
-        ----------
-        name : str
-            Name without the index, such as ``W_hat``.
-
-        Returns
-        -------
-        ndarray of shape (m, l)
-            A row for each sample; l is 0 where there is no such signal.
-        """
+        """Return name[0], name[1], ... as the columns of an array of shape (m, l)."""
         count = 0
         while f"{name}[{count}]" in self.values:
             count += 1
@@ -120,20 +109,12 @@ def signals_of(response: Any) -> Signals:
 
 
 def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
-    """Return max \\|y\\| of a signal whose derivative is known at the samples.
+    r"""Return max \|y\| of a signal whose derivative is known at the samples.
 
     Between two samples it is the cubic with their values and derivatives, which needs no sign that
     the signal is smooth: r of (14) bends where the actuator does, and never jumps.
 
-    Parameters
-    ----------
-    t, y, rate : ndarray of shape (m,)
-        Times (s), samples, and derivative along the diagram (1/s).
-
-    Returns
-    -------
-    float
-        In the unit of y; NaN where one is not a number, and not below the largest sample.
+    Shapes: `t, y, rate` (m,).
     """
     if not np.all(np.isfinite(y) & np.isfinite(rate)):
         return float(np.max(np.abs(y)))

@@ -98,23 +98,7 @@ def members_of(
     start: Mapping[str, Any] | None,
     params: Mapping[str, Any] | None,
 ) -> list[Member]:
-    """Return the members that a horizon or responses stand for.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    run : float, control.TimeResponseData or sequence of them
-        A horizon (s), or responses of the loop with its states.
-    step : float
-        Sampling interval (s) for a horizon.
-    start, params : mapping or None
-        Numbers, or arrays with one entry per member; for a horizon only.
-
-    Raises
-    ------
-    ParameterError
-        If arrays differ in length, or the horizon is not positive.
-    """
+    """Return the members that a horizon or responses stand for."""
     if not np.isscalar(run):
         if start or params:
             raise ParameterError("ledger takes start and params of the responses: leave them out")
@@ -167,24 +151,7 @@ def observe(
     split: Decomposition,
     max_steps: int = 2_000_000,
 ) -> Iterator[MemberRun]:
-    """Run the members, observed; see `nlctl.analysis.lyapunov.loop.instrumented`.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    members : sequence of Member
-    split : Decomposition
-        Of the actuator.
-    max_steps : int, optional
-        Steps after which a run counts as lost.
-
-    Raises
-    ------
-    ParameterError
-        If a member does not reproduce the response that it stands for.
-    DiagramError
-        If the loop is not the one that the proof is about.
-    """
+    """Run the members, observed; see `nlctl.analysis.lyapunov.loop.instrumented`."""
     compiled = observed_loop(loop, split)
     for place, member in enumerate(members):
         parts = read_parts(loop, member.start, member.params)

@@ -30,13 +30,7 @@ _EQUAL = 1e-7  # relative to the size of the terms
 
 
 def check_decrease(loop: Any, match: Matching, params: Mapping[str, Any] | None = None) -> None:
-    """Compare V' of the proof with that of the loop, at points.
-
-    Raises
-    ------
-    DiagramError
-        If they differ.
-    """
+    """Compare V' of the proof with that of the loop, at points."""
     u, understood = np.zeros(loop.ninputs or 0), match.loop.understood
     rates_of, outputs_of = rates_and_outputs(loop, params), rates_and_outputs(understood)
     labels = list(understood.output_labels)

@@ -65,16 +65,7 @@ class Decrease:
 
 
 def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:
-    """Bound V for all time and in the end, from its value at the beginning.
-
-    Parameters
-    ----------
-    match : Matching
-    D : arb
-        Bound of |delta|.
-    V_0 : arb
-        V(0).
-    """
+    """Bound V for all time and in the end, from its value at the beginning."""
     weights = match.loop.spec("weights")
     if not D.is_finite():
         endless = arb("inf")

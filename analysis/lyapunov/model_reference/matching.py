@@ -170,22 +170,7 @@ def equation_signals(loop: ModelReferenceLoop) -> tuple[str, ...]:
 def matching(
     loop: ModelReferenceLoop, split: Decomposition, W: Sequence[float] | None = None
 ) -> Matching:
-    """Take away from a plant's equation what the loop's own weights can learn.
-
-    Parameters
-    ----------
-    loop : ModelReferenceLoop
-    split : Decomposition
-        Of the loop's actuator.
-    W : sequence of l floats, optional
-        Weights of one's own choice; by default those that match.
-
-    Raises
-    ------
-    DiagramError
-        If the plant's or the basis's equations are none of arithmetic and functions, the input has
-        no gain, or one of the other sign than the law supposes.
-    """
+    """Take away from a plant's equation what the loop's own weights can learn."""
     values = symbols(loop)
     x = [values[name] for name in coordinate_names(loop.order)]
     paths = loop.roles.paths

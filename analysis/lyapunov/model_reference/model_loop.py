@@ -132,24 +132,7 @@ def read_model_reference(
     inputs: Mapping[str, float] | None = None,
     starts: Any = None,
 ) -> ModelReferenceLoop:
-    """Read a loop such as `nlctl.mrac` makes with a plant and an actuator.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-    params : mapping, optional
-        Overrides by qualified name, as in a run.
-    inputs : mapping, optional
-        Bound of |w| for every external input w that is added to the plant's v, by name.
-    starts : mapping or Box, optional
-        Initial states, by default the loop's own; ``"V"`` bounds V(0).
-
-    Raises
-    ------
-    DiagramError
-        As `read_checked` does; if plant, model and error differ in their order; if the regressor
-        has memory or takes other signals; if the reference has no proved bound.
-    """
+    """Read a loop such as `nlctl.mrac` makes with a plant and an actuator."""
     read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs, starts, _OF_V)
     roles, order = read.roles, _checked_orders(read.roles)
     model, error = roles.spec("model"), roles.spec("error")

@@ -110,18 +110,7 @@ def is_positive_definite(M: fmpq_mat) -> bool:
 def quadratic_form(path: str, K: Sequence[float], P: np.ndarray) -> QuadraticForm:
     """Prove that E^T P E is a Lyapunov function of E_n' = -K^T E.
 
-    Parameters
-    ----------
-    path : str
-        Block that K and P are of, for the message.
-    K : sequence of n floats
-    P : ndarray of shape (n, n)
-        Of it the last column is taken as it is, and the rest symmetrically.
-
-    Raises
-    ------
-    DiagramError
-        If P or Q = -(A^T P + P A) is not positive definite.
+    Shapes: `P` (n, n).
     """
     n = len(K)
     lower = [[float(P[max(i, j), min(i, j)]) for j in range(n)] for i in range(n)]

@@ -70,18 +70,7 @@ def model_reach(match: Matching) -> arb:
 
 
 def region(match: Matching, split: Decomposition, C: arb, *, tol: float) -> Region:
-    """Bound all signals, and delta, while V <= C.
-
-    Parameters
-    ----------
-    match : Matching
-    split : Decomposition
-        Of the loop's actuator, with external inputs.
-    C : arb
-        Bound of V.
-    tol : float
-        The suprema are proved to this, relative to their size.
-    """
+    """Bound all signals, and delta, while V <= C."""
     C = arb(upper(C))  # the bound that is told, and no smaller one
     loop, model = match.loop, model_reach(match)
     errors = tuple(map(upper, loop.form.errors(C)))

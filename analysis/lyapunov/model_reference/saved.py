@@ -29,16 +29,7 @@ _STAGES, _LESS = 40, 0.99  # of the bound in the end: each is to be less by that
 
 
 def model_attempts(match: Matching, split: Decomposition, C: float) -> Iterator[Content]:
-    """Yield premises and proof of a loop with a reference model, with more and more room.
-
-    Parameters
-    ----------
-    match : Matching
-    split : Decomposition
-        Of the actuator, with external inputs.
-    C : float
-        Bound of V whose box closes.
-    """
+    """Yield premises and proof of a loop with a reference model, with more and more room."""
     premises = _premises(match, split)
     for raised in _RAISED:
         yield {"premises": premises, "proof": _proof(match, split, C * (1 + raised))}

@@ -62,15 +62,7 @@ class Drift:
 
 
 def signal(response: Any, name: str) -> np.ndarray:
-    """Return an output of a response over time, shape (m,).
-
-    Raises
-    ------
-    UnknownNameError
-        If the response has no such output.
-    ParameterError
-        If it is not finite throughout: nothing can be said about a run that diverged.
-    """
+    """Return an output of a response over time, shape (m,)."""
     labels = list(response.output_labels)
     if name not in labels:
         raise unknown("output signal", name, labels, "of the response")

@@ -122,32 +122,7 @@ def long_run(
     start: Mapping[str, float] | None = None,
     progress: Callable[[float], object] | None = None,
 ) -> LongRun:
-    """Run a loop with a Nussbaum law for hours of its time, and predict the end early on.
-
-    Parameters
-    ----------
-    loop : control.InterconnectedSystem
-        Of the blocks that `nlctl.paper.example_1` connects, with a Nussbaum law.
-    horizon : float, optional
-        In s; the run ends earlier where it diverges.
-    rtol : float, optional
-        Relative tolerance; the absolute one is a hundredth of it.
-    start : mapping, optional
-        Initial states other than the blocks' own, ``{"law.zeta": 2.9}``.
-    progress : callable, optional
-        Called with the time, as `nlctl.input_output_response` does.
-
-    Returns
-    -------
-    LongRun
-
-    Raises
-    ------
-    DiagramError
-        If the loop is not one that the proof is about.
-    ParameterError, UnknownNameError
-        If zeta is not in a lobe for long enough for a prediction, or `start` is refused.
-    """
+    """Run a loop with a Nussbaum law for hours of its time, and predict the end early on."""
     last = min(max(LOOKS), horizon)
     times = np.append(
         np.linspace(0.0, last, round(last / FINE) + 1),

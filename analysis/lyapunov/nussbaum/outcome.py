@@ -18,21 +18,7 @@ _STILL = 0.1  # share of it by which zeta may move from one window to the next, 
 def outcome(forecast: SlowDrift, time: np.ndarray, zeta: np.ndarray) -> Outcome:
     """Tell whether a run bore a forecast out.
 
-    Parameters
-    ----------
-    forecast : SlowDrift
-        Made from the beginning of the run.  It says where zeta comes to rest, if it has such a
-        place, and otherwise when the budget is spent.
-    time : ndarray of shape (m,)
-        Of the run (s).
-    zeta : ndarray of shape (m,)
-        Nussbaum argument.
-
-    Returns
-    -------
-    {"held", "failed", "open"}
-        A burst holds if it lies in `burst_range`, and fails if the run has passed that without
-        one; a rest holds if zeta stands still within 0.01 of its place, and fails beyond that.
+    Shapes: `time` (m,), `zeta` (m,).
     """
     beyond = np.flatnonzero(zeta >= forecast.lobe.high)
     if forecast.rest is not None:

@@ -158,22 +158,7 @@ def running_means(s: np.ndarray, N: GainFunction = functions.nussbaum) -> np.nda
 def lobes(
     N: GainFunction = functions.nussbaum, low: float = 0.0, high: float = 9.0, *, step: float = 0.01
 ) -> tuple[Lobe, ...]:
-    """Return the lobes of N on [low, high], with their budgets and extrema.
-
-    Parameters
-    ----------
-    N : callable, optional
-        Function of one number; the paper's by default.
-    low, high : float, optional
-        The range; its ends cut lobes off.
-    step : float, optional
-        Zeros nearer to each other than this may be overlooked.
-
-    Raises
-    ------
-    ParameterError
-        If the range is empty, or N is not finite on it.
-    """
+    """Return the lobes of N on [low, high], with their budgets and extrema."""
     if not low < high:
         raise ParameterError(f"lobes needs low < high, got {low:g} and {high:g}")
     grid = np.linspace(low, high, max(int(np.ceil((high - low) / step)), 2) + 1)
@@ -219,11 +204,6 @@ def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: flo
     """Return the whole lobe that zeta lies in, searched within `reach` on both sides.
 
     At a zero of N it is the lobe above.
-
-    Raises
-    ------
-    ParameterError
-        If N has no zero on one side within `reach`, so that the lobe has no budget.
     """
     found = lobes(N, zeta - reach, zeta + reach)
     inside = [lobe for lobe in found if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]

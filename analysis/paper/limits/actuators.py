@@ -88,23 +88,7 @@ def _latex(value: float) -> str:
 
 
 def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any]:
-    """Run an example with one actuator in the place of its own.
-
-    Parameters
-    ----------
-    example : {"example_1", "example_2"}
-    name : str
-        Of `actuators_of_the_table`.
-    label : str, optional
-        Controller, of `nlctl.analysis.paper.rivals.rival_controllers`.
-
-    Returns
-    -------
-    dict
-        example, controller, actuator, status, time (s, at which the run ended), error (largest
-        abs(y - yd) from 10 s on), peak (largest abs(u)); error and peak are NaN where the run does
-        not reach its end.
-    """
+    """Run an example with one actuator in the place of its own."""
     actuator, controller = actuators_of_the_table()[name], rival_controller(example, label)
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
     loop = paper.EXAMPLES[example](actuator=actuator, controller=controller)

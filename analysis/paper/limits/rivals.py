@@ -56,21 +56,7 @@ def study_key(example: str) -> str:
 
 
 def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
-    """Return what tells the loop of a pair from another one.
-
-    Parameters
-    ----------
-    example, controller, actuator : str
-        See `nlctl.analysis.paper.rivals.rival_loop`.
-
-    Returns
-    -------
-    parameters : str
-        A key of the nominal parameters and the initial state.
-    rates : float
-        Size of python-control's rates and outputs at some points, without those that the
-        controller refuses.
-    """
+    """Return what tells the loop of a pair from another one."""
     loop = rival_loop(example, f"{controller} / {actuator}")
     facts = loop_facts(loop)
     held = json.dumps([facts["parameters"], facts["initial_state"]], sort_keys=True)
@@ -80,23 +66,7 @@ def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
 
 
 def rival_rows(result: Result, example: str) -> pd.DataFrame:
-    """Return what a run of the study found, a line for each controller behind each actuator.
-
-    Parameters
-    ----------
-    result : Result
-        Of ``reports/rivals-1.toml`` or ``rivals-2.toml``, or of parts of them.
-    example : {"example_1", "example_2"}
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns example, study (`study_key`), actuator, controller, parameters and
-        rates (`loop_key`), samples, violations, failed (of which did not reach their end),
-        late_rms (RMS of e from 10 s on), iae (s), peak_u, energy (s), all medians; less, less_low,
-        less_high: median of the late_rms of the paper's controller minus this one on the same
-        samples, and its exact interval.
-    """
+    """Return what a run of the study found, a line for each controller behind each actuator."""
     rows, key = [], study_key(example)
     for finding in result.findings:
         pairs = finding.tables["differences"].loc["late_rms"]
@@ -118,14 +88,7 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
 
 
 def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
-    """Return the record, if it is of the study files and of the loops of today.
-
-    Raises
-    ------
-    ValueError
-        If a study file has another content than the one of which the record was made, or a loop
-        has other parameters or other rates.
-    """
+    """Return the record, if it is of the study files and of the loops of today."""
     record = pd.read_csv(path)
     again = "make it again with 'python -m nlctl.analysis.paper.limits.rivals'"
     for example in paper.EXAMPLES:
@@ -154,11 +117,6 @@ def beaten_by(record: pd.DataFrame, example: str) -> dict[str, dict[str, tuple[s
 
     One beats another with no more violations of the spec and a smaller RMS of e from 10 s on: the
     exact interval of the median difference on the same samples is on one side of 0.
-
-    Returns
-    -------
-    dict
-        ``{actuator: {"beaten by": labels, "beats": labels}}``
     """
     found = {}
     for actuator, own in record[record["example"] == example].groupby("actuator", sort=False):

@@ -16,15 +16,7 @@ _Runs = Mapping[str, CaseRun]
 
 
 def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
-    """Return the last sections.
-
-    Parameters
-    ----------
-    runs : mapping
-        Result of `nlctl.analysis.paper.run_all`.
-    numerics : pandas.DataFrame, optional
-        Result of `nlctl.analysis.paper.numerics`.
-    """
+    """Return the last sections."""
     return [_choices(runs), _numerics(runs, numerics), _limits(runs)]
 
 

@@ -33,21 +33,7 @@ def lyapunov_sections(
     far: Mapping[str, LongRun] | None = None,
     burst: Burst | None = None,
 ) -> list[Section]:
-    """Compose the part from what was found.
-
-    Parameters
-    ----------
-    found : mapping
-        Result of `evidence` by number of the example; without any there is no part.
-    far : mapping, optional
-        Runs far beyond 20 s, by key of `nlctl.analysis.paper.evidence.FAR_HORIZONS`.
-    burst : Burst, optional
-        Example 2 beyond its run.
-
-    Returns
-    -------
-    list of Section
-    """
+    """Compose the part from what was found."""
     if not found:
         return []
     parts = [section for number, one in found.items() for section in _example(number, one)]

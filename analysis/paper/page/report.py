@@ -42,33 +42,7 @@ def paper_report(
     rivals: pd.DataFrame | None = None,
     sections: Sequence[Section] | None = None,
 ) -> Report:
-    """Compose the reproduction report from the runs of `nlctl.analysis.paper.CASES`.
-
-    Parameters
-    ----------
-    runs : mapping
-        Result of `nlctl.analysis.paper.run_all`.
-    proofs : mapping, optional
-        What `nlctl.analysis.paper.page.proof.evidence` found, by number of the example.
-    far : mapping, optional
-        Runs far beyond 20 s, of `nlctl.analysis.paper.evidence.far_runs_in_background`.
-    burst : Burst, optional
-        Example 2 beyond its run, of `nlctl.analysis.paper.burst.through_the_burst`.
-    studies : sequence of Section, optional
-        The part on robustness, see `nlctl.analysis.studies.page.report.study_part`.
-    numerics : pandas.DataFrame, optional
-        Result of `nlctl.analysis.paper.numerics`.
-    sampling : pandas.DataFrame, optional
-        Result of `nlctl.analysis.paper.sampling_limits.checked_record`.
-    rivals : pandas.DataFrame, optional
-        Result of `nlctl.analysis.paper.limits.rivals.checked_rivals`.
-    sections : sequence of Section, optional
-        What `paper_sections` makes of the same; by default it is made here.
-
-    Returns
-    -------
-    Report
-    """
+    """Compose the reproduction report from the runs of `nlctl.analysis.paper.CASES`."""
     compared = checks(runs)
     if sections is None:
         sections = paper_sections(runs, proofs=proofs, far=far, burst=burst)

@@ -17,13 +17,7 @@ _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 
 def rivals_section(record: pd.DataFrame) -> Section:
-    """Return the section on the paper's controller and its rivals.
-
-    Parameters
-    ----------
-    record : pandas.DataFrame
-        Of `nlctl.analysis.paper.limits.rivals.checked_rivals`.
-    """
+    """Return the section on the paper's controller and its rivals."""
     return Section(
         key="rivals",
         title="Rivals",

@@ -20,13 +20,7 @@ _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 
 def sampling_section(record: pd.DataFrame) -> Section:
-    """Return the section on sampling time, delay and steps of converters.
-
-    Parameters
-    ----------
-    record : pandas.DataFrame
-        Of `nlctl.analysis.paper.sampling_limits.checked_record`.
-    """
+    """Return the section on sampling time, delay and steps of converters."""
     found = spec_ends(record)
     return Section(
         key="sampling",

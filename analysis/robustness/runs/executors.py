@@ -54,16 +54,6 @@ def chunk_table(
 
     A pure function, except for the column ``wall_time``.  `points` are these rows of a listed
     design that was sent without them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        With the columns of `experiment.columns_of`.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If Ctrl-C kept rows from finishing.
     """
     start = time.perf_counter()
     table = rows(design, numbers) if points is None else points
@@ -108,13 +98,6 @@ def computed_elsewhere(
 
     Two per worker are in flight at most.  When no more are wanted, or one has failed, those that
     have not begun are cancelled and the others are waited for.
-
-    Raises
-    ------
-    LostChunkError
-        At the end, if a worker was lost for good.
-    UsageError
-        At the end, if a row was refused.
     """
     payload, todo = _packed(prepared, design), iter(chunks)
     waiting: dict[Future, range] = {}

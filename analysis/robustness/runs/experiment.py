@@ -366,13 +366,7 @@ def columns_of(prepared: Prepared) -> Columns:
 
 
 def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
-    """Return those columns that a frame has, in their order and with their types.
-
-    Raises
-    ------
-    ValueError
-        If a column cannot have its type, or holds another label than it may.
-    """
+    """Return those columns that a frame has, in their order and with their types."""
     for name, kind in columns.items():
         if name in frame and not isinstance(kind, str):
             others = frame[name][~frame[name].isin(list(kind))]

@@ -51,13 +51,6 @@ def identity_of(
     """Return everything that the numbers of a study follow from, as data for a JSON file.
 
     It names no path and no machine.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    design : Design
-    more : mapping, optional
-        What else belongs to it, under ``"study"``; JSON must be able to hold it.
     """
     content = experiment_facts(prepared, design.space) | {
         "design": {
@@ -73,14 +66,7 @@ def identity_of(
 
 
 def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str, Any]:
-    """Return what the numbers of any row of an experiment follow from, its design aside.
-
-    Parameters
-    ----------
-    prepared : Prepared
-    space : Space, optional
-        Where rows are drawn, if not in the experiment's own space.
-    """
+    """Return what the numbers of any row of an experiment follow from, its design aside."""
     experiment = prepared.experiment
     space = experiment.space if space is None else space
     return {

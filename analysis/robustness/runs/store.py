@@ -96,17 +96,6 @@ def locked(folder: Path, error: type[UsageError] = StoreError) -> Iterator[None]
     """Hold a folder for this process alone; it is made where there is none.
 
     The lock is the operating system's: it ends with the process, however that ends.
-
-    Parameters
-    ----------
-    folder : Path
-    error : type, optional
-        Class of what is raised.
-
-    Raises
-    ------
-    UsageError
-        If the folder cannot be written, or another process works in it.
     """
     owner, lock = folder / ".owner", FileLock(folder / ".lock", timeout=0)
     me = f"process {os.getpid()} on {socket.gethostname()}".encode()
@@ -137,14 +126,7 @@ def _text(path: Path) -> str:
 
 @contextmanager
 def claimed(store: ChunkStore, *, resume: bool = False) -> Iterator[None]:
-    """Hold a folder for this process alone, with the study's identity in it.
-
-    Raises
-    ------
-    StoreError
-        As in `locked`, or if the folder holds chunks and `resume` is False, or belongs to another
-        study; the message says what differs.
-    """
+    """Hold a folder for this process alone, with the study's identity in it."""
     with locked(store.folder):
         _identify(store, resume)
         yield
@@ -173,13 +155,7 @@ def _identify(store: ChunkStore, resume: bool) -> None:
 
 
 def opened(folder: str | os.PathLike[str]) -> ChunkStore:
-    """Return the store that a folder holds.
-
-    Raises
-    ------
-    StoreError
-        If it holds none.
-    """
+    """Return the store that a folder holds."""
     path = Path(folder) / "study.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -235,13 +211,7 @@ def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
 
 
 def put(store: ChunkStore, frame: pd.DataFrame) -> None:
-    """Write consecutive rows as one chunk; floats keep their bits.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written; the message says what is kept.
-    """
+    """Write consecutive rows as one chunk; floats keep their bits."""
     columns = {"row": frame.index.to_numpy()} | {name: frame[name].array for name in frame}
     arrays = {name: pa.array(v, from_pandas=False) for name, v in columns.items()}  # NaN, not null
     labels: Any = [name for name, kind in store.columns.items() if not isinstance(kind, str)]
@@ -261,13 +231,7 @@ def _seal(column: Any) -> str:
 
 
 def _check_seals(path: Path, frame: pd.DataFrame) -> None:
-    """Refuse rows that are not what was written into a file.
-
-    Raises
-    ------
-    ValueError
-        If a value has changed since, or somebody else has written the file.
-    """
+    """Refuse rows that are not what was written into a file."""
     seals = json.loads((pq.read_schema(path).metadata or {}).get(SEALS, b"{}"))
     changed = [name for name in frame if seals.get(name) != _seal(frame[name])]
     if changed:
@@ -294,15 +258,7 @@ def stored(store: ChunkStore) -> int:
 
 
 def taken_up(store: ChunkStore) -> Iterator[tuple[range, np.ndarray | str]]:
-    """Go through the chunks that are there, and clear what a killed process has left.
-
-    Yields
-    ------
-    (range, margins)
-        Rows of a chunk that was read to its end, and their margins ``spec``.
-    (range, message)
-        Rows of a chunk that is damaged: its file has been renamed.
-    """
+    """Go through the chunks that are there, and clear what a killed process has left."""
     for place, pattern in (
         (store.folder, "..owner.*"),
         (store.folder, ".*.json.*"),
@@ -331,13 +287,7 @@ def taken_up(store: ChunkStore) -> Iterator[tuple[range, np.ndarray | str]]:
 
 
 def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.DataFrame:
-    """Read the rows that are there, in order; only some columns where asked.
-
-    Raises
-    ------
-    StoreError
-        If a file cannot be read.
-    """
+    """Read the rows that are there, in order; only some columns where asked."""
     try:
         ranges = _ranges(store)
         frame = _read(store, [_path(store, numbers) for numbers in ranges], columns)
@@ -371,13 +321,7 @@ def _read(
 
 
 def _columns_in(path: Path, names: Sequence[str]) -> pa.Table:
-    """Read some columns of a chunk's file, without threads.
-
-    Raises
-    ------
-    ValueError
-        If it lacks one.
-    """
+    """Read some columns of a chunk's file, without threads."""
     with pq.ParquetFile(path, page_checksum_verification=True) as file:
         lacking = [name for name in names if name not in file.schema_arrow.names]
         if lacking:

@@ -22,16 +22,7 @@ Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
 
 
 def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
-    """Evaluate rows; the results are in their order.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If rows are missing, because Ctrl-C kept them from finishing.
-    ParameterError
-        If `evaluate` is not a function, or its result is not a table of these rows with a column
-        ``spec``.
-    """
+    """Evaluate rows; the results are in their order."""
     results = a_function("a search", "evaluate", evaluate)(table)
     if not isinstance(results, pd.DataFrame):
         raise ParameterError(
@@ -65,21 +56,7 @@ def as_table(space: Space, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 def towards_nominal(
     space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
 ) -> dict[str, Any]:
-    """Return the row with the deviations of numbers from nominal multiplied by `factor`.
-
-    Parameters
-    ----------
-    space : Space
-    row : mapping
-    factor : float
-    names : collection of str, optional
-        What is moved; by default every quantity.  Integers are rounded, choices stay.
-
-    Raises
-    ------
-    SpaceError
-        If a quantity has no nominal value.
-    """
+    """Return the row with the deviations of numbers from nominal multiplied by `factor`."""
     middle = nominal(space)
 
     def nearer(quantity: Uncertain) -> float:

@@ -98,15 +98,7 @@ def largest_scale(
 
 
 def refusal_of(space: Space, systems: Iterable[ct.InputOutputSystem]) -> str:
-    """Return why a block refuses values of the boxes that each by itself are admissible, or "".
-
-    Parameters
-    ----------
-    space : Space
-        With full names, and nominal values, which are admissible.
-    systems : iterable of control.InputOutputSystem
-        See `largest_scale` for what is tried of their blocks.
-    """
+    """Return why a block refuses values of the boxes that each by itself are admissible, or ""."""
     return next(filter(None, (one(1.0) for one in _tries(space, systems, space.names))), "")
 
 

@@ -106,11 +106,6 @@ def size_of(space: Space, row: Mapping[str, Any]) -> float:
     """Return the smallest factor by which the box must be scaled to hold a row.
 
     The largest deviation from nominal, each as a multiple of its side of the box.
-
-    Raises
-    ------
-    SpaceError
-        If a quantity has no nominal value.
     """
     middle, sizes = nominal(space), [0.0]
     for quantity in space.quantities:

@@ -135,13 +135,7 @@ def _rounded(value: float, towards: Any) -> str:
 
 
 def checked_confidence(confidence: float) -> float:
-    """Return a confidence.
-
-    Raises
-    ------
-    ParameterError
-        If it is not between 0 and 1.
-    """
+    """Return a confidence."""
     return fraction("a statement", "confidence", confidence)
 
 
@@ -191,13 +185,7 @@ def clopper_pearson(
 
 
 def checked_counts(violations: int, runs: int) -> tuple[int, int]:
-    """Return numbers of violations and runs.
-
-    Raises
-    ------
-    ParameterError
-        If not 0 <= violations <= runs with at least one run and at most `MOST_RUNS`.
-    """
+    """Return numbers of violations and runs."""
     n = integer("a probability", "runs", runs, at_least=1)
     k = integer("a probability", "violations", violations, at_least=0)
     if n > MOST_RUNS:
@@ -262,17 +250,7 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
 def least_count(
     holds: Callable[[int], bool], few: int, more: int, most: float = np.inf
 ) -> int | None:
-    """Return the least count from which on something holds.
-
-    Parameters
-    ----------
-    holds : callable
-        Whether it does for a count; where it does, it does for all larger ones.
-    few, more : int
-        A count for which it does not hold, and the next one that is tried; then twice as many.
-    most : float, optional
-        None is returned if it does not hold for a count beyond this.
-    """
+    """Return the least count from which on something holds."""
     while not holds(more):
         few, more = more, 2 * more
         if few > most:
@@ -356,14 +334,7 @@ def violation_probability(
 
 
 def violations_of(design: Design, margins: Margins) -> np.ndarray:
-    """Return for each of the first rows of a design whether it is a violation, in their order.
-
-    Raises
-    ------
-    NoGuaranteeError
-        If the rows are no independent draws, or are not rows 0, 1, 2, ... without a gap: which
-        runs end first may depend on whether they violate.
-    """
+    """Return for each of the first rows of a design whether it is a violation, in their order."""
     check_iid(design)
     series = series_of(margins, "margins").sort_index()
     if not np.array_equal(series.index, np.arange(series.size)):
@@ -381,13 +352,7 @@ def violations_of(design: Design, margins: Margins) -> np.ndarray:
 
 
 def series_of(values: Any, name: str) -> pd.Series:
-    """Return numbers by row.
-
-    Raises
-    ------
-    ParameterError
-        If they are no numbers, or not one-dimensional.
-    """
+    """Return numbers by row."""
     try:
         kind = pd.Series(values).dtype.kind
         if kind in "mMc":  # times and complex numbers, which would be converted
@@ -401,13 +366,7 @@ def series_of(values: Any, name: str) -> pd.Series:
 
 
 def check_iid(design: Design) -> None:
-    """Refuse a design whose rows are no independent draws.
-
-    Raises
-    ------
-    NoGuaranteeError
-        The message says why, and what to run instead.
-    """
+    """Refuse a design whose rows are no independent draws."""
     of_type("a statement", "design", design, Design, "independent(space, size)")
     if design.is_iid:
         return

@@ -23,19 +23,7 @@ def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
     these are too many they are drawn (a permutation test, whose p is (1 + b) / (1 + draws) and
     never too small), and where every field expects `LARGE` the law of chi-square is taken.
 
-    Parameters
-    ----------
-    counts : ndarray of int, shape (options, 2)
-        Rows by option that fail and that pass; no sum is 0.
-    entropy : int
-        Seed of what is drawn.
-
-    Returns
-    -------
-    V : float
-        Cramér's V, from 0 (independent) to 1.
-    p : float
-        1 with a single option.
+    Shapes: `counts` (options, 2).
     """
     rows, failing = counts.sum(axis=1), int(counts[:, 0].sum())
     if len(rows) == 1:

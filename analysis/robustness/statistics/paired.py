@@ -246,14 +246,7 @@ def mean_is_trusted(values: np.ndarray) -> bool:
     are not skew, n >= 25 g^2 with the skewness g (Cochran 1977); and no single one of them makes a
     tenth of their sum of squares.  The interval of the median needs none of this.
 
-    Parameters
-    ----------
-    values : ndarray of shape (n,)
-
-    Returns
-    -------
-    bool
-        False where a value is not finite; True where all are equal.
+    Shapes: `values` (n,).
     """
     if not np.all(np.isfinite(values)) or values.size < TRUSTED_ROWS:
         return False

@@ -47,12 +47,6 @@ def log_evidence(violations: Any, runs: Any, p: float) -> Any:
     1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n are
     a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe, Sekhon,
     Ann. Statist. 49, 2021).
-
-    Parameters
-    ----------
-    violations, runs : int or ndarray of int
-        k and n.
-    p : float
     """
     k, n = violations, runs
     mixed = special.betaln(k + PRIOR, n - k + PRIOR) - special.betaln(PRIOR, PRIOR)

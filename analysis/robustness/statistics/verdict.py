@@ -135,19 +135,7 @@ def _more(runs: int) -> str:
 
 
 def better_verdict(wins: int, losses: int, p: float, level: float, tests: float = 1.0) -> Verdict:
-    """Judge the claim that one option is better than another, by the sign test.
-
-    Parameters
-    ----------
-    wins, losses : int
-        Samples in which it is better, and worse.
-    p : float
-        Of the sign test, adjusted for the number of tests.
-    level : float
-        The largest p that shows or refutes it.
-    tests : float, optional
-        Factor by which p was adjusted.
-    """
+    """Judge the claim that one option is better than another, by the sign test."""
     if p <= level:
         return Verdict(answer="shown" if wins > losses else "refuted")
 

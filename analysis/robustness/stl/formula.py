@@ -344,20 +344,7 @@ class SampledSignals:
 
 
 def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: float) -> Trace:
-    """Return the margin of a formula as a function of time in [low, high].
-
-    Parameters
-    ----------
-    formula : Formula
-    signals : Signals
-    low, high : float
-        Times (s) with ``high + horizon(formula)`` at most ``signals.until``.
-
-    Raises
-    ------
-    UnknownNameError
-        If a signal is missing.
-    """
+    """Return the margin of a formula as a function of time in [low, high]."""
     match formula:
         case Band():
             return _band(formula, signals, low, high)

@@ -113,14 +113,7 @@ def extremes(
 def crossings(t0, t1, a0, a1, b0, b1, jump=0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return where two lines cross inside an interval, and in which intervals they do.
 
-    Parameters
-    ----------
-    t0, t1 : ndarray of shape (n,)
-        Ends of the intervals.
-    a0, a1, b0, b1 : ndarray of shape (n,)
-        Values of the two lines there.
-    jump : float, optional
-        Intervals that are not longer have no inside.
+    Shapes: `t0, t1` (n,), `a0, a1, b0, b1` (n,).
     """
     d0, d1 = a0 - b0, a1 - b1
     k = np.nonzero((((d0 < 0) & (d1 > 0)) | ((d0 > 0) & (d1 < 0))) & (t1 - t0 > jump))[0]
@@ -141,13 +134,7 @@ def higher(one: Trace, other: Trace) -> Trace:
 
 
 def largest(part: Trace, low: float, high: float, start: float, end: float) -> Trace:
-    """Return max of `part` over [t + start, t + end], for t in [low, high].
-
-    Parameters
-    ----------
-    part : Trace
-        Known on [low + start, high + end], or to the end of all windows where `end` is infinite.
-    """
+    """Return max of `part` over [t + start, t + end], for t in [low, high]."""
     last = part.t[-1]
     if low == high:  # one window: nothing slides
         window = part.between(low + start, min(low + end, last))

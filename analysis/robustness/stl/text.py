@@ -46,11 +46,6 @@ def parse_formula(text: str) -> Formula:
 
     It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales other
     than the default one.
-
-    Raises
-    ------
-    ParameterError
-        With the place in the text, what was expected there, and what stands there.
     """
     reader = _Reader(text)
     formula = _formula(reader, 0)
@@ -136,13 +131,7 @@ def _both(reader: _Reader, depth: int) -> Formula:
 def _parts(
     reader: _Reader, depth: int, word: str, read: Callable[[_Reader, int], Formula]
 ) -> list[Formula]:
-    """Read the parts between words; refuse what is easily read as something else.
-
-    Raises
-    ------
-    ParameterError
-        If a part without a window stands next to one that begins with its window.
-    """
+    """Read the parts between words; refuse what is easily read as something else."""
     parts, are_open = [], []
     while not parts or reader.took(word):
         first = reader.next

@@ -66,15 +66,7 @@ def violation_time(
     requirement looks.  A response that ended before is violated at its last good time, if it was
     not earlier.
 
-    Parameters
-    ----------
-    requirement : Requirement
-    t : ndarray of shape (m,)
-        Increasing times (s) from 0.
-    signals : mapping
-        Samples of shape (m,) by name, NaN after the end of a run.
-    breaks : array_like of shape (k,), optional
-        As in `margin`.
+    Shapes: `t` (m,), `breaks` (k,).
     """
     rows = np.array([t, *(signals[name] for name in requirement.signals)], dtype=float)
     good = np.all(np.isfinite(rows), axis=0)

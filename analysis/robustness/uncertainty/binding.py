@@ -105,18 +105,7 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
 
 
 def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Block, str] | None:
-    """Return the block of nlctl that a parameter belongs to, and its name there.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    name : str
-        In full, ``"controller.lambdas[0]"``.
-
-    Returns
-    -------
-    (block, ``"lambdas[0]"``), or None for a parameter of a third-party block
-    """
+    """Return the block of nlctl that a parameter belongs to, and its name there."""
     path = base_name(name).rpartition(".")[0]
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block) and leaf.parameter_path == path:
@@ -142,13 +131,7 @@ def _filled(quantity: Uncertain, name: str, value: float, unit: str) -> Uncertai
 
 
 def check_keyword(function: Callable[..., Any], name: str) -> None:
-    """Refuse a keyword that a function does not take.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest ones.
-    """
+    """Refuse a keyword that a function does not take."""
     known = inspect.signature(function).parameters
     if name not in known and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
         plain = function.func if isinstance(function, partial) else function

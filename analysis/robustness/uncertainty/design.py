@@ -247,13 +247,7 @@ def independent(space: Space, size: int, entropy: int | None = None) -> Design:
 
 
 def affordable(what: str, rows: int, columns: int) -> int:
-    """Return the number of rows of a design that is held in memory.
-
-    Raises
-    ------
-    ParameterError
-        If it would be larger than `MOST_HELD` numbers.
-    """
+    """Return the number of rows of a design that is held in memory."""
     if rows * columns > MOST_HELD:
         raise ParameterError(
             f"{what} of {rows} rows with {columns} columns needs more memory than a design may: "

@@ -171,16 +171,7 @@ def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
 
     Uniform points become draws of the laws.
 
-    Parameters
-    ----------
-    unit : ndarray of shape (n, len(space.names))
-        In [0, 1]; 0 and 1 stand for the nearest inner floating-point numbers, so that a law with
-        infinite support gives finite values.
-
-    Raises
-    ------
-    ParameterError
-        If the shape is another, or a coordinate lies outside.
+    Shapes: `unit` (n, len(space.names).
     """
     inner = np.clip(_checked(space, unit), 2.0**-54, 1 - 2.0**-53)
 
@@ -277,15 +268,7 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
 
 
 def checked_rows(space: Space, table: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Return the numbers of a table of rows by quantity, all finite.
-
-    Raises
-    ------
-    UnknownNameError
-        If the table lacks a column of the space, or has an option that the space does not have.
-    ParameterError
-        If it is not a table, has a row twice, or a number that is none, NaN or infinite.
-    """
+    """Return the numbers of a table of rows by quantity, all finite."""
     of_type("a run of rows", "table", table, pd.DataFrame, "design.table")
     if not table.index.is_unique:
         twice = table.index[table.index.duplicated()][0]
@@ -310,15 +293,7 @@ def checked_rows(space: Space, table: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def checked_row(space: Space, row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a row in the order of the space.
-
-    Raises
-    ------
-    UnknownNameError
-        If it lacks a quantity or a choice, or has one that the space does not have.
-    ParameterError
-        If it is not a mapping, or a number is none, NaN or infinite.
-    """
+    """Return a row in the order of the space."""
     of_type("a row", "row", row, Mapping, "{name: value}")
     for name in row:
         if name not in space.names:

@@ -31,19 +31,7 @@ _FILES: dict[str, tuple[Path, bytes]] = {}  # by name of the module, with what w
 
 
 def load_file(path: Path, admits: Admits | None = None) -> ModuleType:
-    """Return the module in a file; it is run once in a process.
-
-    Parameters
-    ----------
-    path : Path
-    admits : callable, optional
-        Asked before the file or a neighbour that it imports is run; anything may run without it.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file, or one that may not be run.
-    """
+    """Return the module in a file; it is run once in a process."""
     path = path.resolve()
     if not path.is_file():
         raise ParameterError(f"there is no file '{path}'")
@@ -134,13 +122,7 @@ def _parents(full: str) -> Iterator[str]:
 
 
 def _inner(full: str, admits: Admits | None) -> None:
-    """Load a module of a package, unless it is there.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        If there is none.
-    """
+    """Load a module of a package, unless it is there."""
     package, _, name = full.rpartition(".")
     if full in sys.modules or not package:
         return

@@ -38,17 +38,7 @@ def study_digest(data: Mapping[str, Any]) -> str:
 
 
 def statement(study: str, name: str, content: bytes) -> str:
-    """Return what is recorded of one file of a study.
-
-    Parameters
-    ----------
-    study : str
-        Of `study_digest`.
-    name : str
-        What the study calls it: a path from its folder, or a module.
-    content : bytes
-        What is in it.
-    """
+    """Return what is recorded of one file of a study."""
     digest = hashlib.sha256(content).hexdigest()
     return hashlib.sha256("\0".join((study, name, digest)).encode()).hexdigest()
 

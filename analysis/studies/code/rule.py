@@ -202,11 +202,6 @@ def check_defined(function: Any, name: str, grant: Grant) -> None:
     """Refuse a function that another module defines than one that may run.
 
     A file may have the names of others: ``from pandas import read_pickle``.
-
-    Raises
-    ------
-    ParameterError
-        With the rule and what to do.
     """
     module = getattr(_plain(function), "__module__", None) or ""
     file = getattr(sys.modules.get(module), "__file__", None)
@@ -241,16 +236,7 @@ def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
 
 
 def remember_code(study: Study, key: str, folder: Path) -> None:
-    """Record that this user has run the code of a study.
-
-    Parameters
-    ----------
-    study : Study
-    key : str
-        Of `record.study_digest`.
-    folder : Path
-        What paths in it are relative to.
-    """
+    """Record that this user has run the code of a study."""
     kinds = [asked.kind for asked in study.analysis if ":" in asked.kind]
     remember(_statements([*(name for _, name in named_in(study)), *kinds], key, folder))
 
@@ -270,13 +256,7 @@ def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
 
 
 def check_place(name: str) -> None:
-    """Refuse the name of a function that cannot be one, or is of Python's standard library.
-
-    Raises
-    ------
-    ParameterError
-        With the rule.
-    """
+    """Refuse the name of a function that cannot be one, or is of Python's standard library."""
     source, colon, attribute = name.rpartition(":")
     if not (source and colon and attribute):
         raise ParameterError(
@@ -347,13 +327,7 @@ def _installed(top: str) -> tuple[Path, ...]:
 
 
 def check_function(function: Any, name: str) -> None:
-    """Refuse what no study needs to be called: functions of the standard library, builtins.
-
-    Raises
-    ------
-    ParameterError
-        With the rule.
-    """
+    """Refuse what no study needs to be called: functions of the standard library, builtins."""
     if isinstance(function, ct.InputOutputSystem):
         raise ParameterError(
             f"'{name}' needs a function that returns a diagram, got the diagram itself: write "
@@ -371,11 +345,6 @@ def check_loop_function(function: Any, name: str) -> None:
     """Refuse, without calling it, a function that is not known to return a diagram.
 
     That is known by its return annotation, or because it, or what it calls, uses control or nlctl.
-
-    Raises
-    ------
-    ParameterError
-        With the rule and what to do.
     """
     check_function(function, name)
     plain = _plain(function)

@@ -250,16 +250,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 def located(
     problem: Problem, lines: Mapping[KeyPath, int], settings: Mapping[KeyPath, str]
 ) -> Problem:
-    """Return a mistake with its line, or with the settings of the command line that made it.
-
-    Parameters
-    ----------
-    problem : Problem
-    lines : mapping
-        See `line_numbers`.
-    settings : mapping
-        Place and text of each setting.
-    """
+    """Return a mistake with its line, or with the settings of the command line that made it."""
     place = problem.place
     own = tuple(text for at, text in settings.items() if place[: len(at)] == at)
     if own:

@@ -28,13 +28,7 @@ STAND_IN = "gone"
 
 @functools.cache
 def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
-    """Return the shape of study files that may ask for these kinds of analysis.
-
-    Parameters
-    ----------
-    kinds : tuple of (str, Kind)
-        What a file calls each of them, and the kind.
-    """
+    """Return the shape of study files that may ask for these kinds of analysis."""
     schemas: Any = functools.reduce(operator.or_, (tagged(kind, tag) for tag, kind in kinds))
     one: Any = Annotated[schemas, Field(discriminator="kind")]
     many: Any = tuple[one, ...]
@@ -57,13 +51,6 @@ def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], l
     """Return the kinds that a study file names by their place, and the mistakes among them.
 
     The files and modules that they stand in are run, see `code.rule`.
-
-    Parameters
-    ----------
-    data : mapping
-        What stands in the file.
-    grant : Grant
-        What may run.
     """
     named = list(_named(data))
     problems = untrusted(named, grant)

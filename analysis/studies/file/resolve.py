@@ -40,13 +40,7 @@ DEFAULT = "default"
 
 
 def loop_function(name: str, folder: Path) -> Callable[..., Any]:
-    """Return the function that builds the loop, see `paper.named_example`, `named_function`.
-
-    Raises
-    ------
-    ParameterError
-        If nothing shows that it returns a diagram, see `trust.check_loop_function`.
-    """
+    """Return the function that builds the loop, see `paper.named_example`, `named_function`."""
     if ":" in name:
         function = named_function(name, folder)
         check_loop_function(function, name)
@@ -60,15 +54,7 @@ def loop_function(name: str, folder: Path) -> Callable[..., Any]:
 
 
 def named_function(name: str, folder: Path) -> Callable[..., Any]:
-    """Return ``"path/to/file.py:function"``, relative to `folder`, or ``"module:function"``.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file or module, or what is named is of the standard library.
-    UnknownNameError
-        If it has no such function.
-    """
+    """Return ``"path/to/file.py:function"``, relative to `folder`, or ``"module:function"``."""
     module, source, attribute = _place(name, folder)
     function = getattr(module, attribute, None)  # some packages load a name when it is first used
     if not callable(function):
@@ -80,27 +66,13 @@ def named_function(name: str, folder: Path) -> Callable[..., Any]:
 
 
 def checked_definition(name: str, grant: Grant) -> None:
-    """Import what a study names, and refuse it where code that may not run has defined it.
-
-    Raises
-    ------
-    UsageError
-        As in `named_function`, or with the rule.
-    """
+    """Import what a study names, and refuse it where code that may not run has defined it."""
     named(name, grant.folder, grant.refuses)
     check_defined(named_function(name, grant.folder), name, grant)
 
 
 def named_kind(name: str, grant: Grant) -> Kind:
-    """Return the kind of analysis ``"path/to/file.py:name"`` or ``"module:name"``.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file or module, or what is named is not a `Kind`.
-    UnknownNameError
-        If there is nothing of that name.
-    """
+    """Return the kind of analysis ``"path/to/file.py:name"`` or ``"module:name"``."""
     found = named(name, grant.folder, grant.refuses)
     if not isinstance(found, Kind):
         raise ParameterError(
@@ -111,23 +83,7 @@ def named_kind(name: str, grant: Grant) -> Kind:
 
 
 def named(name: str, folder: Path, admits: Admits | None = None) -> Any:
-    """Return whatever ``"path/to/file.py:name"`` or ``"module:name"`` is.
-
-    Parameters
-    ----------
-    name : str
-    folder : Path
-        What the path is relative to.
-    admits : callable, optional
-        Which files may be run, see `code.loading.load_file`.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such file or module.
-    UnknownNameError
-        If there is nothing of that name.
-    """
+    """Return whatever ``"path/to/file.py:name"`` or ``"module:name"`` is."""
     module, source, attribute = _place(name, folder, admits)
     if not hasattr(module, attribute):
         known = [key for key in vars(module) if not key.startswith("_")]
@@ -157,22 +113,7 @@ def _from_module(name: str) -> Any:
 
 
 def option(value: Any, folder: Path) -> Any:
-    """Make what a table of the file describes; numbers and texts stay what they are.
-
-    Parameters
-    ----------
-    value : any
-        ``{ block = "DeadZone", b_r = 0.6 }``: a record of nlctl; ``{ function = "place", ... }``:
-        what the function returns for these keywords.  Both may be nested.
-    folder : Path
-        Of the study file.
-
-    Raises
-    ------
-    UsageError
-        If block, function or a field does not exist, or a value is refused; or a function of a
-        package fails.
-    """
+    """Make what a table of the file describes; numbers and texts stay what they are."""
     if isinstance(value, list):
         return tuple(option(part, folder) for part in value)
     if not isinstance(value, Mapping):
@@ -209,13 +150,7 @@ def option(value: Any, folder: Path) -> Any:
 
 
 def check_complete(function: Callable[..., Any], name: str, given: Mapping[str, Any]) -> None:
-    """Refuse to call a function without what it needs.
-
-    Raises
-    ------
-    ParameterError
-        With the keywords that are missing.
-    """
+    """Refuse to call a function without what it needs."""
     try:
         needed = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # none that Python knows
@@ -228,13 +163,7 @@ def check_complete(function: Callable[..., Any], name: str, given: Mapping[str, 
 
 
 def uncertain(name: str, law: Law) -> Uncertain:
-    """Return the quantity that a table under ``[space]`` describes.
-
-    Raises
-    ------
-    UsageError
-        If there is not exactly one law, or it is none.
-    """
+    """Return the quantity that a table under ``[space]`` describes."""
     given = [key for key in ("uniform", "normal", "law") if getattr(law, key) is not None]
     if len(given) > 1 or not (given or law.bounds):
         raise ParameterError(

@@ -20,13 +20,7 @@ _TOKEN = re.compile(
 
 
 def study_text(content: bytes) -> str:
-    """Return the text in a file.
-
-    Raises
-    ------
-    ValueError
-        If it is not UTF-8; the message is one sentence, with the place.
-    """
+    """Return the text in a file."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -38,13 +32,7 @@ def study_text(content: bytes) -> str:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Return what stands in a text.
-
-    Raises
-    ------
-    ValueError
-        If it is not TOML, or larger or deeper than any study; the message is one sentence.
-    """
+    """Return what stands in a text."""
     if len(text) > _LARGEST:
         raise ValueError(f"has {len(text):,} characters, a study at most {_LARGEST:,}")
     lines = text.split("\n")
@@ -70,13 +58,7 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def _check_printable(value: Any, place: str) -> None:
-    """Refuse control characters, which a terminal would obey.
-
-    Raises
-    ------
-    ValueError
-        With the place.
-    """
+    """Refuse control characters, which a terminal would obey."""
     if isinstance(value, dict):
         for key, part in value.items():
             _check_printable(str(key), f"{place}.{key}" if place else str(key))
@@ -92,13 +74,7 @@ def _check_printable(value: Any, place: str) -> None:
 
 
 def check_depth(data: Any) -> None:
-    """Refuse tables and lists that are nested deeper than those of any study.
-
-    Raises
-    ------
-    ValueError
-        With the place.
-    """
+    """Refuse tables and lists that are nested deeper than those of any study."""
     rows: list[tuple[Any, str]] = [(data, "")]
     for _ in range(DEEPEST + 1):
         inner = []
@@ -113,13 +89,7 @@ def check_depth(data: Any) -> None:
 
 
 def statements(text: str) -> Iterator[tuple[int, str]]:
-    """Yield the statements of a TOML file, a header or a key with its value.
-
-    Yields
-    ------
-    (line, statement)
-        The number of its first line, from 0.
-    """
+    """Yield the statements of a TOML file, a header or a key with its value."""
     start, first, line, depth = 0, 0, 0, 0
     for token in _TOKEN.finditer(text):
         word = token[0]

@@ -211,13 +211,7 @@ def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSyst
 
 
 def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
-    """Return the diagram that a loop's function returns.
-
-    Raises
-    ------
-    ParameterError
-        If it returns something else, or needs what it is not given.
-    """
+    """Return the diagram that a loop's function returns."""
     check_complete(build, name, {})
     made = build()
     if not is_system(made):

@@ -116,13 +116,7 @@ class Compare(Asked):
 
 
 def _options(asked: Compare, setup: Setup) -> Choice:
-    """Return what is compared, as a choice.
-
-    Raises
-    ------
-    UsageError
-        If an option is refused, or a label does not exist.
-    """
+    """Return what is compared, as a choice."""
     build, folder = setup.experiment.build, setup.folder
     if "function" in asked.options:
         options = option(asked.options, folder)
@@ -147,12 +141,6 @@ def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
     """Return the experiment with the options in its space, and the requirements that count.
 
     Metrics of signals that only some options have are left out.
-
-    Raises
-    ------
-    UsageError
-        If the loop has no such keyword, or a quantity, a requirement or its signal does not exist
-        with every option.
     """
     study, experiment = setup.study, setup.experiment
     space = _with_options(experiment, options)

@@ -63,13 +63,7 @@ def statement_numbers(statement: Violation) -> dict[str, Any]:
 
 
 def response(of: str, ground: Ground, done: Sweep) -> tuple[np.ndarray, str, dict[str, Any]]:
-    """Return the column that a sensitivity is of, and how failed rows count: text and numbers.
-
-    Raises
-    ------
-    ParameterError
-        If it is a metric that some rows do not have, or no row reached its end.
-    """
+    """Return the column that a sensitivity is of, and how failed rows count: text and numbers."""
     values = column(done, of)
     if of in ("spec", *(r.key for r in ground.prepared.experiment.spec.requirements)):
         values, failed, least = censored(values)

@@ -70,26 +70,7 @@ def histories(
     most: int = 200,
     threads: int | None = None,
 ) -> Histories:
-    """Simulate the first rows of a table again, the nominal one, and the worst one.
-
-    Parameters
-    ----------
-    prepared : Prepared
-        With nominal values.
-    table : pandas.DataFrame
-        Rows with their margins ``spec``.  Of independent draws the first ones are such as well.
-    witness : (row, margin), optional
-        Of a search; it is the worst row if its margin is lower than all of the table.  What it
-        leaves out is nominal.
-    most : int, optional
-        Number of rows.
-    threads : int, optional
-
-    Raises
-    ------
-    SpaceError
-        If a quantity has no nominal value.
-    """
+    """Simulate the first rows of a table again, the nominal one, and the worst one."""
     space = prepared.experiment.space
     margins = margins_of(table)
     lowest = int(np.argmin(margins))

@@ -19,21 +19,7 @@ __all__ = ["loop_again", "rows_again"]
 def loop_again(
     result: Result, *, trust: bool = False, tell: Callable[[str], object]
 ) -> Prepared | None:
-    """Return the loop of a run again; None if it has gone.
-
-    Parameters
-    ----------
-    result : Result
-    trust : bool, optional
-        As in `nlctl.analysis.studies.read_study`.
-    tell : callable
-        Takes a sentence on what the page will lack, or on versions that differ.
-
-    Raises
-    ------
-    RunFolderError
-        If the results were computed from another loop than today's: nothing is drawn from it.
-    """
+    """Return the loop of a run again; None if it has gone."""
     try:
         run = reopened(result.folder, trust=trust)
     except RunFolderError:

@@ -45,27 +45,7 @@ def study_report(
     loop: StudyLoop | None = None,
     published: Published | None = None,
 ) -> Report:
-    """Compose the report of a study.
-
-    Parameters
-    ----------
-    result : Result
-        Of `nlctl.analysis.studies`, also an incomplete one.  If ``result.rows`` has its design, the
-        report can say why the rows support no guarantee.
-    kept : Histories, optional
-        Signals of some rows; without them there are no fans.
-    command : str, optional
-        What makes the report again.
-    loop : Loop, optional
-        What was simulated; without it there is no diagram.
-    published : Published, optional
-        Where the loop was published.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder holds findings that no analysis of nlctl writes.
-    """
+    """Compose the report of a study."""
     if any(":" in a.kind and kind_of(a).name != STAND_IN for a in result.study.analysis):
         return _composed(
             result, kept, command, loop, published
@@ -117,19 +97,7 @@ def study_sections(
     level: int = 2,
     limits: bool = True,
 ) -> list[Section]:
-    """Compose the sections of a study.
-
-    Parameters
-    ----------
-    result, kept, loop, published
-        As in `study_report`.
-    prefix : str, optional
-        In front of every key, so that several studies can stand in one report.
-    level : int, optional
-        Of the headings.
-    limits : bool, optional
-        Whether what the study does not show is a section as well.
-    """
+    """Compose the sections of a study."""
     table = None if result.rows is None or not result.rows.done else result.rows.table
     asked = [
         Section(key="study_asked", title="What was asked", items=[*setup_items(result, published)])
@@ -190,16 +158,7 @@ def study_part(
     key: str = "robustness",
     published: Mapping[str, Published] | None = None,
 ) -> list[Section]:
-    """Compose several studies, in short, as a part of another report: first the verdicts.
-
-    Parameters
-    ----------
-    studies : sequence of (Result, Histories or None)
-    key : str, optional
-        Anchor of the part; those of the studies begin with it.
-    published : mapping of str to Published, optional
-        Where loops were published, by the name that their studies call them.
-    """
+    """Compose several studies, in short, as a part of another report: first the verdicts."""
     rows = []
     for result, _ in studies:
         look, told = summary(claims(result))

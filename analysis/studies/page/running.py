@@ -36,17 +36,7 @@ def running_items(
     decides: str,
     fixed: tuple[float, float] | None = None,
 ) -> Iterator[Item]:
-    """Yield what the estimate did while the rows came in.
-
-    Parameters
-    ----------
-    finding, result, asked, key
-        As in `nlctl.analysis.studies.kind.Kind.items`.
-    decides : str
-        What the verdict rests on, the end of the caption.
-    fixed : (float, float), optional
-        Bounds at the end, drawn as a bar.
-    """
+    """Yield what the estimate did while the rows came in."""
     assert result.rows is not None
     margins = result.rows.columns("spec")["spec"].to_numpy(dtype=float)
     confidence = float(finding.numbers["confidence"])

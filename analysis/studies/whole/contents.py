@@ -30,14 +30,7 @@ REMEDY = "continue the run with --resume, which makes it anew, or take an intact
 
 
 def seal(result: Result, before: Mapping[str, Any] | None = None) -> None:
-    """Write the record of a folder, as it is now.
-
-    Parameters
-    ----------
-    result : Result
-    before : mapping, optional
-        The record that `unseal` has taken away: the page stays that of the run if nothing changed.
-    """
+    """Write the record of a folder, as it is now."""
     folder, done = result.folder, [finding.key for finding in result.findings]
     files = list(_parts(folder, keyed(result.study)))
     digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in files}
@@ -102,14 +95,7 @@ def _tables(folder: Path, files: Iterable[Path]) -> dict[str, Any]:
 
 
 def check_whole(folder: Path) -> dict[str, Any]:
-    """Refuse a folder that is not what its run has written; return its record.
-
-    Raises
-    ------
-    RunFolderError
-        If it holds no run, a part is missing, edited or too much, or the run has not come to an
-        end.
-    """
+    """Refuse a folder that is not what its run has written; return its record."""
     content = sealed_record(folder)
     for problem in problems_in(folder, content):
         raise RunFolderError(f"{problem}: {REMEDY}")
@@ -117,13 +103,7 @@ def check_whole(folder: Path) -> dict[str, Any]:
 
 
 def sealed_record(folder: Path) -> dict[str, Any]:
-    """Return what ``contents.json`` says, whether or not it is so.
-
-    Raises
-    ------
-    RunFolderError
-        If there is none, or it is damaged, edited or of another version.
-    """
+    """Return what ``contents.json`` says, whether or not it is so."""
     path = folder / CONTENTS
     if (folder / "study.toml").exists() and not path.exists():
         raise RunFolderError(

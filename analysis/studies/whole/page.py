@@ -26,13 +26,7 @@ def is_run(folder: Path) -> bool:
 
 @contextmanager
 def recorded_page(folder: Path) -> Iterator[None]:
-    """Hold a run's folder while its page is written, and put that page into its record.
-
-    Raises
-    ------
-    RunFolderError
-        If the folder is not whole, or a run works in it.
-    """
+    """Hold a run's folder while its page is written, and put that page into its record."""
     with locked(folder, RunFolderError):
         content = check_whole(folder)
         yield
@@ -44,13 +38,7 @@ def recorded_page(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def recorded_print(folder: Path) -> Iterator[None]:
-    """The same while a page is printed to ``report.pdf``, in a folder of a run or another one.
-
-    Raises
-    ------
-    RunFolderError
-        If a run works in the folder.
-    """
+    """The same while a page is printed to ``report.pdf``, in a folder of a run or another one."""
     if not is_run(folder):
         yield
         return
@@ -81,13 +69,7 @@ def page_problems(folder: Path, content: Mapping[str, Any]) -> Iterator[str]:
 
 
 def check_page(folder: Path) -> None:
-    """Refuse the page of a run that is not the one that was made of it.
-
-    Raises
-    ------
-    RunFolderError
-        With what is wrong; nothing is raised for a page that is in no run's folder.
-    """
+    """Refuse the page of a run that is not the one that was made of it."""
     if is_run(folder):
         for problem in page_problems(folder, sealed_record(folder)):
             raise RunFolderError(problem)

@@ -168,13 +168,7 @@ class ContentsFile(_File):
 
 
 def shaped(path: Path, shape: type[_Shape], remedy: str = ANEW) -> dict[str, Any]:
-    """Return what a file of a run folder holds, if it has the shape that runs write.
-
-    Raises
-    ------
-    RunFolderError
-        If it is missing, damaged, edited, or has another shape.
-    """
+    """Return what a file of a run folder holds, if it has the shape that runs write."""
     content = read_json(path, remedy)
     try:
         return shape.model_validate(content).model_dump(exclude_unset=True)

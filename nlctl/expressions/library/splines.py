@@ -17,13 +17,7 @@ __all__ = ["called_object", "enter_splines"]
 
 
 def called_object(graph: Graph, thing: Any, *arguments: Any, **options: Any) -> Any:
-    """Return what an object of a library, that can be called, makes of arrays of expressions.
-
-    Raises
-    ------
-    Untraceable
-        If it is not known here.
-    """
+    """Return what an object of a library, that can be called, makes of arrays of expressions."""
     for kinds, own in _kinds():
         if isinstance(thing, kinds):
             return own(graph, thing, *arguments, **options)

@@ -110,13 +110,7 @@ class Facade:
 
 
 def written_out(graph: Graph, function: Any, *arguments: Any, **options: Any) -> Any:
-    """Return a function of a library of arrays of expressions.
-
-    Raises
-    ------
-    Untraceable
-        If it is not in the table.
-    """
+    """Return a function of a library of arrays of expressions."""
     if function in WRITTEN:
         return WRITTEN[function](graph, *arguments, **options)
     name = UFUNC_OPERATIONS.get(getattr(function, "__name__", ""))

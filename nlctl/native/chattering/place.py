@@ -32,18 +32,7 @@ _SMALL = 1e-300  # what is divided by where nothing else has changed
 def chattering_words(
     compiled: Compiled, p: np.ndarray, params: Mapping[str, Any] | None, jump: Jump
 ) -> str:
-    """Return which signal jumps between which values, and what to do.
-
-    Parameters
-    ----------
-    compiled : Compiled
-    p : ndarray
-        The program's parameter vector.
-    params : mapping or None
-        The same as python-control takes them.
-    jump : Jump
-        Where the run chatters.
-    """
+    """Return which signal jumps between which values, and what to do."""
     relays = relay_places(compiled.schedule.nodes)
     if jump.crowd is not None:
         return _accumulation(compiled, jump.crowd)

@@ -21,16 +21,7 @@ _Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the m
 def interpreted_function(
     function: Function, lanes: int, calls: Mapping[str, _Opaque]
 ) -> Callable[..., None]:
-    """Return one function of a program.
-
-    Parameters
-    ----------
-    function : Function
-    lanes : int
-        Number of members.
-    calls : mapping
-        Opaque functions and searches, by name.
-    """
+    """Return one function of a program."""
 
     def run(*arrays: np.ndarray) -> None:
         memory = dict(zip(function.arguments, arrays, strict=True))

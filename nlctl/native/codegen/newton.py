@@ -34,22 +34,7 @@ _ROUNDING = 4 * 2.0**-52
 
 
 def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[Solver, list[Expr]]:
-    """Return what solves for guesses, and the expressions from outside that it is given.
-
-    Parameters
-    ----------
-    name : str
-    guesses : sequence of Expr
-        Leaves that stand for the torn signals.
-    found : sequence of Expr
-        What the blocks make of these.
-
-    Raises
-    ------
-    Untraceable
-        If an opaque function is in the loop, which has no derivative, or there are too many
-        signals.
-    """
+    """Return what solves for guesses, and the expressions from outside that it is given."""
     if len(guesses) > _MOST:
         raise Untraceable(f"{len(guesses)} signals have to be found together, {_MOST} can be")
     nodes = needed(found)
@@ -133,20 +118,7 @@ def _pass(
 def improved(
     n: int, state: Sequence[Any], found: Sequence[Any], jacobian: Sequence[Sequence[Any]]
 ) -> list[Any]:
-    """Return the next state of a search.
-
-    Parameters
-    ----------
-    n : int
-        Number of signals.
-    state : sequence of 4 + 2 n numbers
-        Phase, trials from this start, starts so far, the least max |F(z) - z| of this start; the
-        guess, and the best one so far.
-    found : sequence of n numbers
-        F(guess).
-    jacobian : n rows of n numbers
-        Derivatives of F at the guess.
-    """
+    """Return the next state of a search."""
     phase, count, start, best = state[:4]
     guess, base = state[4 : 4 + n], state[4 + n : 4 + 2 * n]
     apart = largest_magnitude([found[i] - guess[i] for i in range(n)])

@@ -166,21 +166,7 @@ def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
 def plan_function(
     wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int
 ) -> FunctionPlan:
-    """Plan a function.
-
-    Parameters
-    ----------
-    wanted : sequence of Store
-        Its results.
-    known : dict
-        Expressions that already lie in memory, and where.
-    rows : int
-        Rows of the array ``c`` that are taken.
-
-    Returns
-    -------
-    Plan
-    """
+    """Plan a function."""
     wanted = [part for store in wanted for part in split(store, known)]
     nodes = needed([s.expr for s in wanted], known)
     stored = dict(known)

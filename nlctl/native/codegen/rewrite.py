@@ -22,23 +22,7 @@ _LOG2_E = 1.4426950408889634
 def rewritten(
     graph: Graph, stores: Mapping[str, Sequence[Store]]
 ) -> tuple[dict[str, list[Store]], frozenset[Expr], Graph]:
-    """Return the same results in other words.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where they are from.
-    stores : mapping
-        What is to be written, by the name of the array.
-
-    Returns
-    -------
-    stores : dict
-    exact : frozenset of Expr
-        Operations that are to be rounded one by one.
-    graph : Graph
-        Where the results are kept now.
-    """
+    """Return the same results in other words."""
     nodes = needed([s.expr for part in stores.values() for s in part], ())
     decisive = _decisive(nodes)
     fresh, new = Graph(graph.lengths), {}

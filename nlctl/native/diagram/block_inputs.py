@@ -14,13 +14,7 @@ def block_inputs(
 ) -> Iterator[tuple[Any, np.ndarray]]:
     """Yield every block of a diagram with its inputs, in the order of the state vector.
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram, nested to any depth, or a block.
-    u : ndarray of shape (ninputs,)
-    outputs : mapping
-        Outputs of the blocks, by their places in that order.
+    Shapes: `u` (ninputs,).
     """
     places = iter(range(len(outputs)))
     yield from ((block, given) for block, given, _ in _walked(system, u, outputs, places))

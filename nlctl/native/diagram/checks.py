@@ -20,13 +20,7 @@ from .parameters import current_values
 
 
 def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
-    """Hold a diagram to the number of states that its blocks have.
-
-    Raises
-    ------
-    CompileError
-        If it was made with another one.
-    """
+    """Hold a diagram to the number of states that its blocks have."""
     had = sum(block.nstates or 0 for block in blocks)
     if had != (system.nstates or 0):
         raise CompileError(
@@ -39,23 +33,6 @@ def check_functions(path: str, system: Any) -> FunctionReading:
     """Check that a block's functions depend on their arguments alone, and return enough values.
 
     The functions are read, not called, until they are known to remember nothing.
-
-    Parameters
-    ----------
-    path : str
-    system : control.InputOutputSystem
-        The block, which has this path.
-
-    Returns
-    -------
-    FunctionReading
-        Of all functions together.
-
-    Raises
-    ------
-    CompileError
-        If a function has a memory, changes something, cannot be read, or returns a wrong number
-        of values.
     """
     is_block, found = isinstance(system, Block), []
     for what, function in _functions(system):
@@ -120,17 +97,6 @@ def sized(system: Any, inputs: Any, initial_state: Any) -> Any:
     """Return a block with the numbers of states, inputs and outputs that a run gives it.
 
     python-control takes them from the run's arguments where a block does not declare them.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        Returned as it is unless it is a block that lacks a number.
-    inputs, initial_state : object
-        The run's: as many inputs as rows (1 for a number), as many states as values.
-
-    Returns
-    -------
-    control.InputOutputSystem
     """
     counts = (system.nstates, system.ninputs, system.noutputs)
     diagram = isinstance(system, ct.InterconnectedSystem)

@@ -20,14 +20,7 @@ def feedthrough(system: Any) -> np.ndarray:
     others are traced: what reaches an output in their expressions is depended on, whatever the
     values are.
 
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A block, not a diagram.
-
-    Returns
-    -------
-    ndarray of bool, shape (noutputs, ninputs)
+    returns (noutputs, ninputs).
     """
     shape = (system.noutputs or 0, system.ninputs or 0)
     if isinstance(system, Block):

@@ -77,18 +77,7 @@ def is_numeric(value: Any) -> bool:
 
 
 def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
-    """Lay out the numeric parameters of all blocks.
-
-    Returns
-    -------
-    dict
-        For every block index the slots of its parameters by name.
-
-    Raises
-    ------
-    UsageError
-        If a third-party block's parameter name is not a string.
-    """
+    """Lay out the numeric parameters of all blocks."""
     found: dict[int, dict[str, Slot]] = {}
     offset = 0
     for i, node in enumerate(nodes):
@@ -125,14 +114,7 @@ def packed(
     layout: Mapping[int, Mapping[str, Slot]],
     fixed: Mapping[int, Mapping[str, Any]],
 ) -> np.ndarray:
-    """Return the parameter vector with the values that the blocks have now.
-
-    Raises
-    ------
-    UsageError
-        If an override has changed what is fixed by compiling, or brings a parameter that nobody
-        declared.
-    """
+    """Return the parameter vector with the values that the blocks have now."""
     p = np.empty(length(layout))
     for i, block in layout.items():
         path, values, constants = nodes[i].path, current_values(nodes[i].system), fixed.get(i, {})
@@ -154,14 +136,7 @@ def packed(
 
 
 def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
-    """Put a parameter into its place in the vector.
-
-    Raises
-    ------
-    UsageError
-        If its shape is another than when the diagram was compiled, or it is not an integer any
-        more.
-    """
+    """Put a parameter into its place in the vector."""
     array = np.asarray(value) if is_numeric(value) else None
     if array is None or array.shape != slot.shape:
         now = f"be {value!r}" if array is None else f"have shape {array.shape}"

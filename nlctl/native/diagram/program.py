@@ -63,11 +63,6 @@ class Program:
         """What may happen at one instant: there is a function of the program for each.
 
         Where parameters of clocks are overridden, more may; see `machine.evaluations`.
-
-        Raises
-        ------
-        CompileError
-            If there is too much.
         """
         found = tuple(meetings(self.clocks))
         if len(found) > _MOST:
@@ -89,13 +84,7 @@ class Program:
 
 
 def program(schedule: Schedule) -> Program:
-    """Lay out the arrays of a diagram's program.
-
-    Raises
-    ------
-    CompileError
-        If a block is of a kind that cannot be compiled, or has no fixed size.
-    """
+    """Lay out the arrays of a diagram's program."""
     for node in schedule.nodes:
         _check_kind(node)
     layout = slots(schedule.holders)
@@ -187,13 +176,7 @@ def _check_kind(node: Node) -> None:
 
 
 def check_continuous(node: Node, committed: Tracer, inputs: Tracer) -> None:
-    """Refuse a memory without switching functions that may jump: error control does not see it.
-
-    Raises
-    ------
-    BlockError
-        If what it is committed to is not a continuous function of states, inputs and time.
-    """
+    """Refuse a memory without switching functions that may jump: error control does not see it."""
     known = {expr for expr, _ in inputs.pieces()}
     if may_jump([expr for expr, _ in committed.pieces()], known):
         raise BlockError(

@@ -126,26 +126,7 @@ class Schedule:
 
 
 def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Schedule:
-    """Flatten a diagram and order its blocks.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram, nested to any depth, or a single block.
-    solve_loops : bool, optional
-        Whether algebraic loops are scheduled to be solved instead of being an error.
-
-    Returns
-    -------
-    Schedule
-
-    Raises
-    ------
-    AlgebraicLoopError
-        If signals depend on each other without a state in between.
-    CompileError
-        If a block's function does not depend on its arguments alone.
-    """
+    """Flatten a diagram and order its blocks."""
     wiring = Wiring(system)
     blocks = [within(place.system) for place in wiring.blocks]
     read = [note for place in places(system) for note in _equations_of(place.system)]
@@ -207,13 +188,7 @@ def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
 
 
 def during(read: Schedule, what: Happening) -> Schedule:
-    """Return the schedule at an instant: outputs of what samples then depend on its inputs.
-
-    Raises
-    ------
-    AlgebraicLoopError
-        If blocks that sample then depend on each other's new outputs in a circle.
-    """
+    """Return the schedule at an instant: outputs of what samples then depend on its inputs."""
     nodes = tuple(
         replace(node, direct=feedthrough(node.system))
         if node.sampled and node.sampled.answers(what)

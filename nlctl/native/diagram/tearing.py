@@ -13,18 +13,7 @@ _Item = TypeVar("_Item", bound=Hashable)
 
 
 def first_loop(before: Mapping[_Item, set[_Item]]) -> set[_Item]:
-    """Return the items of one loop that depends on no other loop.
-
-    Parameters
-    ----------
-    before : mapping
-        For every item those that it depends on: none is without.
-
-    Returns
-    -------
-    set
-        Items each of which depends on each other (a strongly connected component).
-    """
+    """Return the items of one loop that depends on no other loop."""
     items = list(before)
     number = {item: i for i, item in enumerate(items)}
     edges = [(number[item], number[other]) for item in items for other in before[item]]

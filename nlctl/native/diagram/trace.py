@@ -60,9 +60,7 @@ def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Sl
 
     What cannot be traced, or holds for some values of a parameter only, depends on all of them.
 
-    Returns
-    -------
-    ndarray of bool, shape (noutputs, ninputs)
+    returns (noutputs, ninputs).
     """
     found = np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)
     graph = Graph()

@@ -50,19 +50,7 @@ def point_of(x: float, width: int) -> Ends:
 
 
 def routine(b: Body, name: str, make: Callable[..., Ends], *args: Ends) -> Ends:
-    """Return what a rule makes of intervals; it is written once, as a function of a module.
-
-    Parameters
-    ----------
-    b : Body
-        Where it is used.
-    name : str
-        Of the rule, where no constant and no known sign is among its arguments.
-    make : callable
-        ``make(b, *args)``, the rule.
-    *args : Ends
-        Of numbers.
-    """
+    """Return what a rule makes of intervals; it is written once, as a function of a module."""
     known = "".join("c" if x.point is not None else "n" if x.not_negative else "p" for x in args)
     if "c" in known:
         return make(b, *args)

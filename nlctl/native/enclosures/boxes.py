@@ -62,14 +62,7 @@ class BoxCode:
     def values(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds of the functions on boxes, by their natural extension.
 
-        Parameters
-        ----------
-        low, high : ndarray of shape (boxes, sides)
-
-        Returns
-        -------
-        low, high : ndarray of shape (boxes, results)
-            Both not a number where a function may have no value.
+        Shapes: `low, high` (boxes, sides); returns (boxes, results).
         """
         count, lanes = len(low), self.lanes
         ends = np.stack([low, high], axis=2).astype(float)  # (boxes, sides, 2)
@@ -86,42 +79,18 @@ class BoxCode:
 
 
 def side_leaves(graph: Graph, sides: int) -> tuple[Tracer, ...]:
-    """Return the sides of a box as numbers that a traced function may take.
-
-    Parameters
-    ----------
-    graph : Graph
-    sides : int
-    """
+    """Return the sides of a box as numbers that a traced function may take."""
     return tuple(scalar(graph, graph.leaf("x", i, None)) for i in range(sides))
 
 
 def expressions_of(function: Callable[..., Any], sides: int) -> tuple[Graph, list[Expr]]:
-    """Return what a function of a tuple of numbers computes, as expressions of its numbers.
-
-    Raises
-    ------
-    Untraceable
-        If it is not a function of its arguments alone, or does what expressions cannot say.
-    """
+    """Return what a function of a tuple of numbers computes, as expressions of its numbers."""
     graph = UnroundedGraph({"x": sides})
     return graph, numbers_at(graph, function, side_leaves(graph, sides))
 
 
 def numbers_at(graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, ...]) -> list[Expr]:
-    """Return what anybody's function of one tuple computes; see `expressions_of`.
-
-    Parameters
-    ----------
-    graph : Graph
-    function : callable
-    sides : tuple of Tracer
-
-    Raises
-    ------
-    Untraceable
-        If it is not a function of its arguments alone, or does what expressions cannot say.
-    """
+    """Return what anybody's function of one tuple computes; see `expressions_of`."""
     try:
         check_pure(function, [FRESH])
     except Impure as error:
@@ -132,20 +101,7 @@ def numbers_at(graph: Graph, function: Callable[..., Any], sides: tuple[Tracer, 
 def traced_numbers(
     graph: Graph, function: Callable[..., Any], arguments: Callable[[], tuple[Any, ...]]
 ) -> list[Expr]:
-    """Return the numbers that a pure function computes.
-
-    Parameters
-    ----------
-    graph : Graph
-    function : callable
-    arguments : callable
-        Makes its arguments, see `nlctl.expressions.trace`.
-
-    Raises
-    ------
-    Untraceable
-        If it does what expressions cannot say, or what they understand in another way.
-    """
+    """Return the numbers that a pure function computes."""
     try:
         with np.errstate(all="ignore"):
             found = trace(graph, function, arguments)
@@ -155,22 +111,7 @@ def traced_numbers(
 
 
 def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
-    """Make the machine code that encloses functions of a box.
-
-    Parameters
-    ----------
-    results : sequence of Expr
-        Numbers, made of the leaves ``x[0], ..., x[sides - 1]``.
-    sides : int
-        Of the box, at least one.
-    fixed : int, optional
-        So many of the last sides are numbers, such as a level, which may be others for each box.
-
-    Raises
-    ------
-    Untraceable
-        If there is no enclosure of what they are made of.
-    """
+    """Make the machine code that encloses functions of a box."""
     with np.errstate(all="ignore"):  # of constants
         graph, numbers = scalar_expressions(results)
         gradients = [_gradient(graph, expr, sides, fixed) for expr in numbers]

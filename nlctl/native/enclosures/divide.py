@@ -70,15 +70,7 @@ def decide_claim(
 ) -> BoxVerdict:
     """Prove or refute that the least of the functions is at most `bound` on a box.
 
-    Parameters
-    ----------
-    code : BoxCode
-    low, high : ndarray of shape (sides,)
-    bound : float
-    max_boxes : int
-        Boxes after which the rest counts as undecided.
-    threads : int, optional
-        The result is the same for any number of them.
+    Shapes: `low, high` (sides,).
     """
     _check_fixed(code, low, high)
     begun = _Search(code, np.stack([low, high], axis=1).reshape(1, -1), bound)
@@ -174,16 +166,7 @@ def enclose_supremum(
 ) -> Supremum:
     """Enclose the supremum of the least of the functions on a box.
 
-    Parameters
-    ----------
-    code : BoxCode
-    low, high : ndarray of shape (sides,)
-    tol : float
-        How far the bound may be from a value that is attained.
-    max_boxes, hopeless : int
-        Boxes after which the rest is left as it is, the second while there is no bound at all.
-    relative : float, optional
-        A smaller tolerance that is tried, relative to the bound.
+    Shapes: `low, high` (sides,).
     """
     _check_fixed(code, low, high)
     box = np.stack([low, high], axis=1).reshape(-1)

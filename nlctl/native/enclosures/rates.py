@@ -17,17 +17,6 @@ def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> l
     """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``.
 
     Its external inputs are 0.
-
-    Parameters
-    ----------
-    compiled : Reading
-    params : dict, optional
-        Overrides by qualified name.
-
-    Raises
-    ------
-    Untraceable
-        If the rates are not a function of the states alone: with the reason.
     """
     _check(compiled)
     p = compiled.parameter_vector(params)
@@ -69,14 +58,7 @@ def _check(compiled: Reading) -> None:
 def with_leaves(
     exprs: Sequence[Expr], instead: Callable[[Graph, Expr], Expr]
 ) -> tuple[Graph, list[Expr]]:
-    """Return expressions of numbers with something else in the place of what is read.
-
-    Parameters
-    ----------
-    exprs : sequence of Expr
-    instead : callable
-        ``instead(graph, leaf)``: an expression of the new graph.
-    """
+    """Return expressions of numbers with something else in the place of what is read."""
     graph, made = UnroundedGraph(), {}
     for node in needed(exprs):
         if node.op == "leaf":

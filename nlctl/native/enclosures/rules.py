@@ -80,16 +80,7 @@ STEPS = ("floor", "ceil", "trunc", "rint", "sign")
 
 
 def interval_of(b: Body, name: str, *args: Ends) -> _Result:
-    """Return what a function of the table makes of intervals, and where it may jump.
-
-    Parameters
-    ----------
-    b : Body
-        Where it is written.
-    name : str
-        NumPy's name.
-    *args : Ends
-    """
+    """Return what a function of the table makes of intervals, and where it may jump."""
     if name in ("minimum", "maximum"):  # which know an infinite constant
         return (minimum if name == "minimum" else maximum)(b, *args), None
     args = tuple(map(finite, args))

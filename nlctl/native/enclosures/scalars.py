@@ -12,18 +12,7 @@ MOST_NUMBERS = 3_000  # numbers, beyond which code would take too long to make
 
 
 def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
-    """Return expressions in a graph of their own, in which everything is a number.
-
-    Parameters
-    ----------
-    results : sequence of Expr
-        Numbers.
-
-    Raises
-    ------
-    Untraceable
-        If there is an opaque function among what they are made of, or too much of it.
-    """
+    """Return expressions in a graph of their own, in which everything is a number."""
     graph, made = UnroundedGraph(), {}
     for node in needed(results):
         if node.op in ("call", "solve"):

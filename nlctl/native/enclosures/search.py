@@ -36,30 +36,7 @@ def best_side(x, o, lane, weight, whole):
 def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
     """Prove or refute that the least of some functions is at most a bound on boxes.
 
-    Parameters
-    ----------
-    judge : int
-        Address of machine code.
-    places : tuple of 2 int
-        In `o`, where the centre and the weights of sides begin.
-    x, o : ndarray of shape (rows, lanes)
-        Room for what it is given and what it writes.
-    stack : ndarray of shape (boxes, 2 sides)
-        Boxes: lower and upper end of each side.
-    whole : ndarray of shape (sides,)
-        Widths that sides are compared with.
-    bound : float
-    most : int
-        Number of boxes after which the rest is left.
-    counts : ndarray of 3 int
-        Boxes on the stack, boxes judged, boxes that cannot be divided; they are counted on.
-    point : ndarray of shape (sides + 1,)
-        Where it is refuted, and the value there; or the centre of such a box.
-
-    Returns
-    -------
-    int
-        `ALL_PROVED`, `REFUTED`, `LEFT`, or `FULL` where the stack has no room for more.
+    Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides + 1,).
     """
     n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
     top = counts[0]
@@ -105,32 +82,7 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
 def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, found):
     """Enclose the supremum of the least of some functions on a box.
 
-    Parameters
-    ----------
-    judge, places, x, o, whole
-        As for `prove_below`.
-    nodes : ndarray of shape (boxes, 2 sides)
-        Boxes, the first of which is there to begin with.
-    index : ndarray of shape (3, boxes)
-        Of each box the side that is divided next; the heap's places in `nodes`; boxes that wait.
-    keys : ndarray of shape (boxes,)
-        The heap's bounds.
-    limits : tuple of (float, float, int, int)
-        How far the bound may be from a value that is attained, and a smaller number, relative to
-        the bound, that is tried; boxes after which the rest is left, the second while there is no
-        bound at all.
-    counts : ndarray of 5 int
-        Boxes that wait, boxes in the heap, places in use, boxes judged, boxes without a bound
-        that are left.
-    found : ndarray of 2 floats
-        The bound of boxes that cannot be divided, in the end that of all, and the largest lower
-        bound of a value at a point; where sides have no end, the largest upper bound at the
-        centres of the others.
-
-    Returns
-    -------
-    int
-        `FULL` where there is no room for more boxes, or `ALL_PROVED`.
+    Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
     """
     while True:
         judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)

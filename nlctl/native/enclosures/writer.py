@@ -97,19 +97,7 @@ class JudgedRows:
 def enclosure_text(
     results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int, lanes: int = LANES
 ) -> str:
-    """Return the IR of both functions.
-
-    Parameters
-    ----------
-    results : sequence of Expr
-        Numbers.  That all of them are positive is what `judge` looks for.
-    gradients : sequence of sequences of Expr
-        Of each result, the derivative along each side.
-    sides : int
-        Of the box.
-    lanes : int, optional
-        Boxes at a time.
-    """
+    """Return the IR of both functions."""
     all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
     module = Module(inlined=len(all_of_it) <= INLINED)
     texts = [_values(module, results, lanes), _judge(module, results, gradients, sides, lanes)]

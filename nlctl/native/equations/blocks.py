@@ -64,29 +64,7 @@ def equations(
     p: np.ndarray | None = None,
     meetings: Sequence[Happening] = (),
 ) -> Equations:
-    """Write a schedule as expressions.
-
-    Parameters
-    ----------
-    schedule : Schedule
-    layout : mapping
-        Places of the parameters, as in `Program.layout`.
-    p : ndarray, optional
-        The parameter vector whose integers steer what is computed; by default those that the
-        blocks have now.
-    meetings : sequence of frozenset, optional
-        What happens to sampled blocks, as in `Program.meetings`.
-
-    Returns
-    -------
-    Equations
-
-    Raises
-    ------
-    CompileError
-        If a function means one thing in Python and another in expressions, or one in an algebraic
-        loop is opaque.
-    """
+    """Write a schedule as expressions."""
     system = schedule.system
     sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
     reader = Reader(

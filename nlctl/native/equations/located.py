@@ -90,20 +90,7 @@ def found_conditions(
     events: Mapping[int, Sequence[Tracer]],
     others: Iterable[Expr],
 ) -> Conditions:
-    """Return what switches in a diagram whose blocks have been read.
-
-    Parameters
-    ----------
-    reader : Reader
-    rates : sequence of Tracer
-        The derivatives of each block's states.
-    declared : iterable of Tracer
-        Switching functions that the blocks declare.
-    events : mapping
-        Guards of blocks, and what their memories become, by their places.
-    others : iterable of Expr
-        What arrives at delays, and event functions of the run.
-    """
+    """Return what switches in a diagram whose blocks have been read."""
     declared, others = tuple(declared), tuple(others)
     arrays = [*rates, *declared, *(array for own in events.values() for array in own)]
     roots = [*others, *_pieces(arrays)]

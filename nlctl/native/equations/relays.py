@@ -26,11 +26,6 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     """Return a reader that knows outputs and rates of ideal relays, if there are any.
 
     The diagram is read once more for that, with their outputs as if they came from outside.
-
-    Raises
-    ------
-    CompileError
-        If the input of a relay has no rate of the form a + b v.
     """
     graph, blocks = reader.graph, reader.blocks
     places = relay_places(blocks)

@@ -19,18 +19,7 @@ if TYPE_CHECKING:
 
 
 def watched_conditions(reader: Reader, schedule: Schedule) -> list[Located]:
-    """Return the functions of a run as conditions.
-
-    Parameters
-    ----------
-    reader : Reader
-    schedule : Schedule
-
-    Raises
-    ------
-    CompileError
-        If one cannot be written as an expression: it would have to be called as it stands.
-    """
+    """Return the functions of a run as conditions."""
     graph, system = reader.graph, schedule.system
     sizes = (system.nstates or 0, system.ninputs or 0)
     found = []

@@ -28,27 +28,7 @@ def simulate_discrete(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k]).
 
-    Parameters
-    ----------
-    compiled : Compiled
-        A discrete-time system.
-    times : ndarray of shape (m,)
-        Sampling times, ``dt`` apart (s); any equal distance where ``dt`` is True.
-    inputs : ndarray of shape (ninputs, m)
-    x0 : ndarray of shape (nstates,)
-    p : ndarray
-        The program's parameter vector.
-
-    Returns
-    -------
-    outputs : ndarray of shape (noutputs, n)
-    states : ndarray of shape (nstates, n)
-        n = m, or fewer where the run diverged: sample n has a state or output that is not finite.
-
-    Raises
-    ------
-    ParameterError
-        If `times` are not one sampling time apart.
+    Shapes: `times` (m,), `inputs` (ninputs, m), `x0` (nstates,); returns (noutputs, n).
     """
     system, count = compiled.system, times.size
     _check_times(system, times)

@@ -84,20 +84,6 @@ def with_table(record: Any, **values: Any) -> Any:
 
     Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
     that this function has made.
-
-    Parameters
-    ----------
-    record : class
-        Of named tuples, with arrays annotated as `Reals1`, ..., `Places3`.
-    **values
-        Its fields.
-
-    Raises
-    ------
-    TypeError
-        If a field has another type than machine code takes it for.
-    ValueError
-        If an array is not C-contiguous: the table has no strides.
     """
     numbers: list[int] = []
     for name, (dtype, ndim) in type_of(record).formats.items():

@@ -119,14 +119,7 @@ def _every_input(run: Any, j: int, done: int) -> np.ndarray:
 
 
 def at_its_end(run: Any, found: Trajectory) -> Trajectory:
-    """Return a single run with the instant at which a function has ended it as its last time.
-
-    Parameters
-    ----------
-    run : Run
-    found : Trajectory
-        Up to the last time of the response before that.
-    """
+    """Return a single run with the instant at which a function has ended it as its last time."""
     t, x, u = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x, run.work.u))
     if found.statistics.status is not Status.ENDED or t[0] <= found.time[-1]:
         return found

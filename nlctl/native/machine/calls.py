@@ -79,15 +79,7 @@ def _plain(call: Call) -> Callable[[np.ndarray, int, int], None]:
 
 
 def native_calls(calls: Mapping[str, Call], lanes: int) -> Native:
-    """Return calls as C functions.
-
-    Parameters
-    ----------
-    calls : mapping
-        By name.
-    lanes : int
-        Number of members.
-    """
+    """Return calls as C functions."""
     symbols, owners, called_back = {}, [], []
     raised: dict[tuple[int, int], BaseException] = {}
     for name, call in calls.items():

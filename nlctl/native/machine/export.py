@@ -57,18 +57,7 @@ define void @NRT_MemInfo_call_dtor(ptr %info) {
 
 
 def exported(wanted: Sequence[Wanted]) -> bytes:
-    """Return compressed bitcode of functions, each with its Python name.
-
-    Parameters
-    ----------
-    wanted : sequence of Wanted
-        Their arguments are numbers and pointers.
-
-    Raises
-    ------
-    numba.core.errors.NumbaError
-        If a function cannot be compiled.
-    """
+    """Return compressed bitcode of functions, each with its Python name."""
     names, libraries = {}, []
     with own_ir() as texts:
         for each in wanted:

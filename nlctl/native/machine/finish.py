@@ -60,24 +60,7 @@ def finished(
     symbols: Mapping[str, int] = MappingProxyType({}),
     owners: Iterable[Any] = (),
 ) -> Loaded:
-    """Return the functions of some IR, ready to be called.
-
-    Parameters
-    ----------
-    source : str or bytes
-        IR as text, or bitcode that `export` has made.
-    names : iterable of str
-        Functions whose addresses are wanted.
-    symbols : mapping
-        Addresses of what it calls, by name.
-    owners : iterable
-        What these addresses belong to.
-
-    Raises
-    ------
-    CompileError
-        If it calls what is nowhere.
-    """
+    """Return the functions of some IR, ready to be called."""
     with _ONE_AT_A_TIME:
         key = _key(source)
         code = store.read(key)

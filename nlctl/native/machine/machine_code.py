@@ -55,17 +55,6 @@ def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
     """Return functions as machine code, from the store, or compiled and kept there as one entry.
 
     With NUMBA_DISABLE_JIT=1 they are returned as they stand.
-
-    Parameters
-    ----------
-    key : str
-        Of all that their code is made of; what compiles it is added here.
-    wanted : sequence of Wanted
-
-    Raises
-    ------
-    numba.core.errors.NumbaError
-        If a function cannot be compiled.
     """
     if is_jit_disabled():
         return [each.function for each in wanted]
@@ -80,14 +69,7 @@ def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
 
 
 def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
-    """Return a function as machine code, None if numba refuses it; that is kept as well.
-
-    Parameters
-    ----------
-    key : str
-        As in `machine_code`.
-    wanted : Wanted
-    """
+    """Return a function as machine code, None if numba refuses it; that is kept as well."""
     refused = store_key(key, "refused", str(wanted.signature), wanted.options)
     if store.read(refused) is not None:
         return None

@@ -16,12 +16,6 @@ def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
 
     It is registered under the program's key, by which machine code that was kept finds it, and its
     lines are known to tracebacks.
-
-    Parameters
-    ----------
-    program : Program or Lowered
-    functions : mapping
-        What takes the place of the blocks' functions.
     """
     name = f"nlctl_program_{program_key(program)}"
     file = f"<{name}>"

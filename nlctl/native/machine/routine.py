@@ -66,12 +66,7 @@ class Routine:
         self.bound(*arrays)()
 
     def bound(self, *arrays: np.ndarray) -> Callable[[], None]:
-        """Return a call with these arrays, which are looked at once; their values may change.
-
-        Parameters
-        ----------
-        *arrays : ndarray
-        """
+        """Return a call with these arrays, which are looked at once; their values may change."""
         for array, shape in zip(arrays, self.shapes, strict=True):
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
@@ -90,13 +85,7 @@ class Routine:
         return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(self.shapes))(self.address)
 
     def check(self, c: np.ndarray) -> None:
-        """Raise what a function that it has called has raised.
-
-        Parameters
-        ----------
-        c : ndarray
-            As it was given.
-        """
+        """Raise what a function that it has called has raised."""
         for each in self.opaque:
             each.check(c)
 
@@ -115,11 +104,6 @@ def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
     """Return the functions of a program as machine code, from the cache if it is there.
 
     With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
-
-    Raises
-    ------
-    CompileError
-        If the C library lacks a function.
     """
     if is_jit_disabled():
         return plain_functions(lowered)

@@ -55,13 +55,7 @@ def cache_folder() -> Path:
 
 
 def read(key: str) -> bytes | None:
-    """Return what was written under a key; None if there is nothing that can be relied on.
-
-    Warns
-    -----
-    CacheWarning
-        If the folder or the file is not this user's alone; once for a folder.
-    """
+    """Return what was written under a key; None if there is nothing that can be relied on."""
     path = _path(key)
     try:
         if not _is_safe(os.stat(path.parent), path.parent):

@@ -42,24 +42,7 @@ def call_of(
     name: str, node: Any, kind: str, functions: Sequence[Any], slots: Mapping[str, Slot],
     count: int, reason: str,
 ) -> Call:  # fmt: skip
-    """Return a call of a block's functions.
-
-    Parameters
-    ----------
-    name : str
-    node : Node
-        The block.
-    kind : str
-        ``"update"``, ``"output"`` or ``"events"``.
-    functions : sequence of callable
-        Whose results follow each other.
-    slots : mapping
-        Places of its parameters.
-    count : int
-        Number of results.
-    reason : str
-        Why they are not written out.
-    """
+    """Return a call of a block's functions."""
     size = sum(s.size for s in slots.values())
     stands = _AsItStands(
         path=node.path,
@@ -96,13 +79,7 @@ class _AsItStands:
         object.__setattr__(self, "start", first)
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
-        """Return the results.
-
-        Raises
-        ------
-        BlockError
-            If there are more or fewer than the block has states or outputs.
-        """
+        """Return the results."""
         _, x, u, p, count = self.lengths
         places = np.cumsum((1, x, u, p))
         parts = [given[a:b].copy() for a, b in pairwise(places)]
@@ -148,13 +125,7 @@ def _like(template: Any, values: np.ndarray) -> Any:
 
 
 def _source(name: str, stands: _AsItStands, system: Any) -> Source:
-    """Return the source of ``name(given, y)`` for numba.
-
-    Raises
-    ------
-    CompileError, UsageError
-        If a function is not a plain one, or the name of a parameter cannot be that of a field.
-    """
+    """Return the source of ``name(given, y)`` for numba."""
     _, x, u, p, count = stands.lengths
     first, second, third = 1, 1 + x, 1 + x + u
     fixed = [k for k in stands.template if k not in stands.slots]
@@ -210,13 +181,7 @@ def _given(first: int, size: int, as_tuple: bool) -> str:
 
 
 def _jitted(function: Any) -> Any:
-    """Make a function callable from machine code; equations already are.
-
-    Raises
-    ------
-    CompileError
-        If it is not a plain function.
-    """
+    """Make a function callable from machine code; equations already are."""
     if isinstance(function, CPUDispatcher):
         return function
     if not isinstance(function, FunctionType):

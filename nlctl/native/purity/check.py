@@ -62,23 +62,7 @@ class FunctionReading:
 
 
 def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReading:
-    """Check that a function depends on its arguments alone and changes nothing.
-
-    Parameters
-    ----------
-    function : callable
-    arguments : sequence of Value
-        What is known of its arguments.
-
-    Returns
-    -------
-    FunctionReading
-
-    Raises
-    ------
-    Impure
-        With the reason, and the place in ``place``.
-    """
+    """Check that a function depends on its arguments alone and changes nothing."""
     plain = python_function(function)
     if plain is not None and inspect.isgeneratorfunction(plain):
         error = Impure("yields its values", "return them as a list")

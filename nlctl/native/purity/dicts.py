@@ -39,13 +39,7 @@ _LIBRARIES = ("numpy", "scipy", "numba")  # numba has its own versions of their 
 
 
 def params_record(path: str, names: Sequence[str]) -> type:
-    """Return the record type that stands for a parameter dict in machine code.
-
-    Raises
-    ------
-    UsageError
-        If a name cannot be that of a field.
-    """
+    """Return the record type that stands for a parameter dict in machine code."""
     try:
         return namedtuple("Params", names or [FILLER])
     except ValueError as error:

@@ -38,20 +38,7 @@ _BOUND = (types.BuiltinFunctionType, types.MethodWrapperType)
 
 
 def held_by(thing: Any, is_library: Callable[[str], bool]) -> Any:
-    """Return what an object of a library holds, as data and other objects.
-
-    Parameters
-    ----------
-    thing : object
-    is_library : callable
-        Whether the version of a module stands for what is in it.
-
-    Returns
-    -------
-    object
-        A tuple of parts; or a text that begins with `NAMED` or `OPAQUE`; or None where the object
-        is told by its text alone.
-    """
+    """Return what an object of a library holds, as data and other objects."""
     kind = type(thing)
     top = (getattr(kind, "__module__", None) or "").partition(".")[0]  # arrays of ctypes have none
     if isinstance(thing, _TOLD) or (top == "_thread" and kind.__name__ in _LOCKS):

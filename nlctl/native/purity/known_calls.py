@@ -101,13 +101,7 @@ _PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "
 def call(
     walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
-    """Return what is known of the result of calling an object.
-
-    Raises
-    ------
-    Impure
-        If it changes something, differs from call to call, or cannot be read.
-    """
+    """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
         return walk.call(walk.captured(thing, "__wrapped__", thing.__wrapped__), given, named)
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
@@ -186,13 +180,7 @@ def _is_table(cls: type) -> bool:
 def method(
     walk: Walk, base: KnownValue, name: str, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue | None:
-    """Return what is known of the result of a method of a container; None if it is another's.
-
-    Raises
-    ------
-    Impure
-        If it changes a container that the call has not made.
-    """
+    """Return what is known of the result of a method of a container; None if it is another's."""
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given)
@@ -259,12 +247,7 @@ def _walkable(function: FunctionType) -> bool:
 
 
 def check_object(value: KnownValue, what: str) -> None:
-    """Check that what a value does by itself is known: no iterator, no class of somebody.
-
-    Raises
-    ------
-    Impure
-    """
+    """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
     if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
         return

@@ -33,13 +33,7 @@ _NEUTRAL = (object, Generic, Protocol, abc.ABC)
 def instance(
     walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
-    """Return what is known of a new object of somebody's class.
-
-    Raises
-    ------
-    Impure
-        If making it is more than its ``__init__``, which is walked.
-    """
+    """Return what is known of a new object of somebody's class."""
     _check_plain(cls)
     own = Instance(cls)
     value = KnownValue(True, True, True, known=own)

@@ -35,13 +35,7 @@ _FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__bui
 
 
 def asked_outside(function: types.FunctionType) -> Iterator[str]:
-    """Yield what a function asks, with the words that ask, ``time.time``.
-
-    Parameters
-    ----------
-    function : function
-        Of Python; those nested in it count.
-    """
+    """Yield what a function asks, with the words that ask, ``time.time``."""
     every = {**function.__globals__, **_cells(function)}
     for code in _codes(function.__code__):
         for (_, word), (_, follower) in itertools.pairwise(_words(code)):

@@ -41,18 +41,7 @@ class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a so
 
 
 def definition(function: FunctionType) -> Definition:
-    """Return the syntax tree of a function.
-
-    Parameters
-    ----------
-    function : function
-        Made with ``def`` or ``lambda``.
-
-    Raises
-    ------
-    Unreadable
-        If its source is not to be found, or is not what the function was made of.
-    """
+    """Return the syntax tree of a function."""
     code = function.__code__
     file, text = _file_and_text(function)
     if not text:

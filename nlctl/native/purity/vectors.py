@@ -12,13 +12,7 @@ MESSAGE = "a function returns another number of values than its block has states
 
 
 def as_vector(value: Any, count: int) -> Any:
-    """Return a function's result, an array, tuple, list or number, as `count` values.
-
-    Raises
-    ------
-    ValueError
-        If it has another size: elements are taken by their places.
-    """
+    """Return a function's result, an array, tuple, list or number, as `count` values."""
     return _counted(value if isinstance(value, tuple) else np.asarray(value).reshape(-1), count)
 
 

@@ -30,25 +30,7 @@ def nudged_values(
     calls: Functions,
     fixed_points: Mapping[str, list[Expr]],
 ) -> list[np.ndarray]:
-    """Return the values of expressions at one point, in `ROUNDINGS` ways of rounding.
-
-    Parameters
-    ----------
-    results : iterable of Expr
-    arrays : mapping
-        As `evaluate_expressions` takes them, of shape (rows, 1).
-    searches : mapping
-        What finds the signals of algebraic loops, by name.
-    calls : mapping
-        Opaque functions of one array, by name.
-    fixed_points : mapping
-        By the names of searches: what the blocks of a loop make of the signals found.
-
-    Returns
-    -------
-    list of ndarray
-        Of shape (ROUNDINGS,) or (size, ROUNDINGS), or such that they broadcast to it.
-    """
+    """Return the values of expressions at one point, in `ROUNDINGS` ways of rounding."""
     results = list(results)
     given = {name: np.repeat(array, ROUNDINGS, axis=1) for name, array in arrays.items()}
     reader = _Reader(given, searches, calls)

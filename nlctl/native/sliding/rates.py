@@ -90,21 +90,7 @@ def sliding_rates(
     motion: Motion,
     output: Callable[[int, tuple[Expr, Expr, Expr]], Expr],
 ) -> list[SlidingRate]:
-    """Return a and b of every relay's u' = a + b v, and its output.
-
-    Parameters
-    ----------
-    graph : Graph
-    relays : sequence of SlidingInput
-    motion : Motion
-    output : callable
-        Takes the number of a relay and its u, a, b; returns its output.
-
-    Raises
-    ------
-    CompileError
-        If there is no such rate, or relays act on each other's.
-    """
+    """Return a and b of every relay's u' = a + b v, and its output."""
     rates = [_rate(graph, relay, motion) for relay in relays]
     leaves = [relay.leaf for relay in relays]
     read = [set(leaves).intersection(needed([rate.whole])) for rate in rates]

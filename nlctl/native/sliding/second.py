@@ -55,21 +55,7 @@ def second_order(
     along: Callable[[Expr], Expr | None],
     slope: LeafDerivative,
 ) -> SecondOrder | None:
-    """Return the second-order sliding of a relay, None where there is none to be read off.
-
-    Parameters
-    ----------
-    graph : Graph
-    given, rate : Expr
-        The relay's input and its derivative, which does not depend on the relay's output.
-    leaf : Expr
-        What stands for the relay's output.
-    limits : Limits
-    along : callable
-        The derivative of what is read along the diagram's motion.
-    slope : callable
-        The derivative of an expression by the leaf.
-    """
+    """Return the second-order sliding of a relay, None where there is none to be read off."""
     try:
         (force,) = tangents(graph, [rate], along)
         (jerk,) = tangents(graph, [force], along) if force is not None else (None,)

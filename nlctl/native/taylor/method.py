@@ -36,21 +36,7 @@ def order_for(rtol: float) -> int:
 def with_taylor(
     task: Any, reading: Reading, p: np.ndarray, settings: Settings
 ) -> tuple[Any, tuple[int, int]]:
-    """Return the task with Taylor's method, and the shape of the coefficients.
-
-    Parameters
-    ----------
-    task : Task
-    reading : Reading
-    p : ndarray
-        Parameter vectors, shape (parameters, members).
-    settings : Settings
-
-    Raises
-    ------
-    ParameterError
-        If there is what it cannot do.
-    """
+    """Return the task with Taylor's method, and the shape of the coefficients."""
     _check(reading)
     order, made = order_for(settings.rtol), series(reading, p, p.shape[1])
     found = [entry(function) for function in made.functions]

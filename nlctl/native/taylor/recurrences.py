@@ -99,22 +99,6 @@ def recurrences(
 
     The first rows of an order are the states, then the switching functions, then the right-hand
     side.
-
-    Parameters
-    ----------
-    graph : Graph
-        Where the expressions are kept, and new ones, too.
-    stores : mapping
-        What is written to ``"dx"`` and ``"g"``.
-    sizes : mapping
-        Rows of ``"x"`` and ``"g"``.
-    packed : bool
-        Whether factors that are numbers lie one beside the other, for a single member.
-
-    Raises
-    ------
-    NoSeriesError
-        If an expression has no such coefficients.
     """
     return _Reader(graph=graph, n=sizes["x"], g=sizes["g"]).read(stores, packed)
 

@@ -64,13 +64,7 @@ class Series:
 
 
 def series(reading: Reading, p: np.ndarray, width: int) -> Series:
-    """Return the coefficients of `width` members' solutions, made when they are first needed.
-
-    Raises
-    ------
-    ParameterError
-        If the diagram has something without Taylor coefficients.
-    """
+    """Return the coefficients of `width` members' solutions, made when they are first needed."""
     with _ONCE:
         known = reading.cache.of(Series)
         for made in known:

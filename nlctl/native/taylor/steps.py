@@ -24,16 +24,7 @@ _Write = Callable[[str, Sequence[Value]], Sequence[Value]]  # of a place and of 
 
 
 def steps_text(n: int, switching: int, compared: Sequence[int], layout: SeriesLayout) -> str:
-    """Return the IR of the functions.
-
-    Parameters
-    ----------
-    n, switching : int
-        Numbers of states and of switching functions.
-    compared : sequence of int
-        Rows of the differences of what is compared.
-    layout : SeriesLayout
-    """
+    """Return the IR of the functions."""
     functions = {
         "growth": ("x c k largest", lambda f: f.growth(n)),
         "step": ("h c k x slope", lambda f: f.step(n)),

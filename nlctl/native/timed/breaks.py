@@ -23,20 +23,7 @@ def break_points(
 ) -> np.ndarray:
     """Return when conditions of t alone switch within a run.
 
-    Parameters
-    ----------
-    conditions : sequence of Expr
-        Parts before what is made of them.
-    p : ndarray of shape (parameters,)
-    span : tuple of float
-        First and last time (s).
-    fastest : float
-        Largest angular frequency of their sines (rad/s).
-
-    Returns
-    -------
-    ndarray
-        The first times, as numbers, at which they are what they become; increasing.
+    Shapes: `p` (parameters,).
     """
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:

@@ -81,16 +81,7 @@ class Lines:
 def as_lines(
     results: list[Expr], constants: Callable[[Expr], np.ndarray], span: tuple[float, float]
 ) -> dict[Expr, Lines]:
-    """Return expressions of t alone as pieces of lines, those that are.
-
-    Parameters
-    ----------
-    results : list of Expr
-    constants : callable
-        The value of an expression that does not vary.
-    span : tuple of float
-        First and last time (s).
-    """
+    """Return expressions of t alone as pieces of lines, those that are."""
     found: dict[Expr, Lines] = {}
     for node in needed(results):
         try:

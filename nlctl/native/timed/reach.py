@@ -22,18 +22,7 @@ def reach(terms: Sequence[Expr], p: np.ndarray, span: tuple[float, float]) -> np
     A step ends where a function has moved by half of its range since its beginning, up and down
     added.  A pulse that is seen at the ends of two cells is seen by the step that comes to it.
 
-    Parameters
-    ----------
-    terms : sequence of Expr
-        Functions of t alone.
-    p : ndarray of shape (parameters,)
-    span : tuple of float
-        First and last time (s).
-
-    Returns
-    -------
-    ndarray of shape (cells,)
-        Empty if no function moves.
+    Shapes: `p` (parameters,); returns (cells,).
     """
     t = np.linspace(*span, CELLS + 1)
     found = evaluate_expressions(terms, {"t": t[None, :], "p": p[:, None]})

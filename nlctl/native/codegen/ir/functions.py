@@ -53,16 +53,7 @@ _SMALLEST, _STEP = -707.0, 64  # below e^-707 powers of two are made in two step
 
 
 def applied(b: Body, name: str, *args: Value) -> Value:
-    """Return a function of the table of functions, written out or called.
-
-    Parameters
-    ----------
-    b : Body
-        Where it is written.
-    name : str
-        NumPy's name.
-    *args : Value
-    """
+    """Return a function of the table of functions, written out or called."""
     code = FUNCTIONS[name].code
     if name in ("sin", "cos"):
         return sin_cos(b, args[0], {name})[name]

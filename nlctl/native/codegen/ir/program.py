@@ -28,20 +28,7 @@ def program_text(
     exact: Collection[Expr],
     solvers: Iterable[Solver] = (),
 ) -> str:
-    """Return the IR of some functions.
-
-    Parameters
-    ----------
-    functions : mapping
-        By name.
-    lanes : int
-        Number of members.  Functions such as exp become part of those that call them only with
-        one: with several a call costs nothing, and there would be much more to compile.
-    exact : collection of Expr
-        Operations that are rounded one by one; of others a product and a sum may be one.
-    solvers : iterable of Solver
-        Searches that they call.
-    """
+    """Return the IR of some functions."""
     module = Module(inlined=lanes == 1)
     texts = [_function(module, name, f, lanes, exact) for name, f in functions.items()]
     for solver in solvers:

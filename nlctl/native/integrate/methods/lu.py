@@ -67,15 +67,7 @@ WHOLE = Elimination(
 def elimination(structure: np.ndarray) -> Elimination:
     """Order pivots after Markowitz: the next is the one that can create the fewest entries.
 
-    Parameters
-    ----------
-    structure : ndarray of bool, shape (n, n)
-        Where a matrix may have entries; the diagonal is taken to be full.
-
-    Returns
-    -------
-    Elimination
-        `WHOLE` if the factors have entries in more than `SPARSE` of all places.
+    Shapes: `structure` (n, n).
     """
     n = len(structure)
     here = structure | np.eye(n, dtype=bool)
