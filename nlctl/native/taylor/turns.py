@@ -48,8 +48,7 @@ def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
     """Return a run that goes on by the other method, if it asks for that."""
-    lane, expands = run.lanes[0], run.task.taylor.highest > 0 and run.task.taylor.span > 0
-    fails = expands and lane["status"] in (STEP_TOO_SMALL, DIVERGED)
+    lane, fails = run.lanes[0], _fails(run)
     if lane["status"] != METHOD and not fails:
         return run
     if fails:  # the explicit pair has the last word
@@ -73,6 +72,17 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
     arrays = new_terms(*terms, run.work.u.shape[0], 1)
     work = with_fields(with_stages(run.work, SLOPES), taylor=arrays)
     return replace(run, task=task, work=work, series=task)
+
+
+def _fails(run: Run) -> bool:
+    """Whether Taylor's method does not get on, from a place where all is finite.
+
+    Where a guard is NaN it is, at that place: no other method may go on.
+    """
+    if not (run.task.taylor.highest and run.task.taylor.span):
+        return False
+    here = np.append(run.work.x, run.work.events.g_start)
+    return run.lanes["status"][0] in (STEP_TOO_SMALL, DIVERGED) and bool(np.isfinite(here).all())
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:

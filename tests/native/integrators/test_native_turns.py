@@ -129,3 +129,26 @@ def test_what_has_no_coefficients_keeps_the_pair():
     compiled = nlctl.compile(nlctl.paper.example_2())
     auto, pair = (nlctl.input_output_response(compiled, times, method=m) for m in ("auto", "tsit5"))
     np.testing.assert_array_equal(auto.states, pair.states)
+
+
+@nlctl.record
+class Unguarded:
+    """A guard that is NaN from t = 3 on, while another state oscillates."""
+
+    inputs, outputs, states, feedthrough = (), ("x",), ("x", "v"), False
+    update = staticmethod(lambda t, x, u, p: (x[1], -400.0 * x[0]))
+    output = staticmethod(lambda t, x, u, p: (x[0],))
+    guard = staticmethod(lambda t, x, u, p: (np.sqrt(3.0 - t),))
+    reset = staticmethod(lambda t, x, u, p: (x[0], x[1]))
+
+
+def test_a_guard_that_is_nan_ends_the_run_whatever_the_method():
+    """NaN travels: the explicit pair does not go on where Taylor's method has met it."""
+    loop = nlctl.interconnect({"block": Unguarded()}, outputs=["x"])
+    for method in ("auto", "tsit5"):
+        found = nlctl.input_output_response(
+            nlctl.compile(loop), np.linspace(0, 6, 61), initial_state=[1, 0], method=method,
+            rtol=1e-10, atol=1e-12, ignore_errors=True,
+        )  # fmt: skip
+        assert found.statistics.status.name == "DIVERGED"
+        assert found.statistics.time == pytest.approx(3.0, abs=0.05)
