@@ -25,7 +25,7 @@ ENCLOSED = r"(?:\{{\{{|\\left\(|\\left\||\\l[a-z]+ |, |\(1 \+ )\{{{}\}}"  # wher
 
 
 def symbol(name: str) -> str:
-    """Return an identifier as a symbol: ``W_hat`` is a W with a hat, ``b_r`` a b with index r.
+    r"""Return an identifier as a symbol: ``W_hat`` is a W with a hat, ``b_r`` a b with index r.
 
     Elements of vectors are counted from 1, as on paper: ``W_hat[0]`` is the first one.
 

@@ -114,13 +114,11 @@ def _conditions(
     if not ct.isctime(system):
         return Conditions()
     declared, guards, committed, watched = events
-    own = {i: [guard] for i, (_, guard) in guards.items()}
-    for i, (_, array) in committed.items():
-        own[i] = [*own.get(i, []), array]
-    arriving = [e for e, _ in y[system.noutputs or 0 :].pieces()]
-    signs = [array for _, array in declared]
+    falls = {i: guard for i, (_, guard) in guards.items()}
+    signs, kept = [array for _, array in declared], [array for _, array in committed.values()]
+    others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
     given = [each.function for each in watched if not watches_nan(each.what)]
-    return found_conditions(reader, rates, signs, own, [*arriving, *given])
+    return found_conditions(reader, rates, signs, falls, others, given)
 
 
 def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:

@@ -87,20 +87,25 @@ def found_conditions(
     reader: Reader,
     rates: Sequence[Tracer],
     declared: Iterable[Tracer],
-    events: Mapping[int, Sequence[Tracer]],
+    guards: Mapping[int, Tracer],
     others: Iterable[Expr],
+    watched: Iterable[Expr] = (),
 ) -> Conditions:
-    """Return what switches in a diagram whose blocks have been read."""
-    declared, others = tuple(declared), tuple(others)
-    arrays = [*rates, *declared, *(array for own in events.values() for array in own)]
-    roots = [*others, *_pieces(arrays)]
-    nodes = needed([*roots, *(e for found in reader.fixed_points.values() for e in found)])
+    """Return what switches in a diagram whose blocks have been read.
+
+    Where it moves rates, declared switching functions, guards, by the places of their blocks, what
+    arrives at delays and memories become (`others`), or an event function of the run (`watched`).
+    """
+    declared, watched = tuple(declared), tuple(watched)
+    solved = [e for found in reader.fixed_points.values() for e in found]
+    roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
+    nodes = needed([*roots, *watched])
     timed, wanted = _of_time(nodes), set(nodes)
     known = {_key(e) for e in _pieces(declared)}
     found: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
     rows = beyond = 0
-    for condition, node in _undeclared(reader, rates, events, others):
+    for condition, node in _undeclared(reader, rates, guards, watched):
         if condition not in wanted:
             continue
         if condition in timed:
@@ -120,7 +125,7 @@ def found_conditions(
         path = "" if node is None else node.path
         found[key] = Located(function=function, block=path, what=condition.op, bends=bends)
         rows += size
-    waves, pulses = _moving(reader.graph, _terms(nodes, timed), timed)
+    waves, pulses = _moving(reader.graph, _terms(needed(roots), timed), timed)
     return Conditions(
         located=tuple(sorted(found.values(), key=lambda each: not each.bends)),
         of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
@@ -135,8 +140,8 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 def _undeclared(
     reader: Reader,
     rates: Sequence[Tracer],
-    events: Mapping[int, Sequence[Tracer]],
-    others: Sequence[Expr],
+    guards: Mapping[int, Tracer],
+    watched: Sequence[Expr],
 ) -> Iterable[tuple[Expr, Node | None]]:
     """Yield the conditions of blocks that do not declare theirs, each with its block.
 
@@ -146,10 +151,10 @@ def _undeclared(
         if node.sampled or _declares(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        made = [reader.signals[i], rates[i], *events.get(i, ())]
+        made = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
         for each in conditions(_pieces(made), given):
             yield each, node
-    for each in conditions(list(others), set(_pieces(reader.signals.values()))):
+    for each in conditions(list(watched), set(_pieces(reader.signals.values()))):
         yield each, None
 
 
