@@ -10,6 +10,7 @@ from .along import derivatives
 from .compiled import Compiled
 from .integrate.discrete import compile_discrete
 from .machine.evaluations import ENSEMBLE_WIDTH, machine
+from .taylor.turns import series_ahead
 
 
 @as_annotated
@@ -40,6 +41,7 @@ def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
         machine(compiled, np.repeat(p[:, :1], width, axis=1), width)
         if width == 1:
             derivatives(compiled, p[:, 0])
+            series_ahead(compiled, p[:, :1])
     else:
         machine(compiled, p[:, :1], 1)
         compile_discrete()

@@ -9,6 +9,7 @@ stiff.  Nothing rests on clocks: a run has the same numbers on every machine.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -23,27 +24,38 @@ from ..reading import Reading
 from ..run import Run
 from ..settings import Settings
 from .method import order_for, with_taylor
+from .routine import series
 
 _ORDER = 10  # from which on steps are worth more than what they cost, in most loops
 _STEPS = 250  # of the explicit pair, before Taylor's method is tried
 _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many each time
 
 
-def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
-    """Return a run that tries Taylor's method after so many steps.
+def may_turn(reading: Reading) -> bool:
+    """Whether runs of a diagram may go on by Taylor's method.
 
-    More of them for large diagrams, whose coefficients take longer to compile.  None where memories
-    and delays have no coefficients, and where clocks end the steps: such a run can be resumed at a
-    sample, and knows nothing of the steps before.
+    Memories and delays have no coefficients, and where clocks end the steps a run can be resumed
+    at a sample, and knows nothing of the steps before.
     """
+    program, lines = reading.program, reading.schedule.lines
+    return bool(reading.system.nstates) and not (program.memory or program.sampled or lines)
+
+
+def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
+    """Return a run that tries Taylor's method after so many steps."""
     if settings.method != "auto" or settings.step or order_for(settings.rtol) < _ORDER:
         return run
-    program, lines = reading.program, reading.schedule.lines
-    if program.memory or program.sampled or lines or not reading.system.nstates:
+    if not may_turn(reading):
         return run
-    steps = max(_STEPS, len(reading.lowered.functions["rhs"].plan.nodes))
-    run.lanes["span"] = run.lanes["wait"] = steps
+    run.lanes["span"] = run.lanes["wait"] = _STEPS
     return replace(run, task=with_fields(run.task, taylor=with_fields(OTHER_METHOD, span=_SPAN)))
+
+
+def series_ahead(reading: Reading, p: np.ndarray) -> None:
+    """Make the code of Taylor's method now, where runs with parameters `p` may go on by it."""
+    if may_turn(reading):
+        with contextlib.suppress(ParameterError):
+            series(reading, p, 1)
 
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
