@@ -101,13 +101,14 @@ def with_table(record: Any, **values: Any) -> Any:
 
 def _number(record: Any, name: str, value: Any) -> int:
     """Return what a table has for a number: a float's bits, an integer; for a record its table."""
+    if hasattr(value, "_fields"):
+        _check_format(record, name, value)
+        return value.table.ctypes.data
     if type(value) is float and type_of(record).fields[name] is types.float64:
         return _BITS.unpack(_FLOAT.pack(value))[0]
     if type(value) is int and type_of(record).fields[name] is types.int64:
         return value
     _check_format(record, name, value)
-    if hasattr(value, "_fields"):
-        return value.table.ctypes.data
     return int(np.asarray(value).view(np.int64))
 
 
