@@ -51,5 +51,5 @@ below.set(xlabel="value less the truth, with two standard errors")
 assert np.all(abs(apart) < 4 * found.errors)
 assert abs(found.noise - 0.02) < 0.004
 both = nlctl.fit(loop, t, {"y": y}, truth | {"plant.k": 1.0})
-print("not told:", both.unidentifiable)
+print("not identifiable:", both.unidentifiable)
 assert {"plant.k", "gap.m_r", "gap.m_l"} <= set(both.unidentifiable)

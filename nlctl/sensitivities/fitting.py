@@ -133,7 +133,7 @@ class Fit:
         lines = [f"Fit of {counted(len(self.names), 'parameter')}, noise {self.noise:.3g}"]
         lines += [f"  {name} = {value:.6g} +- {error:.2g}" for name, value, error in rows]
         if self.unidentifiable:
-            lines.append(f"  not told by these data: {', '.join(self.unidentifiable)}")
+            lines.append(f"  not identifiable from these data: {', '.join(self.unidentifiable)}")
         return "\n".join(lines)
 
 
@@ -260,7 +260,7 @@ def _found(search: _Search, found: Any) -> Fit:
 def _covariance(
     jacobian: np.ndarray, scale: np.ndarray, noise: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the covariance of parameters, and which are not told by the data."""
+    """Return the covariance of parameters, and which are not identifiable from the data."""
     _, values, directions = np.linalg.svd(jacobian * scale, full_matrices=False)
     blind = values <= _UNKNOWN * max(values[0], np.finfo(float).tiny)
     unknown = np.any(np.abs(directions[blind]) > _SHARE, axis=0, keepdims=True)[0]

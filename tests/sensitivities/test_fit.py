@@ -104,7 +104,7 @@ def test_bouncing_ball():
 
 
 def test_what_data_do_not_tell():
-    """Of a b only the product is told; of c nothing; of d all."""
+    """Of a b only the product is identifiable; of c nothing; of d all."""
     plant = block(
         lambda t, x, u, p: [p["a"] * p["b"] + 0 * p["c"] - p["d"] * x[0]],
         {"a": 1.0, "b": 2.0, "c": 1.0, "d": 1.0},
@@ -118,7 +118,7 @@ def test_what_data_do_not_tell():
     assert np.isinf(found.errors[:3]).all()
     assert abs(found["plant.d"] - 1.2) < 1e-2
     assert found.errors[3] < 1e-2
-    assert "not told by these data: plant.a, plant.b, plant.c" in repr(found)
+    assert "not identifiable from these data: plant.a, plant.b, plant.c" in repr(found)
 
 
 @pytest.mark.parametrize(
