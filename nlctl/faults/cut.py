@@ -67,7 +67,7 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     While no fault is present the right-hand side is the same, to the bit in python-control; in
     machine code to the rounding of a product and a sum that are contracted across the cut.  A
     fault with a memory (``stuck`` without a value, or with a condition) adds memory states, which
-    may change the steps that are chosen, within the tolerance.
+    may change the steps and the method that are chosen, within the tolerance.
 
     Parameters
     ----------
