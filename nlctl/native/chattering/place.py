@@ -56,27 +56,30 @@ def _accumulation(compiled: Compiled, crowd: Crowd) -> str:
 
 def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:
     """Whether what jumps is the mode of an ideal relay."""
-    nodes, program = compiled.schedule.nodes, compiled.program
-    sides = [_declared(compiled, p, side)[1] for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])
-    if not changes.size or not changes.max() > 1e-3:
-        return False
-    m = program.memory[int(changes.argmax())]
-    return any(m in memory(nodes[i]) for i in relay_places(nodes))
+    nodes, switched = compiled.schedule.nodes, _switched(compiled, p, jump)
+    return switched is not None and any(
+        switched[0] in memory(nodes[i]) for i in relay_places(nodes)
+    )
 
 
 def _committed(compiled: Compiled, p: np.ndarray, jump: Jump) -> str:
     """Return which memory switches, if one does and that is what jumps."""
-    program, nodes = compiled.program, compiled.schedule.nodes
-    sides = [_declared(compiled, p, side)[1] for side in jump.sides()]
-    changes = np.abs(sides[1] - sides[0])
-    if not changes.size or not changes.max() > 1e-3:
+    switched = _switched(compiled, p, jump)
+    if switched is None:
         return ""
+    m, before, after = switched
+    node = next(node for node in compiled.schedule.nodes if m in memory(node))
+    return _between(node.system.state_labels[m - node.state_offset], node.path, before, after)
+
+
+def _switched(compiled: Compiled, p: np.ndarray, jump: Jump) -> tuple[int, float, float] | None:
+    """Return which memory state changes most at a jump, from what to what; None if none does."""
+    before, after = (_declared(compiled, p, side)[1] for side in jump.sides())
+    changes = np.abs(after - before)
+    if not changes.size or not changes.max() > 1e-3:
+        return None
     place = int(changes.argmax())
-    m = program.memory[place]
-    node = next(node for node in nodes if m in memory(node))
-    label = node.system.state_labels[m - node.state_offset]
-    return _between(label, node.path, sides[0][place], sides[1][place])
+    return compiled.program.memory[place], float(before[place]), float(after[place])
 
 
 def _declared(compiled: Compiled, p: np.ndarray, side: Any) -> tuple[np.ndarray, np.ndarray]:

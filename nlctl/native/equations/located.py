@@ -99,7 +99,8 @@ def found_conditions(
     declared, watched = tuple(declared), tuple(watched)
     solved = [e for found in reader.fixed_points.values() for e in found]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
-    nodes = needed([*roots, *watched])
+    moving = needed(roots)
+    nodes = needed([*roots, *watched]) if watched else moving
     timed, wanted = _of_time(nodes), set(nodes)
     known = {_key(e) for e in _pieces(declared)}
     found: dict[object, Located] = {}
@@ -125,7 +126,7 @@ def found_conditions(
         path = "" if node is None else node.path
         found[key] = Located(function=function, block=path, what=condition.op, bends=bends)
         rows += size
-    waves, pulses = _moving(reader.graph, _terms(needed(roots), timed), timed)
+    waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     return Conditions(
         located=tuple(sorted(found.values(), key=lambda each: not each.bends)),
         of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
