@@ -53,6 +53,7 @@ _FIELDS = [
     ("right", "f8"),  # and the first
     ("cross", "f8"),  # width of the step that is to lead across a condition next, 0 if none is
     ("across", "i8"),  # whether the step being tried is such a one
+    ("misses", "i8"),  # such steps in a row that have not led across
     ("left_zero", "i8"),  # whether the step before led away from a condition that was exactly 0
     ("right_high", "i8"),  # whether the error of the step `high` is small
     ("low_before", "f8"),  # the step without it that was tried before `low`

@@ -22,6 +22,7 @@ NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
 _CLOSEST = 8e-16  # of the time: no condition can be told closer than that
 _ROUNDING = 1e-14  # of what is integrated, in the error of a step
+_WIDER = 4.0  # each time that a step across has not led across
 _TRIES = 60
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
@@ -107,7 +108,15 @@ def _is_behind(task, lane, w, j):
             _leaves(task, lane, w, i, j) and w.events.g[i, j] != 0
         ):
             return True
+        if task.taylor.highest and i < task.rows.guarded and _meets(w, i, j):
+            return True
     return False
+
+
+@numba.njit(**INNER)
+def _meets(w, i, j):
+    """Whether a step ends where a condition is exactly 0, and the right-hand side is another."""
+    return w.events.g[i, j] == 0.0 and w.events.g_start[i, j] != 0.0 and not w.error[j] <= 1.0
 
 
 @numba.njit(**INNER)
@@ -152,7 +161,9 @@ def _across(task, lane, w, j):
         return REFUSED
     for i in range(task.rows.declared, task.rows.switching):
         if _crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
+            lane.misses = 0
             return EVENT
+    lane.misses += 1
     return CLEAR
 
 
@@ -225,8 +236,7 @@ def _bracket(task, lane, w, bad, j):
 @numba.njit(**INNER)
 def _next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
-    t_end = max(abs(lane.t), abs(lane.t + lane.high))
-    close = max(BEFORE_CONDITION * task.rtol * lane.whole, _CLOSEST * t_end)
+    close = _close(task, lane)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
         lane.across, lane.traces, lane.tries = 1, 0, 0
@@ -249,6 +259,18 @@ def _next_try(task, lane, w, bad, j):
     lane.step = min(max(aim, lane.low + rest), lane.high - rest)
     lane.ends = 0
     return AGAIN
+
+
+@numba.njit(**INNER)
+def _close(task, lane):
+    """Return how close before a condition a step is to end.
+
+    No closer than rounding allows, which is more than that of the time where a state hardly moves:
+    what a short step adds to it may be lost, and the step across leads nowhere.
+    """
+    t_end = max(abs(lane.t), abs(lane.t + lane.high))
+    wider = _WIDER ** min(max(lane.misses - 1, 0), _TRIES)
+    return wider * max(BEFORE_CONDITION * task.rtol * lane.whole, _CLOSEST * t_end)
 
 
 @numba.njit(**INNER)

@@ -217,6 +217,8 @@ def step_accepted(lane, event):
     lane.last = lane.step
     lane.tries = lane.seeks = lane.returns = 0
     lane.quiet = max(0, lane.quiet - 1)
+    if not lane.across and lane.cross == 0.0:
+        lane.misses = 0
     if event and lane.across:
         lane.events += 1
     elif event:

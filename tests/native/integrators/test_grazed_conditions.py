@@ -1,0 +1,49 @@
+"""Conditions that a state hardly moves over: what short steps add to it is lost in rounding."""
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+
+METHODS = ["tsit5", "rodas5p", "taylor", "auto"]
+
+
+def oscillator(t, x, u, params):
+    """sin t, and how long it is above 1 - eps."""
+    return [x[1], -x[0], 1.0 if x[0] > 1.0 - params["eps"] else 0.0]
+
+
+def drift(t, x, u, params):
+    """1 + d - s t, and how long it is above 1."""
+    return [-params["s"], 1.0 if x[0] > 1.0 else 0.0]
+
+
+def compiled(function, states, **params):
+    return nlctl.compile(
+        ct.nlsys(function, None, inputs=0, outputs=states, states=states, params=params, name="g")
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("eps", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-8, 1e-9, 1e-10])
+def test_a_peak_just_above_a_level(method, eps, rtol):
+    """Twice in ten seconds; an error of x moves both ends by its part of the slope there."""
+    if 30.0 * rtol > eps:
+        pytest.skip("the peak is no higher than the error")
+    z = nlctl.input_output_response(
+        compiled(oscillator, 3, eps=eps), [0, 10], initial_state=[0, 1, 0], method=method,
+        rtol=rtol, atol=1e-2 * rtol,
+    ).states[2, -1]  # fmt: skip
+    assert z == pytest.approx(4.0 * np.arccos(1.0 - eps), abs=20.0 * rtol / np.sqrt(2.0 * eps))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("s", [1.0, 1e-3, 1e-6, 1e-9])
+def test_a_slow_drift_over_a_level(method, s):
+    z = nlctl.input_output_response(
+        compiled(drift, 2, s=s), [0, 2], initial_state=[1.0 + s, 0], method=method,
+        rtol=1e-9, atol=1e-11,
+    ).states[1, -1]  # fmt: skip
+    assert z == pytest.approx(1.0, abs=1e-8 + 4e-15 / s)
