@@ -27,8 +27,8 @@ from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
 from .loop_record import difference_text, fact_differences, loop_facts
-from .lyapunov.certificate.certify import AnyCertificate
 from .lyapunov.ledger import Ledger
+from .lyapunov.proofs.result import Certificate
 from .paper.page.proof import ledger_tables
 from .paper.page.proof_text import ledger_text
 from .report.document import (
@@ -68,7 +68,7 @@ def loop_report(
     signals: Sequence[str] = (),
     params: Mapping[str, Any] | None = None,
     ledger: Ledger | None = None,
-    certificate: AnyCertificate | None = None,
+    certificate: Certificate | None = None,
     study: Result | None = None,
     sections: Sequence[Section] = (),
     claims: Sequence[Claim] = (),
@@ -212,7 +212,7 @@ def _proof(found: Ledger) -> Section:
     return Section(key="ledger", title="The proof line by line", items=items, folded=True)
 
 
-def _certified(certificate: AnyCertificate) -> Section:
+def _certified(certificate: Certificate) -> Section:
     """Return a certificate: what is proved, then every constant with where it comes from."""
     table = Table(
         caption="The constants of the certificate, and the bounds that follow from them.",

@@ -82,6 +82,18 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["staged", "stage"],
         ["derivatives", "trace"],
     ],
+    "nlctl.analysis.lyapunov": [
+        ["bounds"],
+        ["loop"],
+        ["proofs", "nussbaum"],
+        ["model_reference", "attraction"],
+        ["certificate"],
+        ["constants"],
+        ["premises"],
+        ["assumptions", "inequalities"],
+        ["lines", "examination"],
+        ["closure", "conclusions", "conservatism", "ledger", "tighten"],
+    ],
     "nlctl.analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
 }
 FILES = sorted(p for package in ("nlctl", "analysis") for p in (ROOT / package).rglob("*.py"))
