@@ -33,14 +33,14 @@ from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
 from .code.record import study_digest
 from .code.rule import Grant
-from .file.own_kinds import STAND_IN, own_kinds, stand_ins
-from .file.resolve import uncertain
 from .file.schema import Study, keyed
 from .file.toml import read_toml, study_text
-from .file.written import from_toml
 from .finding import Finding
 from .kind import Kind, kind_of
 from .origin import plain_study
+from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
+from .reading.written import from_toml
+from .resolve import uncertain
 from .result import Result
 from .sealed import (
     ANEW,

@@ -22,9 +22,9 @@ from ..loop_record import (
 )
 from ..robustness import Prepared, diagrams
 from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
-from .file.parse import StudyFile
 from .file.schema import Study, keyed
 from .kind import Setup, kind_of
+from .reading.parse import StudyFile
 
 __all__ = [
     "compared_differences",

@@ -12,9 +12,9 @@ from nlctl.annotations import as_annotated
 from ..robustness import Prepared, evaluate, independent, prepare
 from ..robustness.runs.experiment import columns_of
 from .build import main_design
-from .file.parse import StudyFile
 from .file.schema import keyed
 from .kind import Setup, kind_of
+from .reading.parse import StudyFile
 
 __all__ = ["Plan", "plan"]
 

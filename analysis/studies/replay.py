@@ -19,10 +19,10 @@ from ..figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from ..robustness import Experiment, Prepared, evaluate, prepare
 from ..robustness.runs.experiment import by_diagram, simulate_rows
 from ..robustness.stl.formula import Band, parts_of
-from .file.parse import StudyFile
 from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
 from .kind import Setup, kind_of
+from .reading.parse import StudyFile
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 

@@ -23,10 +23,8 @@ from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
 from .code.record import study_digest
 from .code.rule import remember_code
-from .file.parse import StudyFile, read_study
 from .file.schema import Study, keyed
 from .file.toml import read_toml
-from .file.written import to_toml
 from .finding import Finding
 from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
 from .kind import Ground, answer, kind_of, unanswered
@@ -37,6 +35,8 @@ from .origin import (
     unseen_notes,
     version_differences,
 )
+from .reading.parse import StudyFile, read_study
+from .reading.written import to_toml
 from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
 from .whole.contents import seal, unseal

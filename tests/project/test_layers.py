@@ -36,8 +36,9 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.analysis.lyapunov", "nlctl.analysis.robustness"],
     ["nlctl.analysis.figures", "nlctl.analysis.report"],
     ["nlctl.analysis.studies"],
-    ["nlctl.analysis.paper"],
+    ["nlctl.analysis.pages"],
     ["nlctl.analysis.loop_report"],
+    ["nlctl.analysis.paper"],
     ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
@@ -93,6 +94,20 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["assumptions", "inequalities"],
         ["lines", "examination"],
         ["closure", "conclusions", "conservatism", "ledger", "tighten"],
+    ],
+    "nlctl.analysis.studies": [
+        ["sealed", "file"],
+        ["code", "finding"],
+        ["result"],
+        ["kind", "page"],
+        ["resolve"],
+        ["build"],
+        ["kinds"],
+        ["reading"],
+        ["origin", "whole"],
+        ["folder"],
+        ["run", "plan", "differences", "wholeness"],
+        ["replay"],
     ],
     "nlctl.analysis.robustness": [["stl", "uncertainty"], ["statistics"], ["runs"], ["search"]],
 }

@@ -17,12 +17,12 @@ from nlctl.analysis.lyapunov.loop.roles import read_parts
 from nlctl.analysis.lyapunov.loop.signals import equality, inequality
 from nlctl.analysis.lyapunov.nussbaum.long_run import LongRun, long_run
 from nlctl.analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
+from nlctl.analysis.pages.notation import formulas
 from nlctl.analysis.paper import BOUND
 from nlctl.analysis.paper.burst import through_the_burst
 from nlctl.analysis.paper.evidence import far_runs_in_background
 from nlctl.analysis.paper.figures import after_burst
 from nlctl.analysis.paper.page import proof_text as text
-from nlctl.analysis.paper.page.notation import formulas
 from nlctl.analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.paper.reference_run import (

@@ -22,6 +22,10 @@ from nlctl.analysis import figures as figures
 from nlctl.analysis.cli.study_report import report_study
 from nlctl.analysis.figures.labels import plain
 from nlctl.analysis.figures.runs import upper_envelope
+from nlctl.analysis.pages.study.claims import claims, refusal, verdict
+from nlctl.analysis.pages.study.histories import histories
+from nlctl.analysis.pages.study.report import study_part, study_report, study_sections
+from nlctl.analysis.pages.study.rows import margin_items, row_items
 from nlctl.analysis.report import render_html, render_json
 from nlctl.analysis.report.document import Figure, Paragraph, Section, Table
 from nlctl.analysis.report.outline import claim_status, place_anchors
@@ -31,11 +35,7 @@ from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
 from nlctl.analysis.studies.kind import kind_of, unanswered
 from nlctl.analysis.studies.kinds import KINDS
-from nlctl.analysis.studies.page.claims import claims, refusal, verdict
 from nlctl.analysis.studies.page.deviations import deviations_table
-from nlctl.analysis.studies.page.histories import histories
-from nlctl.analysis.studies.page.report import study_part, study_report, study_sections
-from nlctl.analysis.studies.page.rows import margin_items, row_items
 from nlctl.analysis.studies.page.running import running
 from nlctl.analysis.studies.page.text import margin_text, violate, without_assumptions
 from nlctl.errors import UsageError

@@ -8,10 +8,10 @@ import tomli_w
 
 from nlctl.annotations import as_annotated
 
+from ..file.schema import Study
+from ..file.toml import read_toml
 from ..kind import Kind
 from .own_kinds import model_of
-from .schema import Study
-from .toml import read_toml
 
 __all__ = ["from_toml", "to_toml"]
 

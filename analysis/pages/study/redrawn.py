@@ -7,10 +7,10 @@ from collections.abc import Callable
 from nlctl.errors import UsageError
 
 from ...robustness import Prepared
-from ..kind import kind_of
-from ..result import Result
-from ..run import reopened
-from ..sealed import RunFolderError, as_written
+from ...studies.kind import kind_of
+from ...studies.result import Result
+from ...studies.run import reopened
+from ...studies.sealed import RunFolderError, as_written
 from .histories import Histories, histories
 
 __all__ = ["loop_again", "rows_again"]

@@ -18,11 +18,19 @@ from nlctl.errors import ParameterError, UsageError
 from ...robustness import Experiment
 from ..code.record import study_digest
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
-from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
+from ..file.errors import (
+    KeyPath,
+    Problem,
+    StudyError,
+    line_numbers,
+    located,
+    place_text,
+    schema_problems,
+)
+from ..file.schema import Study
+from ..file.toml import check_depth, read_toml, study_text
+from ..resolve import checked_definition
 from .own_kinds import model_of, own_kinds
-from .resolve import checked_definition
-from .schema import Study
-from .toml import check_depth, read_toml, study_text
 from .validate import checked_experiment
 
 __all__ = ["StudyFile", "read_study"]

@@ -8,13 +8,13 @@ from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid
-from ..kind import kind_of
-from .text import without_assumptions
+from ...studies.kind import kind_of
+from ...studies.page.text import without_assumptions
 
 if TYPE_CHECKING:
-    from ..file.asked import Asked
-    from ..finding import Finding
-    from ..result import Result
+    from ...studies.file.asked import Asked
+    from ...studies.finding import Finding
+    from ...studies.result import Result
 
 __all__ = ["claims", "refusal", "verdict"]
 

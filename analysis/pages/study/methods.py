@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 from nlctl.wording import counted
 
-from ..kind import kind_of
+from ...studies.kind import kind_of
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ...studies.result import Result
     from .loop import Published
 
 __all__ = ["limits", "methods"]

@@ -11,23 +11,24 @@ from typing import TYPE_CHECKING, Any
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ..file.asked import Varied
-from ..file.own_kinds import STAND_IN
-from ..kind import kind_of
-from ..kinds import KINDS
-from ..result import LISTED
-from ..sealed import as_written
+from ...studies.file.asked import Varied
+from ...studies.kind import kind_of
+from ...studies.kinds import KINDS
+from ...studies.page.running import running
+from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
+from ...studies.reading.own_kinds import STAND_IN
+from ...studies.result import LISTED
+from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text
 from .claims import claims, verdict
 from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
-from .running import running
 
 if TYPE_CHECKING:
-    from ..finding import Finding
-    from ..result import Result
+    from ...studies.finding import Finding
+    from ...studies.result import Result
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
@@ -65,7 +66,7 @@ def _composed(
     return Report(
         title=result.study.study.title,
         question=result.study.study.question,
-        verdict=text.without_assumptions(verdict(result)),
+        verdict=without_assumptions(verdict(result)),
         lead=_lead(result, kept),
         claims=claims(result),
         sections=study_sections(result, kept, loop, published, limits=False),
@@ -107,7 +108,7 @@ def study_sections(
         title = "The loop as published"
         asked.append(Section(key="study_published", title=title, items=items, folded=True))
     if loop is not None:
-        asked += loop_sections(loop, result, "", 2)
+        asked += loop_sections(loop, result)
     if kept is not None:
         shown = [*fan_items(kept, f"{prefix}study")]
         asked.append(Section(key="study_fans", title="The runs over time", items=shown))
@@ -116,7 +117,7 @@ def study_sections(
         rows = [*row_items(result, table, f"{prefix}{key}")]
         asked.append(Section(key=key, title="How the runs ended", items=rows))
         asked += [
-            _section(f, result, text.without_assumptions(f.sentence), prefix)
+            _section(f, result, without_assumptions(f.sentence), prefix)
             for f in _statements(result)
         ]
     asked += _findings(result, prefix)
@@ -148,9 +149,9 @@ def _lead(result: Result, kept: Histories | None) -> Figure | None:
 
 def _assumed(result: Result) -> list[Section]:
     """Return the assumptions of all statements, each once; nothing if there are none."""
-    found = text.assumptions_in(finding.sentence for finding in result.findings)
+    found = assumptions_in(finding.sentence for finding in result.findings)
     items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in found]
-    return [Section(key="study_assumed", title=text.ASSUMED, items=items)] if found else []
+    return [Section(key="study_assumed", title=ASSUMED, items=items)] if found else []
 
 
 def study_part(
@@ -162,7 +163,7 @@ def study_part(
     rows = []
     for result, _ in studies:
         look, told = summary(claims(result))
-        words = f"{told} {text.without_assumptions(verdict(result))}"
+        words = f"{told} {without_assumptions(verdict(result))}"
         asked = result.study.study.question
         rows.append((result.study.study.title, asked, OUTCOMES.get(look, look), words))
     overview = Table(
@@ -222,7 +223,7 @@ def _brief(
 
 def _told(finding: Finding, asked: Any) -> str:
     """Return what was found, and what was varied if that is not everything."""
-    sentence = text.without_assumptions(finding.sentence)
+    sentence = without_assumptions(finding.sentence)
     if not (isinstance(asked, Varied) and asked.quantities):
         return sentence
     return f"{sentence} Here only {', '.join(asked.quantities)} vary, all others are nominal."

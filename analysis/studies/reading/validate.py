@@ -35,11 +35,11 @@ from ..build import (
     size_mistakes,
     times,
 )
+from ..file.asked import Asked
+from ..file.errors import KeyPath, Problem
+from ..file.schema import RESERVED, Faulty, Study
 from ..kind import Setup, kind_of
-from .asked import Asked
-from .errors import KeyPath, Problem
-from .resolve import check_complete, loop_function, option, uncertain
-from .schema import RESERVED, Faulty, Study
+from ..resolve import check_complete, loop_function, option, uncertain
 
 __all__ = ["checked_experiment"]
 
