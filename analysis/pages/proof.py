@@ -15,26 +15,26 @@ from .run import own_values
 
 __all__ = ["certificate_section", "ledger_section", "ledger_text"]
 
-_PROVED = (
+PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
     "in closed form."
 )
-_CHECKED = (
+CHECKED = (
     "Only checked: seen to hold at every sample of this run, up to rounding. That is not a proof "
     "for other runs, nor between samples. “Literal”: with q cos(w t) counted to g(x), as the paper "
     "has it, and with the d* and eps* of that g; the corrected line counts it to d."
 )
-_VIOLATED = (
+VIOLATED = (
     "Violated: statements of the proof in their corrected form that do not hold along this run."
 )
-_FAILING = "False as the paper has it: statements as printed, or as the paper uses them."
-_LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
+FAILING = "False as the paper has it: statements as printed, or as the paper uses them."
+LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 _GROUPS = (  # of the ledger's lines, each a table of its own
-    (("violated",), "corrected", _VIOLATED),
-    (("proved", "computed"), None, _PROVED),
-    (("checked",), None, _CHECKED),
-    (("violated",), "paper", _FAILING),
-    (("undecided", "not applicable"), None, _LEFT_OPEN),
+    (("violated",), "corrected", VIOLATED),
+    (("proved", "computed"), None, PROVED),
+    (("checked",), None, CHECKED),
+    (("violated",), "paper", FAILING),
+    (("undecided", "not applicable"), None, LEFT_OPEN),
 )
 
 

@@ -12,13 +12,13 @@ from .parameters import (
 )
 from .places import (
     Place,
-    continuous_blocks,
     initial_state,
     known_system,
     leaves,
     not_a_system,
     places,
     state_names,
+    supplied_blocks,
 )
 from .third_party import Apart, apart
 
@@ -29,7 +29,6 @@ __all__ = [
     "apart",
     "as_system",
     "check_read",
-    "continuous_blocks",
     "initial_state",
     "interconnect",
     "known_system",
@@ -43,4 +42,5 @@ __all__ = [
     "reconnected",
     "samplings",
     "state_names",
+    "supplied_blocks",
 ]
