@@ -33,7 +33,7 @@ from nlctl.analysis.robustness import Space, Uncertain, confidence_sequence, ind
 from nlctl.analysis.robustness.search.radius import size_of
 from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
-from nlctl.analysis.studies.kind import kind_of, unanswered
+from nlctl.analysis.studies.kind import unanswered
 from nlctl.analysis.studies.kinds import KINDS
 from nlctl.analysis.studies.page.deviations import deviations_table
 from nlctl.analysis.studies.page.running import running
@@ -222,7 +222,7 @@ def test_every_analysis_has_a_section_that_is_not_empty(result, report, page):
 
 def test_every_kind_of_analysis_has_title_and_methods(result):
     """The study of this module asks for all of them, and none has an empty text."""
-    assert {kind_of(asked) for asked in result.study.analysis} == set(KINDS)
+    assert {asked.definition for asked in result.study.analysis} == set(KINDS)
     assert all(kind.title and kind.answers and kind.method for kind in KINDS)
     assert len({kind.title for kind in KINDS}) == len({kind.name for kind in KINDS}) == len(KINDS)
 

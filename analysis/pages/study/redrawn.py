@@ -7,7 +7,6 @@ from collections.abc import Callable
 from nlctl.errors import UsageError
 
 from ...robustness import Prepared
-from ...studies.kind import kind_of
 from ...studies.result import Result
 from ...studies.run import reopened
 from ...studies.sealed import RunFolderError, as_written
@@ -43,7 +42,7 @@ def rows_again(
         told = [
             look(f)
             for f in result.findings
-            if (look := kind_of(result.asked[f.key]).witness) is not None and f.is_answered
+            if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
         ]
     witness = min(told, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

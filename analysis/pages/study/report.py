@@ -12,7 +12,6 @@ from ...report.document import Figure, Item, Paragraph, Report, Section, Table, 
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.asked import Varied
-from ...studies.kind import kind_of
 from ...studies.kinds import KINDS
 from ...studies.page.running import running
 from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
@@ -47,7 +46,7 @@ def study_report(
     published: Published | None = None,
 ) -> Report:
     """Compose the report of a study."""
-    if any(":" in a.kind and kind_of(a).name != STAND_IN for a in result.study.analysis):
+    if any(":" in a.kind and a.definition.name != STAND_IN for a in result.study.analysis):
         return _composed(
             result, kept, command, loop, published
         )  # errors of theirs are told as such
@@ -214,8 +213,8 @@ def _brief(
         yield replace(made, key=f"{key}-assumed", level=4, folded=True)
     for finding in result.findings:
         one = asked[finding.key]
-        if kind_of(one).in_brief and finding.is_answered:
-            items = [*kind_of(one).items(finding, result, one, f"{key}-{finding.key}")]
+        if one.definition.in_brief and finding.is_answered:
+            items = [*one.definition.items(finding, result, one, f"{key}-{finding.key}")]
             yield Section(
                 key=f"{key}-map", title=_title(finding, result), items=items, level=4, folded=True
             )
@@ -232,8 +231,8 @@ def _told(finding: Finding, asked: Any) -> str:
 def _title(finding: Finding, result: Result) -> str:
     """Return the heading that the study file gives an analysis, or one by its kind."""
     asked = result.asked[finding.key]
-    of = (getattr(asked, key) for key in kind_of(asked).columns)
-    return asked.title or kind_of(asked).title + "".join(f" of {c}" for c in of if c != "spec")
+    of = (getattr(asked, key) for key in asked.definition.columns)
+    return asked.title or asked.definition.title + "".join(f" of {c}" for c in of if c != "spec")
 
 
 def _findings(result: Result, prefix: str) -> list[Section]:
@@ -243,8 +242,8 @@ def _findings(result: Result, prefix: str) -> list[Section]:
     """
     asked = result.asked
     places = {kind: place for place, kind in enumerate(KINDS)}
-    others = [f for f in _answered(result) if not kind_of(asked[f.key]).is_statement]
-    others.sort(key=lambda f: places.get(kind_of(asked[f.key]), len(places)))
+    others = [f for f in _answered(result) if not asked[f.key].definition.is_statement]
+    others.sort(key=lambda f: places.get(asked[f.key].definition, len(places)))
     return [_section(f, result, _told(f, asked[f.key]), prefix) for f in others] + [
         Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
         for f in result.findings
@@ -255,14 +254,14 @@ def _findings(result: Result, prefix: str) -> list[Section]:
 def _section(finding: Finding, result: Result, told: str, prefix: str) -> Section:
     """Return what an analysis found, in words, with figures and tables of its kind."""
     asked = result.asked[finding.key]
-    shown = kind_of(asked).items(finding, result, asked, f"{prefix}{finding.key}")
+    shown = asked.definition.items(finding, result, asked, f"{prefix}{finding.key}")
     items = [Paragraph(text=told), *shown]
     return Section(key=finding.key, title=_title(finding, result), items=items)
 
 
 def _statements(result: Result) -> list[Finding]:
     """Return what was answered about the probability of a violation."""
-    return [f for f in _answered(result) if kind_of(result.asked[f.key]).is_statement]
+    return [f for f in _answered(result) if result.asked[f.key].definition.is_statement]
 
 
 def _answered(result: Result) -> list[Finding]:
