@@ -11,13 +11,13 @@ import control as ct
 import numpy as np
 
 from nlctl.blocks import memory_states
-from nlctl.delays.lines import delayed_blocks
-from nlctl.diagrams import leaves
+from nlctl.delays.transport import PAST
+from nlctl.diagrams import leaves, supplied_blocks
 from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError, DivergedError
 from nlctl.response import EngineWarning, input_output_response
 from nlctl.sampling.system import clocks_of
-from nlctl.sliding.blocks import sliding_blocks
+from nlctl.sliding.relay import SLIDING
 from nlctl.wording import counted
 
 __all__ = ["check_response", "check_shape", "own_outputs", "own_parameters"]
@@ -54,7 +54,7 @@ def check_response(
     t, finite = np.asarray(response.time, dtype=float), np.isfinite(response.x).all(axis=0)
     last = (len(t) if finite.all() else int(np.argmin(finite))) - 1
     places = np.unique(np.linspace(0, last, _PLACES).astype(int))
-    if delayed_blocks(loop) or sliding_blocks(loop) or clocks_of(b.system for b in leaves(loop)):
+    if supplied_blocks(loop) or clocks_of(b.system for b in leaves(loop)):
         _check_span(loop, response, params, places, [*(names or loop.output_labels)])
         return
     for place, own in own_outputs(loop, response, params):
@@ -127,10 +127,10 @@ def _check_span(
 
 def _engines(loop: Any) -> tuple[str, ...]:
     """Whose run a response may be: plain python-control's as well, which relaxes memories."""
-    if sliding_blocks(loop):
+    if supplied_blocks(loop, SLIDING):
         return ("auto",)
     remembers = any(memory_states(getattr(leaf.system, "spec", None)) for leaf in leaves(loop))
-    is_plain = remembers and not delayed_blocks(loop)
+    is_plain = remembers and not supplied_blocks(loop, PAST)
     is_plain = is_plain and not clocks_of(leaf.system for leaf in leaves(loop))
     return ("auto", "python-control", *(["plain"] if is_plain else []))
 

@@ -14,14 +14,14 @@ import control as ct
 from .annotations import as_annotated
 from .arguments import number, tolerances
 from .blocks import sampling_of
-from .diagrams import leaves
+from .diagrams import leaves, supplied_blocks
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
 from .responses.watched import Watched, check_moves, watched_functions
-from .sliding.blocks import sliding_blocks
+from .sliding.relay import SLIDING
 from .upstream.control_internals import is_system
 
 if TYPE_CHECKING:
@@ -264,7 +264,7 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
         return _native(run)
     except (CompileError, AlgebraicLoopError, AuditError) as error:
         is_ring = isinstance(error, AlgebraicLoopError) and _is_sampled(run.system)
-        if engine != "auto" or not interpretable or sliding_blocks(run.system) or is_ring:
+        if engine != "auto" or not interpretable or supplied_blocks(run.system, SLIDING) or is_ring:
             raise
         warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)

@@ -24,6 +24,10 @@ class Supplied:
     ----------
     why : str
         Of whom, as the end of a sentence: python-control alone would run it wrongly.
+    continuous : str
+        Likewise, why it needs continuous time.
+    shared : str
+        What one block in two places of a diagram would have for both.
     rates : int
         How many numbers its equations get behind the inputs, about the rate of these.
     discrete : str
@@ -31,6 +35,8 @@ class Supplied:
     """
 
     why: str
+    continuous: str
+    shared: str
     rates: int = 0
     discrete: str = ""
 

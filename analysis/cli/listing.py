@@ -39,7 +39,7 @@ def show_all() -> None:
 def show(name: str) -> None:
     """Print the parameters of a block, the keys of a kind of analysis, or the kinds."""
     if ":" in name:
-        from ..studies.file.resolve import named
+        from ..studies.resolve import named
 
         return _show(name, named(name, Path.cwd()))
     blocks = [block for group in block_summaries().values() for block in group]

@@ -16,7 +16,7 @@ def named_loop(name: str) -> Any:
     from nlctl.upstream.control_internals import is_system
 
     if ":" in name:
-        from ..studies.file.resolve import named_function  # takes a second
+        from ..studies.resolve import named_function  # takes a second
 
         made = named_function(name, Path.cwd())()  # who types its name wants it called
     else:

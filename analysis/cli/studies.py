@@ -226,7 +226,7 @@ def asking(action: Callable[[bool], T], trust: bool) -> T:
 
 def schema() -> None:
     """Print the JSON schema of study files, for editors."""
-    from ..studies.file.own_kinds import model_of
+    from ..studies.reading.own_kinds import model_of
 
     print(in_json(model_of({}).model_json_schema()))
 

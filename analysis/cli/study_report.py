@@ -30,12 +30,12 @@ def report_study(
     trust: bool = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study."""
+    from ..pages.study.loop import loop_of
+    from ..pages.study.redrawn import loop_again, rows_again
+    from ..pages.study.report import study_report
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result
-    from ..studies.page.loop import loop_of
-    from ..studies.page.redrawn import loop_again, rows_again
-    from ..studies.page.report import study_report
     from ..studies.whole.page import recorded_page
 
     result = (

@@ -6,18 +6,16 @@ from ..intervals.level_set import prove_decrease
 from .attraction.barrier import Barrier, barrier
 from .attraction.region import AttractionRegion, region_of_attraction
 from .bounds.clipped import clipped_split
-from .bounds.constants import constants, disturbance, kappa
 from .bounds.decomposition import Decomposition, DecompositionError, decompose
-from .bounds.premises import Premises, literal, premises
-from .bounds.provenance import Constant, Constants
 from .bounds.sector import Sector, sector
 from .bounds.starts import Starts
 from .bounds.weights import approximation_error, minimax_weights, tightest_weights
 from .certificate.certify import certify
 from .certificate.gains import GainDesign, design
-from .certificate.known_sign_proof import Certificate
+from .certificate.known_sign import KnownSignCertificate
 from .certificate.sliding_mode import SlidingModeCertificate
 from .conservatism import Conservatism, DirectBound, comparison, conservatism
+from .constants import Constants, constants, disturbance, kappa
 from .examination import Examination, examine
 from .inequalities import inequalities
 from .ledger import Ledger, ledger
@@ -31,6 +29,8 @@ from .nussbaum.aftermath import Aftermath, aftermath
 from .nussbaum.energy import Drift, drift, drift_margin, safe_horizon
 from .nussbaum.property import nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, burst_peak, slow_drift
+from .premises import Premises, literal, premises
+from .proofs.result import Certificate, Constant
 from .tighten import Tightened, tighten
 
 __all__ = [
@@ -48,6 +48,7 @@ __all__ = [
     "Drift",
     "Examination",
     "GainDesign",
+    "KnownSignCertificate",
     "Ledger",
     "Line",
     "Margin",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..intervals.box import Box
-from .bounds.premises import Premises
 from .loop.signals import Margin, Signals, inequality
+from .premises import Premises
 
 __all__ = ["assumptions"]
 

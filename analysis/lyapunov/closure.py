@@ -25,18 +25,17 @@ from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 
 from ..intervals.box import Box
-from .bounds.constants import constants_of
 from .bounds.decomposition import Decomposition
 from .bounds.error_bounds import error_bounds, reference_bounds
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
-from .bounds.premises import Premises, premises
-from .bounds.provenance import Constants
 from .bounds.sector import plant_terms
 from .bounds.weights import network_on_grid
+from .constants import Constants, constants_of
 from .inequalities import terms
 from .lines import Line
 from .loop.roles import Parts
 from .loop.simulation import MemberRun
+from .premises import Premises, premises
 
 __all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
 

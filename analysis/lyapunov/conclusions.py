@@ -8,15 +8,15 @@ import numpy as np
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
-from .bounds.premises import Premises, premises
-from .bounds.provenance import Constants
 from .closure import closure
+from .constants import Constants
 from .inequalities import terms
 from .lines import Line
 from .loop.simulation import MemberRun
 from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
+from .premises import Premises, premises
 
 __all__ = ["conclusions", "slow_drift_of"]
 

@@ -14,13 +14,13 @@ from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
 from .bounds.final_bound import KAPPA, initial_V
-from .bounds.premises import Premises, premises
-from .bounds.provenance import Constants
 from .bounds.weights import Network, tightest_weights
+from .constants import Constants
 from .examination import Examination, examine
 from .inequalities import terms
 from .loop.signals import Signals, peak_by_rates
 from .nussbaum.property import root
+from .premises import Premises, premises
 
 if TYPE_CHECKING:
     import pandas as pd

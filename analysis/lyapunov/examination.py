@@ -15,9 +15,8 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, one_of
 
 from ..intervals.box import Box, visited_box
-from .bounds.constants import constants
 from .bounds.decomposition import Decomposition, decompose
-from .bounds.provenance import Constants
+from .constants import Constants, constants
 from .loop.integral import sharpest
 from .loop.roles import read_parts
 from .loop.simulation import (

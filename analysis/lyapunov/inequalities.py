@@ -17,8 +17,8 @@ from nlctl.functions import smooth_sign
 from nlctl.plants import coordinate_names
 
 from .bounds.final_bound import KAPPA
-from .bounds.premises import Premises
 from .loop.signals import INTEGRATED, Margin, Signals, equality, inequality
+from .premises import Premises
 
 __all__ = ["Terms", "inequalities", "terms"]
 

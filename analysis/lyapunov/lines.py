@@ -11,14 +11,14 @@ import numpy as np
 from nlctl.wording import counted
 
 from .assumptions import assumptions
-from .bounds.constants import kappa
 from .bounds.final_bound import alpha_1
-from .bounds.premises import Premises, forcing_bound, literal, premises
-from .bounds.provenance import Constants, Provenance
+from .constants import Constants, kappa
 from .inequalities import inequalities
 from .loop.declared_terms import update_is_declared
 from .loop.signals import Margin, Signals
 from .loop.simulation import MemberRun
+from .premises import Premises, forcing_bound, literal, premises
+from .proofs.result import Provenance
 
 __all__ = ["Line", "LineStatus", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
 

@@ -16,8 +16,8 @@ from nlctl.native import compile as compiled
 from nlctl.response import input_output_response
 
 from ..lyapunov.assumptions import assumptions
-from ..lyapunov.bounds.premises import premises
-from ..lyapunov.certificate.known_sign_proof import Certificate, certify_known_sign
+from ..lyapunov.certificate.certify import certify
+from ..lyapunov.certificate.known_sign import KnownSignCertificate
 from ..lyapunov.conservatism import Conservatism, conservatism
 from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
@@ -27,6 +27,7 @@ from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.energy import signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
 from ..lyapunov.nussbaum.slow_drift import SlowDrift
+from ..lyapunov.premises import premises
 from ..metrics import peak
 from .burst import Burst, through_the_burst
 from .controllers import compared_controllers
@@ -62,7 +63,7 @@ class Evidence:
     conservatism : Conservatism
     slow_drift : SlowDrift
         Told from the first 200 s.
-    certificate : Certificate
+    certificate : KnownSignCertificate
         Of the same plant and actuator with the law that knows the sign of the gain.
     certified_max_r : float
         max |r| of a run of that loop.
@@ -76,7 +77,7 @@ class Evidence:
     ledger: Ledger
     conservatism: Conservatism
     slow_drift: SlowDrift
-    certificate: Certificate
+    certificate: KnownSignCertificate
     certified_max_r: float
     t: np.ndarray = field(repr=False)
     curves: Mapping[str, np.ndarray] = field(repr=False)
@@ -97,7 +98,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
         ledger=ledger(study),
         conservatism=conservatism(study),
         slow_drift=long_run(loop, LOOK, rtol=1e-7).predictions[0],
-        certificate=certify_known_sign(tame, k=SPLIT.get(str(loop.name))),
+        certificate=certify(tame, k=SPLIT.get(str(loop.name))),
         certified_max_r=_max_r(tame, s.t),
         t=s.t,
         curves={

@@ -17,14 +17,14 @@ from typing import Any
 
 from nlctl import paper
 
+from ..pages.study.redrawn import loop_again, rows_again
+from ..pages.study.report import study_part
 from ..report.document import Report, Section
 from ..report.svg import Drawn, draw_ahead
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
-from ..studies.page.redrawn import loop_again, rows_again
-from ..studies.page.report import study_part
 from . import evidence as proofs
 from .cases import CASES, HORIZON
 from .limits.rivals import checked_rivals

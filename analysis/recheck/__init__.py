@@ -22,9 +22,9 @@ from .content import FORMAT, Record, Refuted, need, seal_of
 from .filtered import known_sign_bounds, sliding_mode_bounds, told_of_filter
 from .reference_model import reference_model_bounds, told_of_model
 
-__all__ = ["FORMAT", "Refuted", "proved_bounds", "recheck", "seal_of"]
+__all__ = ["FORMAT", "RECHECKED", "Refuted", "proved_bounds", "recheck", "seal_of"]
 
-_KINDS = {  # what follows, and the premises in words
+RECHECKED = {  # what follows, and the premises in words
     "known sign": (known_sign_bounds, told_of_filter),
     "sliding mode": (sliding_mode_bounds, told_of_filter),
     "reference model": (reference_model_bounds, told_of_model),
@@ -79,7 +79,7 @@ def recheck(content: Any) -> str:
     for name in claim.content:
         need(bounds[name] <= claim.number(name), f"{name} <= {float(claim.number(name)):.6g}")
     said = ", ".join(f"{name} <= {float(claim.number(name)):.6g}" for name in claim.content)
-    return f"{said}; for all t >= 0 from {_KINDS[whole['kind']][1](whole)}"
+    return f"{said}; for all t >= 0 from {RECHECKED[whole['kind']][1](whole)}"
 
 
 def proved_bounds(content: Any) -> dict[str, Fraction]:
@@ -106,8 +106,8 @@ def proved_bounds(content: Any) -> dict[str, Fraction]:
     """
     whole = Record(content, "the file")
     kind = whole["kind"]
-    need(isinstance(kind, str) and kind in _KINDS, f"there is no proof of kind {kind!r}")
-    return _KINDS[kind][0](whole)
+    need(isinstance(kind, str) and kind in RECHECKED, f"there is no proof of kind {kind!r}")
+    return RECHECKED[kind][0](whole)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -3,20 +3,20 @@
 from .differences import origin_differences, run_differences
 from .file.asked import Asked, Varied
 from .file.errors import Problem, StudyError
-from .file.parse import StudyFile, read_study
 from .file.schema import Study
 from .file.shipped import shipped
-from .file.written import from_toml, to_toml
 from .finding import Finding
 from .folder import load_result
 from .kind import Ground, Kind, Setup, made
 from .kinds import KINDS
 from .plan import Plan, plan
+from .reading.parse import StudyFile, read_study
+from .reading.written import from_toml, to_toml
 from .replay import Replay, replay, replay_figure
 from .result import Result
 from .run import run
 from .sealed import RunFolderError
-from .whole.wholeness import Wholeness, verify
+from .wholeness import Wholeness, verify
 
 __all__ = [
     "KINDS",

@@ -33,8 +33,8 @@ from ..robustness import (
     tracking_metrics,
 )
 from ..robustness.stl.text import parse_formula
-from .file.resolve import DEFAULT, loop_function, option, uncertain
 from .file.schema import Choices, Faulty, Rows, Study
+from .resolve import DEFAULT, loop_function, option, uncertain
 
 __all__ = [
     "choice",

@@ -33,14 +33,14 @@ from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
 from .code.record import study_digest
 from .code.rule import Grant
-from .file.own_kinds import STAND_IN, own_kinds, stand_ins
-from .file.resolve import uncertain
 from .file.schema import Study, keyed
 from .file.toml import read_toml, study_text
-from .file.written import from_toml
 from .finding import Finding
-from .kind import Kind, kind_of
+from .kind import Kind
 from .origin import plain_study
+from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
+from .reading.written import from_toml
+from .resolve import uncertain
 from .result import Result
 from .sealed import (
     ANEW,
@@ -272,8 +272,8 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             f"{', '.join(expected) or 'none'}: continue with --resume"
         )
     if result.complete and result.study.runs is not None:
-        stops = [a for a in result.study.analysis if kind_of(a).needs_rows]
-        early = len(stops) == 1 and kind_of(stops[0]).stop is not None
+        stops = [a for a in result.study.analysis if a.definition.needs_rows]
+        early = len(stops) == 1 and stops[0].definition.stop is not None
         if rows is None or not (rows.complete or early):
             there = 0 if rows is None else rows.done
             raise RunFolderError(
@@ -282,7 +282,7 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             )
     for finding in result.findings:
         asked = result.asked[finding.key]
-        told = asked.claim if kind_of(asked).name != STAND_IN else finding.claim
+        told = asked.claim if asked.definition.name != STAND_IN else finding.claim
         same = finding.claim == told or not (told or finding.is_answered)
         if finding.kind != asked.kind or not same or bool(finding.claim) != bool(finding.answer):
             raise RunFolderError(

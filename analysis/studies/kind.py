@@ -46,7 +46,6 @@ __all__ = [
     "Setup",
     "answer",
     "column",
-    "kind_of",
     "made",
     "tagged",
     "unanswered",
@@ -78,14 +77,12 @@ class Setup:
     What Morris' screening takes is known before anything runs: with r trajectories of k quantities
     r (k + 1) simulations.
 
-    >>> from nlctl.analysis.studies import Setup, read_study, shipped
-    >>> from nlctl.analysis.studies.kind import kind_of
-    >>> file = read_study(shipped("example-1-quick"))
-    >>> setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
-    >>> (asked,) = [asked for asked in file.study.analysis if asked.kind == "morris"]
+    >>> from nlctl.analysis.studies import read_study, shipped
+    >>> setup = read_study(shipped("example-1-quick"))
+    >>> (asked,) = [asked for asked in setup.study.analysis if asked.kind == "morris"]
     >>> asked.trajectories, len(setup.experiment.space.names)
     (4, 5)
-    >>> kind_of(asked).planned(asked, setup)
+    >>> asked.definition.planned(asked, setup)
     24
     """
 
@@ -357,12 +354,6 @@ def tagged(kind: Kind, tag: str) -> type[Asked]:
     return model
 
 
-def kind_of(asked: Asked) -> Kind:
-    """Return the kind of an analysis that a study file asks for."""
-    model: Any = type(asked)
-    return model.definition
-
-
 def column(rows: Sweep, name: str) -> np.ndarray:
     """Return one column of a sweep."""
     return rows.columns(name)[name].to_numpy()
@@ -404,7 +395,7 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
 def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
     """Run one analysis."""
-    found = kind_of(asked).run(asked, ground)
+    found = asked.definition.run(asked, ground)
     if found is None:
         return None
     return _headed(key, asked, found)

@@ -22,9 +22,8 @@ from ..loop_record import (
 )
 from ..robustness import Prepared, diagrams
 from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
-from .file.parse import StudyFile
 from .file.schema import Study, keyed
-from .kind import Setup, kind_of
+from .kind import Setup
 
 __all__ = [
     "compared_differences",
@@ -37,28 +36,27 @@ __all__ = [
 ]
 
 
-def origin_of(file: StudyFile, prepared: Prepared) -> dict[str, Any]:
+def origin_of(setup: Setup, prepared: Prepared) -> dict[str, Any]:
     """Return what the results of a study follow from, as data for a JSON file."""
-    end = float(file.experiment.timepts[-1])
+    end, study = float(setup.experiment.timepts[-1]), setup.study
     facts = experiment_facts(prepared)
     values = {labels_text(labels): loop_values(p.system, end) for labels, p in prepared.loops}
     every = [p.system for _, p in prepared.loops]
-    setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
-    for key, asked in keyed(file.study).items():
-        if (experiment := kind_of(asked).experiment) is not None:
+    for key, asked in keyed(study).items():
+        if (experiment := asked.definition.experiment) is not None:
             own = experiment(asked, setup)
             for labels, diagram in diagrams(own.space, own.build):
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
                 every.append(diagram)
-    own_kinds = {a.kind: short_key(kind_of(a).run) for a in file.study.analysis if ":" in a.kind}
+    own_kinds = {a.kind: short_key(a.definition.run) for a in study.analysis if ":" in a.kind}
     facts |= {"kinds": own_kinds} if own_kinds else {}
     unseen = dict[str, list[str]]()
     for diagram in every:
         unseen |= unseen_parts(diagram)
     facts |= {"unseen": unseen} if unseen else {}
-    content = {**facts, "study": plain_study(file.study), "values": values}
+    content = {**facts, "study": plain_study(study), "values": values}
     return from_json(as_json(content))  # as it is read from a file
 
 

@@ -12,9 +12,9 @@ from nlctl.annotations import as_annotated
 from ..robustness import Prepared, evaluate, independent, prepare
 from ..robustness.runs.experiment import columns_of
 from .build import main_design
-from .file.parse import StudyFile
 from .file.schema import keyed
-from .kind import Setup, kind_of
+from .kind import Setup
+from .reading.parse import StudyFile
 
 __all__ = ["Plan", "plan"]
 
@@ -108,11 +108,11 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
         kept += runs["rows"]
     setup = Setup(study=study, folder=file.folder, experiment=prepared.experiment)
     for key, asked in keyed(study).items():
-        count = kind_of(asked).planned(asked, setup)
+        count = asked.definition.planned(asked, setup)
         if count:
             runs[key] = count
-            kept += count if kind_of(asked).keeps_rows else 0
-    at_most = [key for key, asked in keyed(study).items() if kind_of(asked).ends_early]
+            kept += count if asked.definition.keeps_rows else 0
+    at_most = [key for key, asked in keyed(study).items() if asked.definition.ends_early]
     width = len(columns_of(prepared))
     return Plan(
         runs=runs,

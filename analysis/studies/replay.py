@@ -19,10 +19,9 @@ from ..figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from ..robustness import Experiment, Prepared, evaluate, prepare
 from ..robustness.runs.experiment import by_diagram, simulate_rows
 from ..robustness.stl.formula import Band, parts_of
-from .file.parse import StudyFile
 from .file.schema import keyed
 from .folder import load_finding, load_rows, load_run
-from .kind import Setup, kind_of
+from .reading.parse import StudyFile
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
@@ -185,11 +184,10 @@ def _table(folder: Path, part: str) -> pd.DataFrame:
 def _widened(file: StudyFile, part: str) -> Experiment | None:
     """Return what the rows of a part were run with, where it is not the study's experiment."""
     asked = keyed(file.study).get(part)
-    experiment = None if asked is None else kind_of(asked).experiment
+    experiment = None if asked is None else asked.definition.experiment
     if experiment is None:
         return None
-    setup = Setup(study=file.study, folder=file.folder, experiment=file.experiment)
-    return experiment(asked, setup)
+    return experiment(asked, file)
 
 
 def _same(one: Any, other: Any) -> bool:

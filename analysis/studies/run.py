@@ -21,15 +21,10 @@ from ..robustness.runs.progress import Progress
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
-from .code.record import study_digest
-from .code.rule import remember_code
-from .file.parse import StudyFile, read_study
 from .file.schema import Study, keyed
-from .file.toml import read_toml
-from .file.written import to_toml
 from .finding import Finding
 from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
-from .kind import Ground, answer, kind_of, unanswered
+from .kind import Ground, Setup, answer, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
@@ -37,6 +32,8 @@ from .origin import (
     unseen_notes,
     version_differences,
 )
+from .reading.parse import StudyFile, read_study
+from .reading.written import remember_run, to_toml
 from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
 from .whole.contents import seal, unseal
@@ -155,28 +152,27 @@ def run(
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
         origin = _stamped(file, prepared, folder)
-        remember_code(file.study, study_digest(read_toml(to_toml(file.study))), file.folder)
+        remember_run(file.study, file.folder)
         way = _Way(executor=executor, threads=threads, watch=watch, origin=origin)
         before = unseal(folder)
-        result = replace(_through(file, prepared, folder, way), origin=origin)
-        write_json(folder / "results.json", result.plain() | {"origin": way.key})
-        seal(result, before)
+        result = _through(file, prepared, folder, way)
+        seal(result, way.key, before)
     return result
 
 
-def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Result:
+def _through(setup: Setup, prepared: Prepared, folder: Path, way: _Way) -> Result:
     """Run the main table, then every analysis that is not done yet."""
-    study = file.study
+    study, every = setup.study, keyed(setup.study)
     rows, notes, findings = None, unseen_notes(way.origin), []
     complete, interrupted = True, False
     if study.runs is not None:
-        rows = _main_rows(study, prepared, folder, way)
+        rows = _main_rows(setup, every, prepared, folder, way)
         notes += rows.notes
         complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
-    for key, asked in keyed(study).items() if complete else ():
+    for key, asked in every.items() if complete else ():
         finding, own = load_finding(folder, key, way.key), []
         if finding is None and not interrupted:
-            ground = _ground(file, prepared, rows, folder / key, way, own)
+            ground = _ground(setup, prepared, rows, folder / key, way, own)
             try:
                 finding = _answered(key, asked, ground, own)
             except KeyboardInterrupt:
@@ -189,7 +185,9 @@ def _through(file: StudyFile, prepared: Prepared, folder: Path, way: _Way) -> Re
             complete = False
             break
         findings.append(finding)
-    return _result(study, prepared, folder, rows, findings, complete, interrupted, notes)
+    return _result(
+        study, prepared, folder, rows, findings, complete, interrupted, notes, way.origin
+    )
 
 
 def _answered(key: str, asked: Any, ground: Ground, own: Sequence[Sweep]) -> Finding | None:
@@ -202,13 +200,16 @@ def _answered(key: str, asked: Any, ground: Ground, own: Sequence[Sweep]) -> Fin
         return unanswered(key, asked, error, sum(done.done for done in own))
 
 
-def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Sweep:
+def _main_rows(
+    setup: Setup, every: Mapping[str, Any], prepared: Prepared, folder: Path, way: _Way
+) -> Sweep:
     """Run the main table, or as much of it as the analyses need."""
+    study = setup.study
     assert study.runs is not None
     design = main_design(study.runs, prepared.experiment.space, study.study.seed)
-    users = [(key, a) for key, a in keyed(study).items() if kind_of(a).needs_rows]
+    users = [(key, a) for key, a in every.items() if a.definition.needs_rows]
     key, only = users[0] if len(users) == 1 else ("", None)
-    if only is not None and (stop := kind_of(only).stop) is not None:
+    if only is not None and (stop := only.definition.stop) is not None:
         if load_finding(folder, key, way.key) is not None:
             return replace(load(folder / "rows", design), decided=True)
         ends = stop(only, design)
@@ -217,7 +218,7 @@ def _main_rows(study: Study, prepared: Prepared, folder: Path, way: _Way) -> Swe
 
 
 def _ground(
-    file: StudyFile,
+    setup: Setup,
     prepared: Prepared,
     rows: Sweep | None,
     folder: Path,
@@ -240,8 +241,8 @@ def _ground(
         return own[-1]
 
     return Ground(
-        study=file.study,
-        folder=file.folder,
+        study=setup.study,
+        folder=setup.folder,
         prepared=prepared,
         rows=rows,
         simulate=simulate,
@@ -280,7 +281,7 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        own = {asked.kind: kind_of(asked) for asked in file.study.analysis if ":" in asked.kind}
+        own = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
         changed = _changed(load_study(folder, own), file.study)
         if changed:
             raise RunFolderError(
@@ -303,9 +304,9 @@ def _changed(before: Study, now: Study) -> list[str]:
     return [name for name in type(now).model_fields if getattr(before, name) != getattr(now, name)]
 
 
-def _stamped(file: StudyFile, prepared: Prepared, folder: Path) -> dict[str, Any]:
+def _stamped(setup: Setup, prepared: Prepared, folder: Path) -> dict[str, Any]:
     """Write what a run is computed from, or compare; return it."""
-    origin = origin_of(file, prepared)
+    origin = origin_of(setup, prepared)
     if (folder / "run.json").exists():
         before = load_run(folder)["origin"]
         _refuse_another_loop(folder, before, origin)
@@ -315,7 +316,7 @@ def _stamped(file: StudyFile, prepared: Prepared, folder: Path) -> dict[str, Any
                 "or run the study in another folder with --out"
             )
         return before
-    place = os.path.relpath(file.folder.resolve(), folder.resolve())
+    place = os.path.relpath(setup.folder.resolve(), folder.resolve())
     content = {"study_folder": Path(place).as_posix(), "origin": origin}
     write_json(folder / "run.json", content)
     return origin
@@ -373,6 +374,7 @@ def _result(
     complete: bool,
     interrupted: bool,
     notes: Sequence[str],
+    origin: Mapping[str, Any],
 ) -> Result:
     experiment, space = prepared.experiment, prepared.experiment.space
     quantities = [
@@ -402,4 +404,5 @@ def _result(
         complete=complete,
         interrupted=interrupted,
         notes=tuple(notes),
+        origin=origin,
     )

@@ -1,8 +1,7 @@
 """Transport delays: signals that arrive later than they were sent.
 
-`transport` is the block, `variation` how its delay varies in time, as polynomials by `pieces`, and
-`lines` finds those of a diagram.  What runs keep of the signals is in `nlctl.native.histories` and
-`nlctl.reference.past`.
+`transport` is the block, `variation` how its delay varies in time, as polynomials by `pieces`.
+What runs keep of the signals is in `nlctl.native.histories` and `nlctl.reference.past`.
 """
 
 from .transport import TransportDelay

@@ -13,12 +13,17 @@ from ..params import param, record
 from ..supplied import Supplied
 from ..wording import counted
 
+_DISCRETE = (
+    "in discrete time k samples late is ct.tf(1, [1] + [0] * k, dt), and nlctl.sampled has "
+    "delay=..."
+)
 PAST = Supplied(
     why="delays its signals, and python-control does not keep the past: use "
     "nlctl.input_output_response (engine='python-control' is the reference); to linearize, put "
     "ct.ss(ct.tf(*ct.pade(delay, n))) in its place",
-    discrete="in discrete time k samples late is ct.tf(1, [1] + [0] * k, dt), and nlctl.sampled "
-    "has delay=...",
+    continuous=f"needs continuous time: {_DISCRETE}",
+    shared="past",
+    discrete=_DISCRETE,
 )
 
 

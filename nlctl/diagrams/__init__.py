@@ -12,13 +12,13 @@ from .parameters import (
 )
 from .places import (
     Place,
-    continuous_blocks,
     initial_state,
     known_system,
     leaves,
     not_a_system,
     places,
     state_names,
+    supplied_blocks,
 )
 from .standing import handed, standing
 from .third_party import Apart, apart
@@ -30,7 +30,6 @@ __all__ = [
     "apart",
     "as_system",
     "check_read",
-    "continuous_blocks",
     "handed",
     "initial_state",
     "interconnect",
@@ -46,4 +45,5 @@ __all__ = [
     "samplings",
     "standing",
     "state_names",
+    "supplied_blocks",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +10,11 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
-from ..blocks import Block, default_state, within
+from ..blocks import Block, default_state, supplied_of, within
 from ..errors import DiagramError, ParameterError
 from ..names import Parameters, find_name
 from ..params import as_numbers
+from ..supplied import Supplied
 from ..upstream.control_internals import StandIn
 
 
@@ -106,26 +107,20 @@ def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
     return isinstance(diagram.params, Parameters) and diagram.params.scope is not None
 
 
-def continuous_blocks(
-    system: Any, chosen: Callable[[Any], bool], why: str, shared: str
-) -> list[Block]:
-    """Return chosen blocks of a diagram, in the order of its blocks; each stands there once.
+def supplied_blocks(system: Any, how: Supplied | None = None) -> list[Block]:
+    """Return the blocks of a diagram whose outputs are supplied, in its order; each is there once.
 
     Parameters
     ----------
     system : control.InputOutputSystem
         A diagram or a block.
-    chosen : callable
-        Whether a block is one of them.
-    why : str
-        Why it needs continuous time, for the error.
-    shared : str
-        What two places would share, for the error.
+    how : Supplied, optional
+        Only those that are supplied in this way.
 
     Returns
     -------
     list of Block
-        Those that `chosen` is true of.
+        Transport delays and ideal relays, for example.
 
     Raises
     ------
@@ -135,14 +130,15 @@ def continuous_blocks(
     found: dict[int, Block] = {}
     for leaf in leaves(system):
         made = within(leaf.system)
-        if not chosen(made):
+        own = supplied_of(made)
+        if own is None or how not in (None, own):
             continue
         kind = type(made.spec).__name__
         if made is not leaf.system or not ct.isctime(system) or made.dt not in (0, None):
-            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {why}")
+            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {own.continuous}")
         if id(made) in found:
             raise DiagramError(
-                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {shared} for "
+                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {own.shared} for "
                 "both: make a block of each"
             )
         found[id(made)] = made

@@ -17,8 +17,8 @@ import control as ct
 import numpy as np
 
 from ..blocks import supplied_of
-from ..delays.lines import delayed_blocks, is_delayed
-from ..diagrams import Apart, apart, override
+from ..delays.transport import PAST
+from ..diagrams import Apart, apart, override, supplied_blocks
 from ..diagrams.points import SHAKEN, PointValues, agree, explained, values_now
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
@@ -230,7 +230,7 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointVal
     lines, point = _lines(compiled, trial, point)
     with supplying(lines), happening():
         rates, outputs = values_now(system, point)
-    arriving = [line.arriving for made, line in lines.items() if is_delayed(made)]
+    arriving = [line.arriving for made, line in lines.items() if supplied_of(made) is PAST]
     after, rows = [], list(compiled.program.sampled)
     for what in trial.meetings:
         now = frozenset(moment._replace(owner=trial.of(moment.owner)) for moment in what)
@@ -307,7 +307,7 @@ def _lines(compiled: Compiled, trial: Trial, point: Any) -> tuple[dict[Any, Supp
     lines = {trial.of(nodes[i].system): _line(np.array([v])) for i, v in trial.relays.items()}
     at = own
     system = trial.of(compiled.schedule.system)
-    for made in delayed_blocks(system) if compiled.schedule.lines else ():
+    for made in supplied_blocks(system, PAST) if compiled.schedule.lines else ():
         count = made.noutputs or 0
         values = u[at : at + count]
         lines[made], at = _line(values), at + count

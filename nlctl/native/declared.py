@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks import equation_now
-from ..sliding.blocks import slides
+from ..blocks import equation_now, supplied_of
+from ..sliding.relay import SLIDING
 from ..upstream.control_internals import parts_now
 from ..wording import numbered
 from .diagram.nodes import Node
@@ -33,13 +33,16 @@ def declared_rows(schedule: Schedule, program: Program, located: int) -> np.ndar
 
     What an ideal relay declares is of its input's rate too, and is compared as it slides.
     """
-    signed = [
-        not slides(n.system) for n in schedule.nodes for _ in range(count_switching_functions(n))
-    ]
-    kept = [not slides(node.system) for node in schedule.nodes for _ in memory(node)]
+    signed = [_is_own(n) for n in schedule.nodes for _ in range(count_switching_functions(n))]
+    kept = [_is_own(node) for node in schedule.nodes for _ in memory(node)]
     unknown = located - len(schedule.watched)
     others = len(schedule.watched) + len(program.guards)
     return np.flatnonzero([*signed, *[False] * unknown, *[True] * others, *kept])
+
+
+def _is_own(node: Node) -> bool:
+    """Whether a block's jumps follow from its input alone, and not from the input's rate."""
+    return supplied_of(node.system) is not SLIDING
 
 
 def declared_labels(schedule: Schedule) -> tuple[list[str], list[str]]:
@@ -82,5 +85,5 @@ def _each(nodes: Sequence[Node]) -> Iterator[tuple[tuple[str, int], Node]]:
     """Yield what each block declares: the function's name and its number of values."""
     for node in nodes:
         for what, count in _DECLARED.items():
-            if count(node) and not slides(node.system):
+            if count(node) and _is_own(node):
                 yield (what, count(node)), node

@@ -14,7 +14,8 @@ from scipy.linalg import expm
 
 from ..arguments import number
 from ..blocks import Block
-from ..delays.lines import delayed_blocks
+from ..delays.transport import PAST
+from ..diagrams import supplied_blocks
 from ..errors import (
     CompileError,
     InexactWarning,
@@ -86,7 +87,7 @@ def tangent(reading: Reading) -> Tangent:
 def _tangent(reading: Reading) -> Tangent:
     found = reading.equations
     if reading.schedule.lines:
-        delays = ", ".join(f"'{b.name}'" for b in delayed_blocks(reading.system))
+        delays = ", ".join(f"'{b.name}'" for b in supplied_blocks(reading.system, PAST))
         raise CompileError(
             f"'{reading.system.name}' has the transport delays {delays}, and so no finite state: "
             "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "

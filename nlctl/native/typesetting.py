@@ -17,14 +17,14 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
-from ..blocks import Block
+from ..blocks import Block, supplied_of
 from ..diagrams import known_system, overridden
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
 from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
-from ..sliding.blocks import slides
+from ..sliding.relay import SLIDING
 from .diagram.feedthrough import feedthrough
 from .diagram.nodes import Node
 from .diagram.parameters import Slot, slots_of
@@ -149,7 +149,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
 
 def _outputs(reader: Reader, system: Any) -> Tracer:
     """Return the outputs; of an ideal relay with letters for a and b of its input's rate."""
-    if slides(system):
+    if supplied_of(system) is SLIDING:
         return reader.relay_output(0, leaf_vector(reader.graph, "u", 0, (1 + len(_RATE),)))
     return reader.outputs(0, ())
 
@@ -223,7 +223,7 @@ def _vector(names: list[str], at: int) -> tuple[Callable[[str], str], int]:
 
 def _symbols(system: Any, slots: Mapping[str, Slot]) -> Callable[[str, Index], str]:
     """Return what names a place in one of the arrays that a block reads."""
-    inputs = [*system.input_labels, *(_RATE if slides(system) else ())]
+    inputs = [*system.input_labels, *(_RATE if supplied_of(system) is SLIDING else ())]
     labels = {"x": _names(system.state_labels), "u": _names(inputs)}
     declared = declared_params(system.spec) if isinstance(system, Block) else {}
 

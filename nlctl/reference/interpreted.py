@@ -10,8 +10,8 @@ import control as ct
 import numpy as np
 from scipy import integrate
 
-from ..delays.lines import delayed_blocks
-from ..diagrams import apart, override
+from ..delays.transport import PAST
+from ..diagrams import apart, override, supplied_blocks
 from ..errors import DivergedError, ParameterError, UsageError
 from ..names import unknown
 from ..responses.arguments import (
@@ -24,7 +24,7 @@ from ..responses.arguments import (
 from ..responses.event_log import event_log
 from ..responses.time_response import Response, as_response, response_of
 from ..sampling.system import happening
-from ..sliding.blocks import SLIDING, sliding_blocks
+from ..sliding.relay import SLIDING
 from ..upstream.control_internals import rates_now
 from .driver import Driver
 from .jumps import Jumps
@@ -55,7 +55,7 @@ def python_control_response(
     system, times = apart(run.system).system, run.times
     params = override(system, run.params)
     run = replace(run, system=system, params=params)  # from here on this run's own copy
-    for made in sliding_blocks(system):
+    for made in supplied_blocks(system, SLIDING):
         raise UsageError(f"block '{made.name}' {SLIDING.why}")
     # a function that declares no numbers of inputs or states gets what it is given
     inputs = run.inputs if system.ninputs is None else input_array(system, run.inputs, times)
@@ -106,7 +106,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     system, times, (inputs, x0, wanted), (method, settings) = run.system, run.times, given, how
     begin, end, at = float(times[0]), float(times[-1]), _linear(times, inputs)
     conditions = Known() if known is None else known(system, run.params, times, run.watched)
-    past = Past(delayed_blocks(system), begin, end, (settings["rtol"], settings["atol"]))
+    past = Past(supplied_blocks(system, PAST), begin, end, (settings["rtol"], settings["atol"]))
     jumps = Jumps(system, at, conditions, (run.watched, dict(run.params or {})), past.leaving)
     grid = times if wanted is None else np.union1d(times, wanted)
     driver = Driver(

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..blocks import Block
-from ..delays.lines import is_delayed
+from ..blocks import Block, supplied_of
+from ..delays.transport import PAST
 from ..diagrams import state_names
 from ..errors import CompileError, ParameterError
 from ..names import find_name, unknown
@@ -97,7 +97,7 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
             f"'{name}' says when samples are taken: derivatives by clocks are not known; take "
             "differences of runs"
         )
-    if is_delayed(owner.system) and key == "delay":
+    if supplied_of(owner.system) is PAST and key == "delay":
         raise CompileError(
             f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
             "nobody keeps; take differences of runs"

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..blocks import supplied_of
 from ..errors import CompileError
 from ..expressions.arrays import Tracer
 from ..expressions.continuity import may_jump
@@ -20,7 +21,7 @@ from ..native.diagram.program import Program, count_switching_functions, memory
 from ..native.diagram.trace import traced_arguments
 from ..native.equations.blocks import Equations, equations
 from ..native.sliding.pieces import replaced_parts
-from ..sliding.blocks import slides
+from ..sliding.relay import SLIDING
 from .branches import jumping
 from .directions import (
     Direction,
@@ -190,7 +191,7 @@ def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Ex
 def _jumps(node: Node) -> bool:
     """Whether the memories of a block jump, whatever its inputs do."""
     graph, system = Graph(), node.system
-    if slides(system):
+    if supplied_of(system) is SLIDING:
         return True
     try:
         given = traced_arguments(graph, system, slots_of(system))

@@ -15,6 +15,9 @@ SLIDING = Supplied(
     "diagram, and python-control does not look at these: use nlctl.input_output_response(diagram, "
     "...) in machine code and nlctl.compile(diagram).linearize, or nlctl.Relay, which has "
     "hysteresis",
+    continuous="slides in continuous time only: sampled it switches once a sample, as a block that "
+    "returns np.sign(u) does",
+    shared="output",
     rates=2,  # a and b of the rate u' = a + b v that the whole diagram gives its input
 )
 

@@ -57,7 +57,7 @@ SEVERAL = {  # never one: of a fixed size, or another text is written for one
     ("nlctl.analysis.robustness.uncertainty.design", "rows"),
     ("nlctl.analysis.robustness.uncertainty.design", "columns"),
     ("nlctl.analysis.robustness.uncertainty.design", "MOST_HELD // columns"),
-    ("nlctl.analysis.studies.page.rows", "len(worst)"),
+    ("nlctl.analysis.pages.study.rows", "len(worst)"),
     ("nlctl.analysis.studies.replay", "count"),
     ("nlctl.analysis.studies.result", "count"),
     ("nlctl.native.integrate.methods.tableau", "stages - 1"),

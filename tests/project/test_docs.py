@@ -13,9 +13,9 @@ from nlctl.analysis.report.outline import ANSWERS
 from nlctl.analysis.robustness.stl.text import parse_formula
 from nlctl.analysis.robustness.uncertainty.quantity import QUANTILES
 from nlctl.analysis.studies import StudyError, read_study
-from nlctl.analysis.studies.file.resolve import uncertain
 from nlctl.analysis.studies.file.schema import Law
 from nlctl.analysis.studies.kinds import KINDS
+from nlctl.analysis.studies.resolve import uncertain
 
 GUIDE = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
 

@@ -10,10 +10,10 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.text import Text
 from studies_example import HEAD, write
 
+from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.report.document import Figure
 from nlctl.analysis.report.outline import claim_status
 from nlctl.analysis.studies import read_study, run
-from nlctl.analysis.studies.page.report import study_report
 
 LIMITS = {"refuted": 0.02, "not shown yet": 0.13, "shown": 0.3}  # of a probability of 0.13
 ASKED = '[[analysis]]\nkind = "{kind}"\nlimit = {limit}\nkey = "{key}"\n'

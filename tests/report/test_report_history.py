@@ -19,11 +19,11 @@ from test_report_page import HOSTILE, LADDER, Reader
 from typer.testing import CliRunner
 
 from nlctl.analysis.cli.main import app
+from nlctl.analysis.pages.study.histories import Histories
+from nlctl.analysis.pages.study.rows import fan_items
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import Figure, History, Report, Section, render_html, write_report
 from nlctl.analysis.report.history import chart, thinned
-from nlctl.analysis.studies.page.histories import Histories
-from nlctl.analysis.studies.page.rows import fan_items
 from nlctl.errors import UsageError
 
 VENDOR = ROOT / "analysis" / "report" / "vendor" / "uplot"

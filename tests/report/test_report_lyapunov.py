@@ -17,12 +17,13 @@ from nlctl.analysis.lyapunov.loop.roles import read_parts
 from nlctl.analysis.lyapunov.loop.signals import equality, inequality
 from nlctl.analysis.lyapunov.nussbaum.long_run import LongRun, long_run
 from nlctl.analysis.lyapunov.nussbaum.property import antiderivative, lobe_around
+from nlctl.analysis.pages import proof as ledger_text
+from nlctl.analysis.pages.notation import formulas
 from nlctl.analysis.paper import BOUND
 from nlctl.analysis.paper.burst import through_the_burst
 from nlctl.analysis.paper.evidence import far_runs_in_background
 from nlctl.analysis.paper.figures import after_burst
 from nlctl.analysis.paper.page import proof_text as text
-from nlctl.analysis.paper.page.notation import formulas
 from nlctl.analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_sections
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.paper.reference_run import (
@@ -95,11 +96,11 @@ def test_proved_checked_and_violated_lines_stand_in_tables_of_their_own(number):
     for table in tables([section]):
         stands.setdefault(table.caption, set()).update(row[1] for row in table.rows)
         assert table.status == "status"
-    assert stands[text.PROVED] == {"proved", "computed"}
-    assert stands[text.CHECKED] == {"checked"}
-    assert stands[text.FAILING] == {"violated as printed"}
-    assert stands[text.LEFT_OPEN] <= {"undecided", "not applicable"}
-    assert text.VIOLATED not in stands
+    assert stands[ledger_text.PROVED] == {"proved", "computed"}
+    assert stands[ledger_text.CHECKED] == {"checked"}
+    assert stands[ledger_text.FAILING] == {"violated as printed"}
+    assert stands[ledger_text.LEFT_OPEN] <= {"undecided", "not applicable"}
+    assert ledger_text.VIOLATED not in stands
 
 
 def test_a_violated_line_comes_first_and_says_what_follows():
@@ -112,7 +113,7 @@ def test_a_violated_line_comes_first_and_says_what_follows():
     bad = dataclasses.replace(one, ledger=dataclasses.replace(one.ledger, lines=broken))
     section = next(s for s in lyapunov_sections({2: bad}) if s.key == "proof-2")
     first = tables([section])[0]
-    assert first.caption == text.VIOLATED
+    assert first.caption == ledger_text.VIOLATED
     (row,) = first.rows
     assert row[:2] == ("(31)", "violated")
     assert row[-1].endswith("THE END")

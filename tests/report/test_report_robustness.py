@@ -22,6 +22,10 @@ from nlctl.analysis import figures as figures
 from nlctl.analysis.cli.study_report import report_study
 from nlctl.analysis.figures.labels import plain
 from nlctl.analysis.figures.runs import upper_envelope
+from nlctl.analysis.pages.study.claims import claims, refusal, verdict
+from nlctl.analysis.pages.study.histories import histories
+from nlctl.analysis.pages.study.report import study_part, study_report, study_sections
+from nlctl.analysis.pages.study.rows import margin_items, row_items
 from nlctl.analysis.report import render_html, render_json
 from nlctl.analysis.report.document import Figure, Paragraph, Section, Table
 from nlctl.analysis.report.outline import claim_status, place_anchors
@@ -29,13 +33,9 @@ from nlctl.analysis.robustness import Space, Uncertain, confidence_sequence, ind
 from nlctl.analysis.robustness.search.radius import size_of
 from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
-from nlctl.analysis.studies.kind import kind_of, unanswered
+from nlctl.analysis.studies.kind import unanswered
 from nlctl.analysis.studies.kinds import KINDS
-from nlctl.analysis.studies.page.claims import claims, refusal, verdict
 from nlctl.analysis.studies.page.deviations import deviations_table
-from nlctl.analysis.studies.page.histories import histories
-from nlctl.analysis.studies.page.report import study_part, study_report, study_sections
-from nlctl.analysis.studies.page.rows import margin_items, row_items
 from nlctl.analysis.studies.page.running import running
 from nlctl.analysis.studies.page.text import margin_text, violate, without_assumptions
 from nlctl.errors import UsageError
@@ -222,7 +222,7 @@ def test_every_analysis_has_a_section_that_is_not_empty(result, report, page):
 
 def test_every_kind_of_analysis_has_title_and_methods(result):
     """The study of this module asks for all of them, and none has an empty text."""
-    assert {kind_of(asked) for asked in result.study.analysis} == set(KINDS)
+    assert {asked.definition for asked in result.study.analysis} == set(KINDS)
     assert all(kind.title and kind.answers and kind.method for kind in KINDS)
     assert len({kind.title for kind in KINDS}) == len({kind.name for kind in KINDS}) == len(KINDS)
 

@@ -10,12 +10,12 @@ from rows import each_row
 from studies_example import HEAD, LOOP, ROWS, write
 
 from nlctl.analysis import figures
+from nlctl.analysis.pages.study.histories import histories, limits_of_requirements
+from nlctl.analysis.pages.study.loop import StudyLoop, loop_of, loop_sections
+from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.report import Equation, Figure, Table, render_html
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
 from nlctl.analysis.studies import read_study, run
-from nlctl.analysis.studies.page.histories import histories, limits_of_requirements
-from nlctl.analysis.studies.page.loop import StudyLoop, loop_of, loop_sections
-from nlctl.analysis.studies.page.report import study_report
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def sections(study):
     result, prepared = study
-    return {s.key: s for s in loop_sections(loop_of(prepared), result, "", 2)}
+    return {s.key: s for s in loop_sections(loop_of(prepared), result)}
 
 
 def test_the_source_is_that_of_the_users_file_with_its_hash(study, sections):
@@ -72,7 +72,7 @@ def test_a_loop_without_formulas_or_blocks_is_shown_as_far_as_it_goes(study):
         return np.frombuffer(x.tobytes()) * -1.0
 
     single = ct.nlsys(secret, None, states=["x"], outputs=["x"], name="single")
-    made = {s.key: s for s in loop_sections(StudyLoop(diagram=single, maker="f"), result, "", 2)}
+    made = {s.key: s for s in loop_sections(StudyLoop(diagram=single, maker="f"), result)}
     assert not [i for i in made["study_loop"].items if isinstance(i, Figure)]
     assert "no formulas of this loop" in made["study_equations"].items[0].text
     assert "study_source" not in made

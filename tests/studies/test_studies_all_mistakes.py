@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from nlctl.analysis.studies.file.errors import StudyError
-from nlctl.analysis.studies.file.parse import read_study
+from nlctl.analysis.studies.reading.parse import read_study
 
 STUDY = """
 loop = "example-1"

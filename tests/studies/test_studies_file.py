@@ -11,8 +11,8 @@ from nlctl import ParameterError, paper
 from nlctl.analysis.robustness import nominal, resolved
 from nlctl.analysis.studies import StudyError, from_toml, read_study, to_toml
 from nlctl.analysis.studies.file.errors import line_numbers, place_text
-from nlctl.analysis.studies.file.own_kinds import model_of
 from nlctl.analysis.studies.file.schema import keyed
+from nlctl.analysis.studies.reading.own_kinds import model_of
 from nlctl.names import unknown
 
 

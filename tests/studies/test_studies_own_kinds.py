@@ -12,10 +12,10 @@ from rows import each_row
 
 from nlctl import DeadZone
 from nlctl.analysis.cli.study_report import report_study
+from nlctl.analysis.pages.study.report import study_part, study_report
 from nlctl.analysis.report.document import Figure, Paragraph, Table
 from nlctl.analysis.studies import Asked, Kind, StudyError, load_result, plan, read_study, run
 from nlctl.analysis.studies.folder import remove_run
-from nlctl.analysis.studies.page.report import study_part, study_report
 from nlctl.errors import UsageError
 
 LOOP = '''

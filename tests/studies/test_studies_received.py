@@ -73,8 +73,8 @@ ARGUMENTS = {  # functions of others, with what makes them dangerous
     "nlctl.native.machine.store:stored": 'key = "x"',
     "nlctl.analysis.cli.loops:named_loop": 'name = "{0}/evil.py:loop"',
     "nlctl.analysis.cli.report:write_gallery_of": 'folder = "{0}", open_ = false',
-    "nlctl.analysis.studies.file.resolve:named_function": 'name = "{0}/evil.py:loop", folder = "/"',
-    "nlctl.analysis.studies.file.resolve:option": 'value = 1, folder = "/"',
+    "nlctl.analysis.studies.resolve:named_function": 'name = "{0}/evil.py:loop", folder = "/"',
+    "nlctl.analysis.studies.resolve:option": 'value = 1, folder = "/"',
     "nlctl.analysis.studies.code.loading:load_file": 'path = "{0}/evil.py"',
     "nlctl.analysis.studies.code.record:remember": "statements = []",
     "nlctl.analysis.studies:read_study": 'path = "{0}/evil.toml", trust = true',
@@ -127,7 +127,7 @@ import pandas
 import pandas as table
 from pandas import read_pickle
 from numpy import load as opened
-from nlctl.analysis.studies.file.resolve import named_function
+from nlctl.analysis.studies.resolve import named_function
 
 partial = functools.partial(read_pickle)
 cached = functools.lru_cache(read_pickle)

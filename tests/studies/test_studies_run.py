@@ -33,7 +33,6 @@ from nlctl.analysis.studies import (
 )
 from nlctl.analysis.studies.file.schema import keyed
 from nlctl.analysis.studies.folder import load_finding, load_run, save_finding
-from nlctl.analysis.studies.kind import kind_of
 from nlctl.analysis.studies.sealed import origin_key
 from nlctl.analysis.studies.whole.contents import seal
 
@@ -207,12 +206,12 @@ def test_a_replay_tells_a_difference(result):
     table = before.tables["rows"].copy()
     table.loc[3, "iae"] = np.nextafter(table.loc[3, "iae"], np.inf)
     save_finding(result.folder, replace(before, tables=before.tables | {"rows": table}), origin)
-    seal(result)
+    seal(result, origin)
     try:
         made = replay(result.folder, 3, "worst-case")
     finally:
         save_finding(result.folder, before, origin)
-        seal(result)
+        seal(result, origin)
     assert made.differences == ("iae",)
     assert "1 column differs" in str(made)
     assert "The loop is the same; so are all versions: another processor?" in str(made)
@@ -412,7 +411,7 @@ def test_failed_rows_count_as_the_least_margin_of_the_others(failing):
     made = {"shares": ("indices", sobol_indices), "effects": ("effects", elementary_effects)}
     for key, (name, analysis) in made.items():
         asked = keyed(file.study)[key]
-        design = kind_of(asked).design(asked, space, file.study.study.seed)
+        design = asked.definition.design(asked, space, file.study.study.seed)
         end = solution(design.table, 2.0)
         margin = (0.5 - np.fmax(solution(design.table, 1.0), end)) / 0.5
         if asked.of == "spec":

@@ -7,7 +7,7 @@ from command_line import nlctl_here
 from studies_example import HEAD, ROWS, write
 
 from nlctl.analysis.studies import StudyError, read_study
-from nlctl.analysis.studies.file.resolve import loop_function
+from nlctl.analysis.studies.resolve import loop_function
 from nlctl.errors import ParameterError
 
 MARK = "import pathlib\npathlib.Path({mark!r}).touch()\n"

@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -22,9 +22,11 @@ from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
+from ..proofs.kind import ProofKind
+from ..proofs.result import ProofResult
 from .motion import StateRates, motion_of
 
-__all__ = ["Barrier", "barrier"]
+__all__ = ["BARRIER", "Barrier", "barrier"]
 
 _STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
@@ -37,7 +39,7 @@ _Term = tuple[int, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Barrier:
+class Barrier(ProofResult):
     """A polynomial B with B <= 0 at all starts, B > 0 in all that is unsafe, B' < 0 where B = 0.
 
     No trajectory from a start comes to what is unsafe, or leaves the box, at any time.
@@ -52,15 +54,8 @@ class Barrier:
         Powers of z in each term.
     coefficients : ndarray
         Of the terms.
-    holds : bool
-        Whether it is proved; otherwise nothing is known.
-    reason : str
-        What is missing.
-    boxes : int
-        Boxes of all proofs.
-    seconds : float
-    arithmetic : str
-        What proved it.
+    box : Box
+        Where was looked.
 
     Examples
     --------
@@ -72,16 +67,13 @@ class Barrier:
     half: np.ndarray
     terms: tuple[_Term, ...]
     coefficients: np.ndarray
-    holds: bool
-    reason: str
-    boxes: int
-    seconds: float
+    box: Box
     arithmetic: str = "floats rounded outwards"
 
     @property
-    def status(self) -> Literal["proved", "undecided"]:
-        """Whether it is proved."""
-        return "proved" if self.holds else "undecided"
+    def claim(self) -> str:
+        """What is proved, in words."""
+        return "safe for all time" if self.holds else "no barrier is proved"
 
     def value(self, x: Sequence[float]) -> float:
         """Return B at a state.
@@ -216,7 +208,7 @@ def barrier(
             break
     return Barrier(
         names=problem.motion.names, middle=problem.middle, half=problem.half, terms=problem.terms,
-        coefficients=coefficients, holds=not reason, reason=reason, boxes=boxes,
+        coefficients=coefficients, holds=not reason, reason=reason, boxes=boxes, box=box,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
@@ -391,3 +383,11 @@ def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
     if result.x is None or result.x[-1] <= 1e-7:
         return None
     return result.x[:-1]
+
+
+BARRIER = ProofKind(
+    name="barrier",
+    about="starts and states that are unsafe",
+    result=Barrier,
+    find="barrier",
+)

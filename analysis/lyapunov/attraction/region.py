@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -16,18 +16,20 @@ from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
+from ..proofs.kind import ProofKind
+from ..proofs.result import ProofResult
 from .level import ProvedLevel, largest_level, quadratic_of
 from .motion import StateRates, motion_of
 from .proposals import fitted, from_linear_part
 
-__all__ = ["AttractionRegion", "region_of_attraction"]
+__all__ = ["ATTRACTION", "AttractionRegion", "region_of_attraction"]
 
 _AT_REST = 1e-9  # of the rates at an equilibrium
 _ROUNDS = 3  # of proposals that grow
 
 
 @dataclass(frozen=True, kw_only=True)
-class AttractionRegion:
+class AttractionRegion(ProofResult):
     """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`.
 
     Attributes
@@ -43,15 +45,10 @@ class AttractionRegion:
         The least level that was tried and is not proved.
     refuted : dict or None
         A point with V <= `above` where V does not fall.
-    reason : str
-        What ends the region.
     floor : float
         Down to it V' <= -1e-9 is proved by enclosures, below it by those of the Jacobian.
-    boxes : int
-        Boxes of all proofs.
-    seconds : float
-    arithmetic : str
-        What proved it.
+    box : Box
+        Where was looked.
 
     Examples
     --------
@@ -64,16 +61,16 @@ class AttractionRegion:
     level: float
     above: float
     refuted: dict[str, float] | None
-    reason: str
     floor: float
-    boxes: int
-    seconds: float
+    box: Box
     arithmetic: str = "floats rounded outwards, balls for the linear part"
 
     @property
-    def status(self) -> Literal["proved", "undecided"]:
-        """Whether there is a region."""
-        return "proved" if self.level > 0 else "undecided"
+    def claim(self) -> str:
+        """What is proved, in words."""
+        if not self.holds:
+            return "no region of attraction is proved"
+        return f"from V <= {self.level:.6g} everything goes to the equilibrium"
 
     def value(self, x: Sequence[float]) -> float:
         """Return V at a state.
@@ -95,7 +92,7 @@ class AttractionRegion:
         where = ", ".join(f"{n} = {v:.6g}" for n, v in (self.refuted or {}).items())
         end = f"; {self.above:.6g} is not: {self.reason}" + (f", {where}" if where else "")
         how = counted(self.boxes, "box", "boxes")
-        if self.status == "proved":
+        if self.holds:
             return f"V <= {self.level:.6g} proved on {how}{end}"
         return f"undecided: {self.reason}"
 
@@ -184,8 +181,8 @@ def region_of_attraction(
         where = dict(zip(motion.names, map(float, best.refuted), strict=True))
     return AttractionRegion(
         names=motion.names, at=point, P=best.V.P, level=best.level, above=best.above,
-        refuted=where, reason=best.reason, floor=best.floor, boxes=boxes,
-        seconds=time.perf_counter() - start,
+        refuted=where, holds=best.level > 0, reason=best.reason, floor=best.floor, box=box,
+        boxes=boxes, seconds=time.perf_counter() - start,
     )  # fmt: skip
 
 
@@ -246,3 +243,11 @@ def _positive_definite(P: Any, n: int) -> np.ndarray:
             f"{str(P)[:60]}"
         )
     return matrix
+
+
+ATTRACTION = ProofKind(
+    name="region of attraction",
+    about="an equilibrium with a stable linear part",
+    result=AttractionRegion,
+    find="region_of_attraction",
+)

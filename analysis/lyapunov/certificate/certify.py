@@ -1,33 +1,33 @@
-"""Bounds that hold for all time: which proof a loop is one for."""
+"""The proofs that there are, and bounds that hold for all time: which proof a loop is one for."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import control as ct
 import numpy as np
 
 from nlctl.annotations import as_annotated
-from nlctl.controllers import KnownSignLaw
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import integer
 
 from ...intervals.box import Box
-from ...loop_record import loop_facts
+from ..attraction.barrier import BARRIER
+from ..attraction.region import ATTRACTION
 from ..bounds.decomposition import check_gain
 from ..loop.roles import declared, record_of
-from ..model_reference.closing import certify_model_reference
-from ..model_reference.model_certificate import ModelReferenceCertificate
-from ..model_reference.model_loop import is_model_reference
-from .known_sign_proof import Certificate, certify_known_sign
-from .sliding_mode import SlidingModeCertificate, certify_sliding_mode, is_sliding_mode
+from ..model_reference.closing import MODEL_REFERENCE
+from ..proofs.kind import ProofOptions, certified
+from ..proofs.result import Certificate
+from .known_sign import KNOWN_SIGN
+from .sliding_mode import SLIDING_MODE
 
-__all__ = ["AnyCertificate", "certify"]
+__all__ = ["PROOFS", "certify"]
 
-AnyCertificate = Certificate | ModelReferenceCertificate | SlidingModeCertificate
+PROOFS = (MODEL_REFERENCE, SLIDING_MODE, KNOWN_SIGN, ATTRACTION, BARRIER)
+"""The kinds of proof; a loop is proved by the first of those that it fits."""
 
 
 @as_annotated
@@ -42,7 +42,7 @@ def certify(
     u_max: float = 250.0,
     tol: float = 1e-3,
     max_iterations: int = 60,
-) -> AnyCertificate:
+) -> Certificate:
     """Prove a bound of the tracking error for all time, or say why it cannot be proved.
 
     Which proof it is depends on the controller.  With `nlctl.KnownSignLaw`: |r| <= C_0 by (31) with
@@ -86,8 +86,9 @@ def certify(
 
     Returns
     -------
-    Certificate, ModelReferenceCertificate or SlidingModeCertificate
-        The proved bounds with their constants and box, or why there are none.
+    Certificate
+        The proved bounds with their constants and box, or why there are none: a
+        `KnownSignCertificate`, `SlidingModeCertificate` or `ModelReferenceCertificate`.
 
     Raises
     ------
@@ -143,34 +144,25 @@ def certify(
         if not 0 < value < np.inf:
             raise ParameterError(f"certify needs a finite {name} > 0, got {value}")
     check_gain("certify", k)
-    how: dict[str, Any] = {
-        "params": params, "inputs": inputs, "starts": starts, "k": k, "tol": tol,
-        "max_iterations": max_iterations,
-    }  # fmt: skip
-    found = _certified(loop, W, u_max, how)
-    return replace(found, params=dict(params or {}), loop_facts=loop_facts(loop))
-
-
-def _certified(loop: Any, W: Any, u_max: float, how: Mapping[str, Any]) -> AnyCertificate:
-    """Return what the proof finds that is one for the loop's controller."""
-    if is_model_reference(loop):
-        return certify_model_reference(loop, W=W, u_max=u_max, **how)
-    if W is not None:
+    kind = next((kind for kind in PROOFS if kind.fits is not None and kind.fits(loop)), None)
+    if W is not None and not (kind and kind.takes_W):
         raise ParameterError("certify takes W for loops with a reference model only")
-    if is_sliding_mode(loop):
-        return certify_sliding_mode(loop, **how)
-    _refuse_others(loop)
-    return certify_known_sign(loop, u_max=u_max, **how)
+    if kind is None:
+        _refuse_others(loop)
+        kind = KNOWN_SIGN  # which says what else the loop lacks
+    return certified(kind, loop, ProofOptions(
+        params=params, inputs=inputs, starts=starts, k=k, W=W, u_max=u_max, tol=tol,
+        max_iterations=max_iterations,
+    ))  # fmt: skip
 
 
 def _refuse_others(loop: Any) -> None:
     """Refuse a loop whose law is none that there is a proof for."""
     for place in leaves(loop) if isinstance(loop, ct.InterconnectedSystem) else ():
         spec = record_of(place)
-        known = spec is None or isinstance(spec, KnownSignLaw)
-        if "u" in declared(place, "outputs") and not known:
+        if "u" in declared(place, "outputs") and spec is not None:
+            laws = ", ".join(kind.about for kind in PROOFS if kind.fits is not None)
             raise DiagramError(
-                "certify has proofs for a KnownSignLaw or a SlidingModeLaw, and for a "
-                "ModelReferenceLaw or DirectLaw with a ReferenceModel, got "
-                f"{type(spec).__name__} in the place of '{place.path}' and no ReferenceModel"
+                f"certify has proofs for {laws}, got {type(spec).__name__} in the place of "
+                f"'{place.path}' and no ReferenceModel"
             )

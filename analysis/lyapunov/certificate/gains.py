@@ -17,9 +17,10 @@ from nlctl.response import input_output_response
 
 from ...metrics import peak
 from ..bounds.decomposition import decompose
-from .known_sign import KnownSignLoop, read_loop
-from .known_sign_proof import Certificate, bound_of_r, certify_known_sign
-from .plant_bounds import Demand, demand
+from ..proofs.filtered import Demand, demand
+from ..proofs.result import Certificate
+from .certify import certify
+from .known_sign import KnownSignLoop, bound_of_r, read_known_sign
 
 __all__ = ["GainCandidate", "GainDesign", "design"]
 
@@ -160,7 +161,7 @@ def design(
     horizon = number("design", "horizon", horizon, above=0)
     evaluations = integer("design", "evaluations", evaluations, at_least=1)
     max_steps = integer("design", "max_steps", max_steps, at_least=1)
-    read = read_loop(loop)
+    read = read_known_sign(loop)
     if read.nodes and not read.parts.gains.sigma_1 > 0:
         raise ParameterError("design needs sigma_1 > 0, otherwise alpha_1 = 0; got sigma_1 = 0")
     split = decompose(read.parts.actuator, k=k, u_max=u_max, tol=1e-3)
@@ -214,7 +215,7 @@ def _bound(loop: KnownSignLoop, table: list[Demand]) -> tuple[float, float]:
 
     Between two boxes of the table delta* is interpolated in C.
     """
-    excess = [float(bound_of_r(loop, need.delta_star)[0]) / need.C for need in table]
+    excess = [float(bound_of_r(loop, need.delta_star).level) / need.C for need in table]
     closing = int(np.argmax(np.array(excess) < 1)) if min(excess) < 1 else None
     if closing is None:
         return np.inf, float(np.log(min(excess)))
@@ -225,7 +226,7 @@ def _bound(loop: KnownSignLoop, table: list[Demand]) -> tuple[float, float]:
     for _ in range(60):
         share = (C - below.C) / (above.C - below.C)
         delta = (1 - share) * below.delta_star + share * above.delta_star
-        C = float(bound_of_r(loop, delta)[0])
+        C = float(bound_of_r(loop, delta).level)
     return C, 0.0
 
 
@@ -246,7 +247,7 @@ def _proved(
     """Prove the best trial that keeps the limit; if that fails, the next one."""
     allowed = [t for t in trials if np.isfinite(t.C_0) and t.u <= u_limit]
     for trial in sorted(allowed, key=lambda t: t.C_0)[:5]:
-        certificate = certify_known_sign(loop, params=trial.gains, **how)
+        certificate = certify(loop, params=trial.gains, **how)
         if certificate.holds:
             return GainDesign(
                 gains=trial.gains,

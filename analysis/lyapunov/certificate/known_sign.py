@@ -1,9 +1,21 @@
-"""Reading a loop with `nlctl.KnownSignLaw`: what its certificate is about."""
+r"""A bound that holds for all time: the loop with `nlctl.KnownSignLaw`, proved by intervals.
+
+With W = 0 in (19), which is as good as any other fixed W, and as long as x stays in a box on which
+delta* >= |g + d + G eps_u| and k G >= 1/N_0 hold,
+
+.. math:: V' \le -\alpha_1 V + 0.2785 (\tau \delta^* + b) + \sigma_2 \delta^{*2} / 2, \quad
+   \alpha_1 = \min\{2\beta, \sigma_1 \Gamma, \sigma_2 \gamma\},
+
+hence |r| <= C_0 = sqrt(2 max{V(0), alpha_0/alpha_1}), alpha_0 being all that stands behind
+-alpha_1 V.  A bound C of |r| gives the box, the box gives delta*, and delta* gives C_0(C).
+No Nussbaum function and no Lemma 1 take part.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from flint import arb
@@ -16,17 +28,24 @@ from nlctl.controllers import (
     RobustTerm,
     Zero,
 )
-from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
-from ..bounds.starts import Sides, Starts
+from ...intervals.arithmetic import Ball
+from ...intervals.branch_and_bound import upper
+from ..bounds.decomposition import decompose
+from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..loop.checked import read_checked
-from ..loop.plant_form import Acceleration, acceleration
-from ..loop.roles import PIECES, Parts, Roles, read_parts
+from ..loop.external_inputs import disturbed
+from ..loop.roles import PIECES, Parts, has_law, read_parts
+from ..proofs.filtered import Demand, FilteredLoop, as_filtered, between, demand, feedforward
+from ..proofs.filtered_certificate import FilteredCertificate
+from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
+from ..proofs.result import FROM_STARTS, Row, per_second
+from ..proofs.saved import Content
 
-__all__ = ["KnownSignLoop", "filtered_error", "initial_errors", "read_loop"]
+__all__ = ["KNOWN_SIGN", "KnownSignCertificate", "KnownSignLoop", "bound_of_r", "read_known_sign"]
 
-PROVED_FOR = {
+_PROVED_FOR = {
     "reference": (SumOfSines,),
     "filtered_error": (FilteredError,),
     "basis": (GaussianBasis,),
@@ -34,38 +53,26 @@ PROVED_FOR = {
     "robust": (RobustTerm,),
     "law": (KnownSignLaw,),
 }
+_OUTWARD = 1 + arb("1e-14")  # covers what the products of float gains round off
+_LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 
 @dataclass(frozen=True, kw_only=True)
-class KnownSignLoop:
+class KnownSignLoop(FilteredLoop):
     """The records of a loop with `nlctl.KnownSignLaw`, and where it starts.
 
     Attributes
     ----------
     parts : Parts
         Records of the blocks, and the gains.
-    reference : SumOfSines
-    starts : Starts
-        Initial states.
-    e0 : tuple of n arb
-        Initial errors e_1(0), ..., e_n(0): of all starts.
     delta_hat_0 : arb
     W_hat_0 : tuple of arb
         Initial estimates, of all starts.
-    acceleration : callable
-        x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
     """
 
     parts: Parts
-    reference: SumOfSines
-    starts: Starts
-    e0: tuple[arb, ...]
     delta_hat_0: arb
     W_hat_0: tuple[arb, ...]
-    acceleration: Acceleration
-    disturbance: float = 0.0
 
     @property
     def law(self) -> KnownSignLaw:
@@ -73,26 +80,73 @@ class KnownSignLoop:
         return self.parts.law
 
     @property
-    def lambdas(self) -> tuple[float, ...]:
-        """lambda_1, ..., lambda_{n-1} of the filtered error."""
-        return self.parts.filtered_error.lambdas
-
-    @property
     def nodes(self) -> int:
         """Number of nodes of the network; 0 without one."""
         return len(self.parts.gains.W_hat_0)
 
-    def states(self, part: str) -> list[str]:
-        """Names of the states of a part."""
-        return self.starts.names_of(self.parts.roles.places[part])
 
-    @property
-    def r_0(self) -> arb:
-        """r(0) of (14)."""
-        return filtered_error(self.lambdas, self.e0)
+@dataclass(frozen=True, kw_only=True)
+class KnownSignCertificate(FilteredCertificate):
+    """What `certify` proved of a loop with `nlctl.KnownSignLaw`: |r| <= C_0 for all time.
+
+    Attributes
+    ----------
+    alpha_0, alpha_1, V_0 : float
+        The constants of V' <= -alpha_1 V + alpha_0, and V(0).
+
+    Examples
+    --------
+    See `certify`.
+    """
+
+    alpha_0: float
+    alpha_1: float
+    V_0: float
+
+    def _rows(self) -> Iterator[Row]:
+        split, need, sure, n = self.split, self.region, self._sure, len(self.loop.e0)
+        gain, over = self.loop.law.N_0 * split.k_1 * need.G_min, str(need.box)
+        rate = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}"
+        drive = "0.2785 (tau delta* + b) + sigma_2 delta*^2/2"
+        yield from self._of_plant()
+        yield "N_0 k_1 G_min", gain, "1", sure, "must be at least 1", over
+        yield "alpha_0", self.alpha_0, per_second(2 * n - 1), sure, drive, over
+        yield "alpha_1", self.alpha_1, "1/s", "computed", rate, "all t"
+        yield "V(0)", self.V_0, per_second(2 * n - 2), sure, "(21) with W = 0", "all starts"
+        if self.holds:
+            error, how = per_second(n - 1), "sqrt(2 max{V(0), alpha_0/alpha_1})"
+            yield "C_0", self.C_0, error, "proved", how, FROM_STARTS
+            how = "sqrt(2 alpha_0/alpha_1)"
+            yield "limsup |r|", self.ultimate, error, "proved", how, "t -> infinity"
+            how = "from V <= C_0^2/2 and the box"
+            yield "max |u|", self.u_max, "1", "proved", how, FROM_STARTS
+
+    def _numbers(self) -> tuple[Mapping[str, float], Content]:
+        loop = self.loop
+        names = sorted(("sigma_1", "sigma_2", "Gamma", "gamma", "beta", "tau", "b"))
+        gains = {name: getattr(loop.parts.gains, name) for name in names}
+        return gains | {"N_0": loop.law.N_0}, {
+            "plant": loop.states("plant"),
+            "weights": loop.states("weights") if loop.nodes else [],
+            "delta_hat": loop.states("robust")[:1],
+        }
+
+    def _bound(self) -> str:
+        return f"|r| <= {self.C_0:.6g} proved for all t"
 
 
-def read_loop(
+@dataclass(frozen=True, kw_only=True)
+class _BoundOfR:
+    """C_0, alpha_0, alpha_1 and V(0) for W = 0 and a bound delta*."""
+
+    level: arb
+    drive: arb
+    rate: float
+    V_0: arb
+    doubt: str = field(default="")
+
+
+def read_known_sign(
     loop: Any,
     params: Mapping[str, Any] | None = None,
     inputs: Mapping[str, float] | None = None,
@@ -100,33 +154,87 @@ def read_loop(
 ) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
     parts = read_parts(loop, params=params, inputs=True)
-    checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs, starts)
+    read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
     return KnownSignLoop(
+        **as_filtered(read),
         parts=parts,
-        reference=parts.roles.spec("reference"),
-        starts=checked.starts,
-        e0=initial_errors(parts.roles, checked.start("plant")),
-        delta_hat_0=between(*checked.start("robust")[0]),
-        W_hat_0=tuple(between(*ends) for ends in checked.start("weights")) if parts.weights else (),
-        acceleration=acceleration(checked.roles.places["plant"]),
-        disturbance=checked.disturbance,
+        delta_hat_0=between(*read.start("robust")[0]),
+        W_hat_0=tuple(between(*ends) for ends in read.start("weights")) if parts.weights else (),
     )
 
 
-def between(low: float, high: float) -> arb:
-    """Return an interval."""
-    return arb(low) if low == high else arb(low).union(arb(high))
+def _begin(loop: Any, options: ProofOptions) -> Subject:
+    read = read_known_sign(loop, options.params, options.inputs, options.starts)
+    actuator, u_max, tol = read.parts.actuator, options.u_max, options.tol
+    split = disturbed(decompose(actuator, k=options.k, u_max=u_max, tol=tol), read.disturbance)
+    return Subject(
+        loop=read, start=abs(read.r_0), actuator=actuator, split=split, u_max=u_max, tol=tol
+    )
 
 
-def filtered_error(lambdas: Sequence[float], e: Sequence[arb]) -> arb:
-    """Return r of (14)."""
-    coefficients = (*map(arb, reversed(lambdas)), arb(1))
-    return sum((a * b for a, b in zip(coefficients, e, strict=True)), arb(0))
+def _region(subject: Subject, level: arb) -> Demand:
+    C = wider(upper(level), subject.tol)
+    return demand(subject.loop, subject.split, C, tol=subject.tol)
 
 
-def initial_errors(roles: Roles, sides: Sides) -> tuple[arb, ...]:
-    """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
-    reference = roles.spec("reference")
-    yd = reference.output(0.0, (), (), equation_arguments(reference))
-    # the radius covers what double precision has lost in yd(0)
-    return tuple(between(*x) - arb(float(y), 1e-12) for x, y in zip(sides, yd, strict=False))
+def bound_of_r(loop: KnownSignLoop, delta_star: float) -> _BoundOfR:
+    """Return what follows from a bound delta*."""
+    gains, delta = loop.parts.gains, Ball(arb(delta_star))
+    rate = alpha_1(gains)
+    drive = alpha_0(gains, delta, 0.0).value * _OUTWARD
+    start = dataclasses.replace(gains, r_0=Ball(loop.r_0), delta_hat_0=Ball(loop.delta_hat_0))
+    squares: Any = sum((Ball(w) ** 2 for w in loop.W_hat_0), Ball(arb(0)))
+    V_0 = arb(upper(initial_V(start, delta, squares).value * _OUTWARD))
+    level = (2 * V_0.max(drive / rate * _OUTWARD)).sqrt()
+    return _BoundOfR(level=level, drive=drive, rate=rate, V_0=V_0)
+
+
+def _bound(subject: Subject, need: Demand) -> _BoundOfR:
+    found = bound_of_r(subject.loop, need.delta_star)
+    least, N_0 = subject.split.k_1 * need.G_min, subject.loop.law.N_0
+    if not upper(found.level) < _LIMIT or arb(N_0) * subject.split.k_1 * need.G_min >= 1:
+        return found
+    doubt = f"k G may be {least:.4g} on {need.box}: Assumption 3 fails there"
+    if least > 0:
+        doubt = f"N_0 = {N_0:g} is below 1/(k_1 G_min) = {1 / least:.6g}"
+    return dataclasses.replace(found, doubt=doubt)
+
+
+def _endless(need: Demand, iterations: Sequence[float]) -> str:
+    return "" if iterations[-1] < _LIMIT else without_end("C_0(C)", iterations)
+
+
+def _largest_input(subject: Subject, need: Demand, found: _BoundOfR) -> float:
+    """Bound |u| <= N_0 (beta |r| + |W_hat^T psi| + |delta_hat| + |Y_d|) from V <= C_0^2 / 2."""
+    loop, C_0, gains = subject.loop, found.level, subject.loop.parts.gains
+    s = feedforward(loop, need) + arb(need.delta_star) + C_0 * arb(gains.gamma).sqrt()
+    s = s + C_0 * (arb(gains.Gamma) * loop.nodes).sqrt()
+    return upper(loop.law.N_0 * (loop.law.beta * C_0 + s))
+
+
+def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
+    found = closed.bound
+    return {
+        "C_0": closed.proved(upper(found.level)),
+        "ultimate": closed.proved(upper((2 * found.drive / found.rate * _OUTWARD).sqrt())),
+        "u_max": closed.proved(closed.u),
+        "alpha_0": upper(found.drive),
+        "alpha_1": found.rate,
+        "V_0": upper(found.V_0),
+        "loop": subject.loop,
+    }
+
+
+KNOWN_SIGN = ProofKind(
+    name="known sign",
+    about="a KnownSignLaw",
+    result=KnownSignCertificate,
+    fits=lambda loop: has_law(loop, KnownSignLaw),
+    bounded="|r|",
+    begin=_begin,
+    region=_region,
+    bound=_bound,
+    endless=_endless,
+    largest_input=_largest_input,
+    found=_found,
+)

@@ -18,7 +18,7 @@ import numpy as np
 from nlctl.annotations import as_annotated
 from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
-from nlctl.diagrams import Place, initial_state, interconnect, overridden
+from nlctl.diagrams import Place, initial_state, interconnect, leaves, overridden
 from nlctl.diagrams.points import values_now
 from nlctl.errors import CompileError, DiagramError
 from nlctl.native.diagram.checks import check_functions, check_sizes
@@ -73,6 +73,13 @@ class Roles:
 def record_of(place: Place) -> Any:
     """Return the record of a block with the parameters of the latest run; None if it has none."""
     return place.system.current_spec if type(place.system) is Block else None
+
+
+def has_law(loop: Any, law: type) -> bool:
+    """Whether a diagram has a block with such a record."""
+    return isinstance(loop, ct.InterconnectedSystem) and any(
+        isinstance(record_of(place), law) for place in leaves(loop)
+    )
 
 
 def declared(place: Place, kind: str) -> list[str]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,12 +11,10 @@ from nlctl.controllers import ProjectedWeights
 from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.wording import counted
 
-from ..bounds.decomposition import Decomposition
-from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
-from ..certificate.saved import save_certificate
 from ..loop.external_inputs import ADDED
+from ..proofs.result import FROM_STARTS, Certificate, Row, per_second
+from ..proofs.saved import Content
 from .matching import Matching
-from .region import Region
 from .saved import model_attempts
 
 __all__ = ["ModelReferenceCertificate"]
@@ -27,7 +23,7 @@ _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigm
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelReferenceCertificate(Shown):
+class ModelReferenceCertificate(Certificate):
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
@@ -35,15 +31,8 @@ class ModelReferenceCertificate(Shown):
 
     Attributes
     ----------
-    name : str
-        Of the loop.
-    holds : bool
-        True: the bounds hold for all t >= 0 from the starts, proved.
-    reason : str
-        Why they hold, or why not.
     e : float
-        Bound of |e| = |E_1| for all time, from all `starts`; infinite, as all bounds, if nothing is
-        proved.
+        Bound of |e| = |E_1| for all time, from all `starts`.
     errors : tuple of n floats
         Bounds of |E_1|, ..., |E_n| for all time.
     W_error : float
@@ -61,12 +50,6 @@ class ModelReferenceCertificate(Shown):
         Bound of V for all time, and the largest V(0) of the starts.
     alpha_0, alpha_1 : float
         V' <= -alpha_1 V + alpha_0; NaN where the modification gives no such inequality.
-    iterations : tuple of float
-        Bounds of V: the iteration that closed or was given up.
-    region : Region
-        The box and its constants at the last step.
-    split : Decomposition
-        Of the actuator.
     matching : Matching
         What the weights are to learn, and what is left.
     how, end : str
@@ -77,9 +60,6 @@ class ModelReferenceCertificate(Shown):
     See `certify`.
     """
 
-    name: str
-    holds: bool
-    reason: str
     e: float
     errors: tuple[float, ...]
     W_error: float
@@ -91,9 +71,6 @@ class ModelReferenceCertificate(Shown):
     V_0: float
     alpha_0: float
     alpha_1: float
-    iterations: tuple[float, ...]
-    region: Region = field(repr=False)
-    split: Decomposition = field(repr=False)
     matching: Matching = field(repr=False)
     how: str
     end: str
@@ -103,22 +80,16 @@ class ModelReferenceCertificate(Shown):
         """The weights that the bounds are about."""
         return tuple(map(float, self.matching.W))
 
-    @property
-    def constants(self) -> tuple[Constant, ...]:
-        """Every constant of the proof; without the bounds if nothing is proved."""
-        rows = [*self._of_loop(), *self._of_box(), *(self._bounds() if self.holds else ())]
-        return tuple(
-            Constant(symbol=s, value=float(v), unit=per, provenance=p, how=how, over=where)
-            for s, v, per, p, how, where in rows
-        )
+    def _rows(self) -> Iterator[Row]:
+        yield from self._of_loop()
+        yield from self._of_box()
+        if self.holds:
+            yield from self._bounds()
 
-    def _of_loop(self) -> Iterator[tuple[Any, ...]]:
-        match, split, n = self.matching, self.split, self.matching.loop.order
+    def _of_loop(self) -> Iterator[Row]:
+        match, n = self.matching, self.matching.loop.order
         form, over = match.loop.form, "all t"
-        k = (split.provenance, split.how, split.over)
-        yield "k_1", split.k_1, "1", *k
-        yield "k_2", split.k_2, "1", *k
-        yield "eps_u*", split.eps_star, "1", *k
+        yield from self._of_split()
         yield "beta", match.beta, per_second(n), "computed", "coefficient of v in x_n'", "all x"
         yield "lambda", match.lam, "1", "computed", "beta k / gain of the law, must be > 0", "all x"
         size = match.W_squared**0.5
@@ -127,14 +98,13 @@ class ModelReferenceCertificate(Shown):
         yield "mu", form.mu, "1/s", "proved", "Q - mu P > 0, Q = -(A^T P + P A) exactly", "all E"
         q = float(int(form.q.p) / int(form.q.q))
         yield "q", q, "1", "computed", "b^T P Q^-1 P b, rational", "all E"
-        if match.loop.disturbance:
-            yield "sup |w|", match.loop.disturbance, "1", "given", ADDED, over
+        if self.disturbance:
+            yield "sup |w|", self.disturbance, "1", "given", ADDED, over
         yield "sup |yd|", match.loop.command, "1", "proved", "enclosed", over
 
-    def _of_box(self) -> Iterator[tuple[Any, ...]]:
+    def _of_box(self) -> Iterator[Row]:
         need, n = self.region, self.matching.loop.order
-        sure = "given" if self.split.provenance == "given" else "proved"
-        over, box = f"V <= {need.C:.6g}", need.box
+        over, box, sure = f"V <= {need.C:.6g}", need.box, self._sure
         for i, name in enumerate(model_state_names(n)):
             how = "E^T P E of the model, driven by yd"
             yield f"sup |{name}|", box[name][1], per_second(i), "proved", how, FROM_STARTS
@@ -150,7 +120,7 @@ class ModelReferenceCertificate(Shown):
             yield "alpha_1", self.alpha_1, "1/s", "computed", rate, over
             yield "alpha_0", self.alpha_0, "1/s", sure, _ALPHA_0, over
 
-    def _bounds(self) -> Iterator[tuple[Any, ...]]:
+    def _bounds(self) -> Iterator[Row]:
         always = FROM_STARTS
         yield "V", self.V_max, "1", "proved", self.how, always
         for i, error in enumerate(self.errors):
@@ -170,16 +140,8 @@ class ModelReferenceCertificate(Shown):
         ball = "; the ball of the projection is invariant" if projected else ""
         return f"|W| + |W_hat - W|{ball}"
 
-    def _saved(self, file: Any) -> Path:
-        attempts = lambda: model_attempts(self.matching, self.split, self.region.C)  # noqa: E731
-        return save_certificate(file, "reference model", self.name, attempts)
+    def _attempts(self) -> Iterator[Content]:
+        return model_attempts(self.matching, self.split, self.C)
 
-    @property
-    def examined(self) -> Any:
-        """The loop as the proof has read it."""
-        return self.matching.loop
-
-    @property
-    def bound(self) -> str:
-        """What is proved, in words."""
+    def _bound(self) -> str:
         return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end,"

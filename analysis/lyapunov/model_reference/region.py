@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from flint import arb
@@ -47,6 +47,8 @@ class Region:
         Proved bound of |delta|: of the rest, and of what the actuator and inputs add.
     boxes : int
         Boxes of the proof.
+    arithmetic : {"balls"}
+        What proved it.
     """
 
     C: float
@@ -59,6 +61,7 @@ class Region:
     rest: float
     D: float
     boxes: int
+    arithmetic: Literal["balls"] = "balls"
 
 
 def model_reach(match: Matching) -> arb:
@@ -71,7 +74,7 @@ def model_reach(match: Matching) -> arb:
 
 def region(match: Matching, split: Decomposition, C: arb, *, tol: float) -> Region:
     """Bound all signals, and delta, while V <= C."""
-    C = arb(upper(C))  # the bound that is told, and no smaller one
+    C = arb(upper(C))  # the bound that is reported, and no smaller one
     loop, model = match.loop, model_reach(match)
     errors = tuple(map(upper, loop.form.errors(C)))
     modelled = tuple(map(upper, loop.model_form.errors(model)))

@@ -15,7 +15,7 @@ from nlctl.plants import coordinate_names
 from ...intervals.normal_form import exact
 from ...intervals.written import operations
 from ..bounds.decomposition import Decomposition
-from ..certificate.saved import Content, split_content, starts_content, texts
+from ..proofs.saved import Content, split_content, starts_content, texts
 from .decrease import Decrease, decrease
 from .matching import Matching
 from .quadratic_form import QuadraticForm

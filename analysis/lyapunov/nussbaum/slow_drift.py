@@ -30,8 +30,8 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 
-from ..loop.nussbaum_law import law_of_response
 from .energy import Drift, drift
+from .law import law_of_response
 from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
 __all__ = ["Balance", "SlowDrift", "burst_peak", "slow_drift"]
@@ -226,7 +226,7 @@ def slow_drift(
         The Nussbaum function of the law.
     loop : control.InterconnectedSystem or Compiled, optional
         The loop that the response is of: N is then that of its law, and it is checked that the
-        loop is one that this is about, see `nlctl.analysis.lyapunov.loop.nussbaum_law`.
+        loop is one that this is about, see `nlctl.analysis.lyapunov.nussbaum.law`.
     window : float, optional
         Length of the windows (s) over which rates are averaged; whole periods of the reference,
         of which the default holds four for the paper's.

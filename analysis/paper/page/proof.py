@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from ... import figures
-from ...lyapunov.ledger import Line
 from ...lyapunov.nussbaum.long_run import LongRun
+from ...pages.notation import formulas
+from ...pages.proof import ledger_section
 from ...report.document import Figure, Item, Paragraph, Section, Table
 from ..burst import Burst
 from ..evidence import FAR_HORIZONS, LOOK, Evidence, evidence
 from ..figures import after_burst
 from . import proof_text as text
-from .notation import formulas
 from .proof_text import LONG_RUN
 
-__all__ = ["LONG_RUN", "Evidence", "evidence", "ledger_tables", "lyapunov_sections"]
-
-_GROUPS = (  # of the ledger's lines, each a table of its own
-    (("violated",), "corrected", text.VIOLATED),
-    (("proved", "computed"), None, text.PROVED),
-    (("checked",), None, text.CHECKED),
-    (("violated",), "paper", text.FAILING),
-    (("undecided", "not applicable"), None, text.LEFT_OPEN),
-)
+__all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
 
 def lyapunov_sections(
@@ -157,13 +149,7 @@ def _lemma() -> Section:
 def _example(number: int, one: Evidence) -> list[Section]:
     key = f"proof-{number}"
     return [
-        Section(
-            key=key,
-            title=f"Example {number}: the proof line by line",
-            level=3,
-            folded=True,
-            items=[Paragraph(text=text.ledger_text(one.ledger)), *ledger_tables(one.ledger.lines)],
-        ),
+        ledger_section(one.ledger, key, f"Example {number}: the proof line by line", level=3),
         Section(
             key=f"{key}-bound",
             title=f"Example {number}: V, its bound, and how far the bound is from what happens",
@@ -186,29 +172,6 @@ def _example(number: int, one: Evidence) -> list[Section]:
             items=[_constants(one)],
         ),
     ]
-
-
-def ledger_tables(lines: Sequence[Line]) -> Iterator[Table]:
-    """Yield the lines of a ledger as tables, one for each group of statuses."""
-    for statuses, reading, caption in _GROUPS:
-        group = [x for x in lines if x.status in statuses and reading in (None, x.reading)]
-        rows = [_row(line) for line in group]
-        if rows:
-            columns = ("line", "status", "statement", "least margin", "at (s)", "evidence")
-            yield Table(caption=caption, columns=columns, rows=rows, status="status")
-
-
-def _row(line: Line) -> tuple[str, ...]:
-    least, at = ("" if np.isnan(x) else f"{x + 0.0:.4g}" for x in (line.least, line.time))
-    told = formulas(line.evidence)
-    if not np.isnan(line.first):
-        told = f"{told}, first at {line.first:.4g} s"
-    if line.follows:
-        told = f"{told}. What follows: {formulas(line.follows)}"
-    status = line.status
-    if status == "violated" and line.reading == "paper":
-        status = "violated as printed"  # the paper's statement is wrong, nothing of ours
-    return line.key, status, formulas(line.statement), least, at, told
 
 
 def _bound(key: str, one: Evidence) -> Iterator[Item]:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from ...lyapunov.conservatism import Conservatism
-from ...lyapunov.ledger import Ledger
 from ...lyapunov.nussbaum.long_run import LOOKS, LongRun
 from ...lyapunov.nussbaum.slow_drift import SlowDrift
+from ...pages.notation import formulas
 from ..burst import Burst
 from ..evidence import Evidence
-from .notation import formulas
 
 _IMPORT = "import nlctl; from nlctl.analysis.lyapunov.nussbaum.long_run import long_run"
 LONG_RUN = f'python -c "{_IMPORT}; print(long_run(nlctl.paper.example_2(), rtol=1e-8))"'
@@ -75,20 +72,6 @@ LEMMA = (
     r"cannot change its sign. A bound for all time needs another law: with the sign of the gain "
     r"known, nlctl.analysis.lyapunov.certify proves one, shown with each example below.",
 )
-PROVED = (
-    "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
-    "in closed form."
-)
-CHECKED = (
-    "Only checked: seen to hold at every sample of this run, up to rounding. That is not a proof "
-    "for other runs, nor between samples. “Literal”: with q cos(w t) counted to g(x), as the paper "
-    "has it, and with the d* and eps* of that g; the corrected line counts it to d."
-)
-VIOLATED = (
-    "Violated: statements of the proof in their corrected form that do not hold along this run."
-)
-FAILING = "False as the paper has it: statements as printed, or as the paper uses them."
-LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 V_CAPTION = (
     r"\(V\) of (21) against its bounds: the level of (34), which is \(C_0^2/2\), the bound (32) "
     r"that depends on time, and the part \(r^2/2\) that the filtered error has in \(V\). \(I\) and "
@@ -182,19 +165,6 @@ def forecast_text(forecast: SlowDrift) -> tuple[str, str]:
         first, last = forecast.burst_range
         return f"burst at {forecast.burst:.0f} s", f"{first:.0f} to {last:.0f} s"
     return forecast.verdict, ""
-
-
-def ledger_text(found: Ledger) -> str:
-    """Return the ledger in a paragraph: what is violated, and how many lines are what."""
-    own = ", ".join(line.key for line in found.violated)
-    paper = ", ".join(line.key for line in found.failing)
-    count = Counter(line.status for line in found.lines)
-    told = ", ".join(f"{number} {status}" for status, number in count.items())
-    return (
-        f"Corrected statements violated: {own or 'none'}. False as the paper has them: "
-        f"{paper or 'none'}. One run over {found.horizon:g} s; of {len(found.lines)} lines "
-        f"{told}. The constants hold on the box {formulas(str(found.constants.box))}."
-    )
 
 
 def shares_caption(c: Conservatism) -> str:

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 
 from nlctl.diagrams import leaves
-from nlctl.drawing.picture import draw
 
 from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
+from ...pages.diagram import diagram_figure
 from ...report.document import Figure, History, Item, Paragraph, Report, Section, Table, versions
 from ...report.equations import equations_of
 from .. import CASES, HORIZON, TAIL, CaseRun, Check, checks
@@ -116,15 +116,10 @@ def _model() -> Section:
 def _example(number: int, runs: _Runs, compared: Sequence[Check]) -> list[Section]:
     run = runs[str(number)]
     diagram = run.case.diagram
-    blocks = ", ".join(system.name for system in diagram.syslist)
     key = f"example-{number}"
     tracking, control, *others = _time_histories(key, run)
-    picture = Figure(
-        key=f"{key}-diagram",
-        caption="The closed loop as simulated, and the inside of its controller.",
-        description=f"Block diagram of {diagram.name} with the blocks {blocks}.",
-        figure=draw(diagram, expand=True),
-    )
+    caption = "The closed loop as simulated, and the inside of its controller."
+    picture = diagram_figure(diagram, f"{key}-diagram", caption)
     equations = equations_of(diagram, ("plant", "actuator"), f"Ex. {number}")
     shown = [*equations, picture, tracking, control, _interactive(number, run)]
     folded: tuple[tuple[str, str, list[Item]], ...] = (

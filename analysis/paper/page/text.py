@@ -5,9 +5,9 @@ Text only.  The numbers in use are filled in from the blocks themselves.
 
 from __future__ import annotations
 
+from ...pages.study.loop import Published
 from ...report.document import Equation, Paragraph
 from ...studies.kinds.context import CLOPPER
-from ...studies.page.loop import Published
 
 CITATION = (
     "M. Lv, Y. Wang, S. Baldi, Z. Liu, C. Shi, C. Fu, X. Meng, Y. Qi: Adaptive Neural Control for "

@@ -238,7 +238,7 @@ def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
 def remember_code(study: Study, key: str, folder: Path) -> None:
     """Record that this user has run the code of a study."""
     kinds = [asked.kind for asked in study.analysis if ":" in asked.kind]
-    remember(_statements([*(name for _, name in named_in(study)), *kinds], key, folder))
+    remember([*_statements([*(name for _, name in named_in(study)), *kinds], key, folder)])
 
 
 def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:

@@ -1,1 +1,1 @@
-"""The study file: its shapes, what it names, every mistake at once."""
+"""What a study file may hold: TOML within limits, its shapes, and what is said of mistakes."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, ClassVar
+
 from pydantic import Field
 
 from .field_types import Names, Strict
@@ -12,25 +14,27 @@ __all__ = ["Asked", "Varied"]
 class Asked(Strict):
     """What a study file says of every analysis; the schema of a kind adds its own keys.
 
-    Examples
-    --------
-    The keys of a table of one's own, checked as those of nlctl's kinds are:
+        Examples
+        --------
+        The keys of a table of one's own, checked as those of nlctl's kinds are:
 
-    >>> from pydantic import Field
-    >>> from nlctl.analysis.studies import Asked
-    >>> class Spread(Asked):
-    ...     of: str = Field("spec", description="Column of the main table.")
-    ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
-    ...     @property
-    ...     def claim(self):
-    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
-    >>> Spread(kind="spread", limit=0.5).claim
-    'the spread is at most 0.5'
-    >>> Spread(kind="spread", limit=-1.0)
-    Traceback (most recent call last):
-    pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
-    limit
-      Input should be greater than 0 ...
+        >>> from typing import Any, ClassVar
+
+    from pydantic import Field
+        >>> from nlctl.analysis.studies import Asked
+        >>> class Spread(Asked):
+        ...     of: str = Field("spec", description="Column of the main table.")
+        ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
+        ...     @property
+        ...     def claim(self):
+        ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+        >>> Spread(kind="spread", limit=0.5).claim
+        'the spread is at most 0.5'
+        >>> Spread(kind="spread", limit=-1.0)
+        Traceback (most recent call last):
+        pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
+        limit
+          Input should be greater than 0 ...
     """
 
     key: str = Field(
@@ -40,6 +44,8 @@ class Asked(Strict):
     )
     title: str = Field("", description="Its heading in the report.")
     kind: str
+    definition: ClassVar[Any] = None
+    """The `Kind` of the table, once a file has named it."""
 
     @property
     def claim(self) -> str:

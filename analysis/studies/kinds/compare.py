@@ -33,12 +33,12 @@ from ...robustness.statistics.verdict import better_verdict
 from ..build import choice, inputs_of, metrics_of
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Names, Whole
-from ..file.resolve import option
 from ..file.schema import Choices
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..resolve import option
 from .context import CLOPPER, HOLM
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, made
-from ..page.rows import known
+from ..page.tables import known
 
 if TYPE_CHECKING:
     from ...report.document import Item

@@ -25,8 +25,7 @@ from ..finding import Finding
 from ..kind import Ground, Kind, Setup, made
 from ..page import text as text
 from ..page.deviations import found_rows
-from ..page.rows import status_text
-from ..page.text import DID_NOT_END, margin_text
+from ..page.text import DID_NOT_END, margin_text, status_text
 from .context import AUGER, HANSEN, SEARCHED
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from ... import figures as figures
 from ...report.document import Figure, Item, Table
-from .rows import known
+from .tables import known
 
 __all__ = ["deviations_table", "found_rows"]
 

@@ -1,8 +1,8 @@
-"""Tables of results on a page, and what a figure tells of a column."""
+"""Tables of results and quantities on a page, and what a figure says of a column."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import pandas as pd
@@ -10,7 +10,7 @@ import pandas as pd
 from ...report.document import Table
 from . import text as text
 
-__all__ = ["column_in_words", "result_table"]
+__all__ = ["column_in_words", "known", "result_table"]
 
 
 def column_in_words(column: Any) -> str:
@@ -33,3 +33,12 @@ def result_table(table: pd.DataFrame, caption: str, columns: Mapping[str, str]) 
 
 def _cell(value: Any) -> Any:
     return f"{value:.4g}" if isinstance(value, float) else value
+
+
+def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
+    """Return name and columns of every quantity, None where a choice has no such thing."""
+    table = quantities.reindex(columns=list(columns)).astype(object)
+    table = table.where(table.notna(), None)
+    if "unit" in columns:
+        table["unit"] = table["unit"].map(text.unit_text)
+    return table.itertuples(name=None)

@@ -8,53 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from nlctl.native import Status
 from nlctl.wording import some_of
 
 from ...figures import CLIP
 from ...report.typography import in_print
 from ...robustness.stl.spec import FAILED
 
-SPEC = (
-    "What is required of every run. A margin tells by how much a requirement holds, in multiples "
-    "of its bound: 0.2 means that 20 % of the bound are left; a run violates the spec unless the "
-    "least of its margins is above 0."
-)
-SPACE = (
-    "What is uncertain: nominal value, law, and the box that corners and searches stay in. "
-    "Everything else keeps its nominal value."
-)
-STATUS = "How the runs ended. A run that did not reach its end violates the spec."
-REQUIREMENTS = "Margins by requirement; the spec is the least of them."
-METRICS_CAPTION = (
-    "Metrics of the runs. Missing: runs that did not reach their end; they are not in the other "
-    "columns."
-)
-MARGINS_CAPTION = (
-    "Left: number of runs by margin. Right: share of the runs with at most that margin."
-)
-VIOLATIONS = " Orange: violations."
 CLIPPED = (
     f" Margins below −{CLIP:g}, and runs that did not reach their end, are drawn at −{CLIP:g}."
 )
-PART = (
-    "Short studies of what happens when parameters, initial states and disturbances differ from "
-    "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
-    "files reports/*.toml of nlctl are such studies."
-)
 SAME = "The same in numbers"
-DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
-ALL_PARAMETERS = "All parameters of the loop, with their values."
-PARAMETERS = (
-    "All parameters of the loop, with their values; varied: by which law the study changed them."
-)
-EQUATIONS_CAPTION = (
-    "Read from the functions that are run, block by block; letters are the names of signals, "
-    "parameters and local variables."
-)
-SOURCE = "As it was when this page was made:"
 ASSUMED = "What is assumed"
 WITH_ASSUMPTIONS = f" Assumptions: see “{ASSUMED}”."
-FOUND = "What was asked of the loop, and what was found."
 
 
 DID_NOT_END = "did not end"
@@ -97,3 +63,8 @@ def margin_text(value: float) -> str:
     if np.isnan(value) or value == -np.inf:
         return "NaN"
     return f"{value:.4g}" if value > -FAILED else DID_NOT_END
+
+
+def status_text(name: object) -> str:
+    """Return how a run ended, in words."""
+    return "reached the end" if name == Status.OK.name else str(name).lower().replace("_", " ")

@@ -29,8 +29,9 @@ _AT_TOP = ("study.toml", "run.json", "results.json")
 REMEDY = "continue the run with --resume, which makes it anew, or take an intact copy"
 
 
-def seal(result: Result, before: Mapping[str, Any] | None = None) -> None:
-    """Write the record of a folder, as it is now."""
+def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> None:
+    """Write what was found, from the origin with that key, and the record of the folder then."""
+    write_json(result.folder / "results.json", result.plain() | {"origin": key})
     folder, done = result.folder, [finding.key for finding in result.findings]
     files = list(_parts(folder, keyed(result.study)))
     digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in files}

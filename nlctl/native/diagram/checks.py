@@ -8,8 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import Block
-from ...delays.lines import is_delayed
+from ...blocks import Block, supplied_of
+from ...delays.transport import PAST
 from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
@@ -59,7 +59,7 @@ def _functions(system: Any) -> Iterator[tuple[str, Any]]:
         return
     if system.nstates:
         yield "update", system.updfcn
-    if system.noutputs != 0 and system.outfcn is not None and not is_delayed(system):
+    if system.noutputs != 0 and system.outfcn is not None and supplied_of(system) is not PAST:
         yield "output", system.outfcn
     if isinstance(system, Block):
         for name in ("switching", "commit"):

@@ -16,12 +16,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...blocks import within
-from ...delays.lines import delayed_blocks, is_delayed
-from ...diagrams import places, samplings
+from ...blocks import supplied_of, within
+from ...delays.transport import PAST
+from ...diagrams import places, samplings, supplied_blocks
 from ...responses.watched import Watched
 from ...sampling.system import Happening
-from ...sliding.blocks import slides, sliding_blocks
+from ...sliding.relay import SLIDING
 from ..purity.captured import Captured, noted
 from .checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
@@ -116,7 +116,7 @@ class Schedule:
 
         Ideal relays ask for them.
         """
-        has_relays = any(slides(node.system) for node in self.nodes)
+        has_relays = any(supplied_of(node.system) is SLIDING for node in self.nodes)
         return (self.system.ninputs or 0) if has_relays else 0
 
     @property
@@ -147,12 +147,11 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
         )
         for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)
     )
-    delayed_blocks(system)  # whether each can be
-    sliding_blocks(system)
+    supplied_blocks(system)  # whether each can be
     lines = tuple(
         Signal(i, k)
         for i, node in enumerate(nodes)
-        if is_delayed(node.system)
+        if supplied_of(node.system) is PAST
         for k in range(node.system.noutputs or 0)
     )
     outputs = [wiring.output(wiring.top, i) for i in range(system.noutputs or 0)]

@@ -9,7 +9,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...expressions.arrays import Tracer, as_array, scalar
+from ...expressions.arrays import Tracer, as_array, leaf_vector, scalar
 from ...expressions.graph import Expr, Graph
 from ...responses.watched import watches_nan
 from ...sampling.system import Happening
@@ -67,10 +67,11 @@ def equations(
     """Write a schedule as expressions."""
     system = schedule.system
     sizes = {"t": 1, "x": system.nstates or 0, "u": schedule.ninputs, "p": length(layout)}
+    graph = Graph(sizes)
     reader = Reader(
-        graph=Graph(sizes), layout=layout, blocks=schedule.nodes, p=p,
+        graph=graph, layout=layout, blocks=schedule.nodes, p=p,
         samplings={id(h.system): i for i, h in enumerate(schedule.holders)},
-        lines={line: (system.ninputs or 0) + k for k, line in enumerate(schedule.lines)},
+        supplied=_behind_delays(graph, schedule),
     )  # fmt: skip
     with np.errstate(all="ignore"):  # NumPy would warn of NaN that inputs have that are not known
         reader = with_sliding(reader, schedule)
@@ -102,6 +103,17 @@ def equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
         fixed_points=reader.fixed_points, conditions=found,
     )  # fmt: skip
+
+
+def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
+    """Return what leaves transport delays, by block: inputs behind those of the diagram."""
+    first, found = schedule.system.ninputs or 0, {}
+    for k, line in enumerate(schedule.lines):
+        i = line.block or 0
+        if line.index == 0:
+            shape = (schedule.nodes[i].system.noutputs,)
+            found[i] = leaf_vector(graph, "u", first + k, shape)
+    return found
 
 
 def _conditions(

@@ -58,12 +58,13 @@ class Reader:
         By name.
     what : frozenset of Moment
         What happens to sampled blocks.
-    lines : mapping
-        Outputs of transport delays, and which input stands for each.
     samplings : mapping
         Where in the layout the parameters of a sampling are, by its identity.
-    relays, moving : mapping
-        Outputs of ideal relays, and a and b of the rates u' = a + b v of their inputs.
+    supplied : mapping
+        Outputs of blocks that these alone cannot compute: of transport delays, further inputs of
+        the program; of ideal relays, what follows from the rates of the diagram.
+    moving : mapping
+        a and b of the rates u' = a + b v of the inputs of ideal relays.
     """
 
     graph: Graph
@@ -77,9 +78,8 @@ class Reader:
     solvers: dict[str, Solver] = field(default_factory=dict)
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
     what: Happening = frozenset()
-    lines: Mapping[Signal, int] = field(default_factory=dict)
     samplings: Mapping[int, int] = field(default_factory=dict)
-    relays: Mapping[int, Tracer] = field(default_factory=dict)
+    supplied: Mapping[int, Tracer] = field(default_factory=dict)
     moving: Mapping[int, Tracer] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:
@@ -165,10 +165,8 @@ class Reader:
 
     def _own_outputs(self, i: int, unknown: Collection[int]) -> Tracer:
         node, system = self.blocks[i], self.blocks[i].system
-        if Signal(i, 0) in self.lines:
-            return leaf_vector(self.graph, "u", self.lines[Signal(i, 0)], (system.noutputs,))
-        if i in self.relays:
-            return self.relays[i]
+        if i in self.supplied:
+            return self.supplied[i]
         linear = isinstance(system, ct.StateSpace)
         if not linear and (system.outfcn is None or not system.noutputs):
             return self._states(node)[: system.noutputs or 0]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields, replace
 
+from ...blocks import supplied_of
 from ...expressions.arrays import Tracer, concatenated, scalar
 from ...expressions.graph import Expr, Graph
-from ...sliding.blocks import slides
+from ...sliding.relay import SLIDING
 from ..diagram.nodes import Node
 from ..diagram.program import memory
 from ..diagram.schedule import Schedule
@@ -19,7 +20,7 @@ from .reader import Reader
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:
     """Return the numbers of the blocks that are ideal relays."""
-    return [i for i, node in enumerate(blocks) if slides(node.system)]
+    return [i for i, node in enumerate(blocks) if supplied_of(node.system) is SLIDING]
 
 
 def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
@@ -34,7 +35,13 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
     leaves = [graph.leaf(OUTPUTS, k, None) for k in range(len(places))]
     own = {i: _array(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
     first = replace(
-        reader, relays=own, signals={}, solved=[], solvers={}, fixed_points={}, calls={}
+        reader,
+        supplied={**reader.supplied, **own},
+        signals={},
+        solved=[],
+        solvers={},
+        fixed_points={},
+        calls={},
     )
     first.read(schedule)
     relays = [
@@ -55,9 +62,10 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
         behind=schedule.ninputs - schedule.rates,
     )  # fmt: skip
     found = sliding_rates(graph, relays, motion, output)
+    outputs = {i: _array(graph, [f.output]) for i, f in zip(places, found, strict=True)}
     return replace(
         reader,
-        relays={i: _array(graph, [f.output]) for i, f in zip(places, found, strict=True)},
+        supplied={**reader.supplied, **outputs},
         moving={i: _array(graph, [f.drift, f.gain]) for i, f in zip(places, found, strict=True)},
     )
 

@@ -26,8 +26,8 @@ def test_both_examples_have_bounds_that_are_no_looser(order):
     assert found.status == reference.status == "proved"
     assert found.C_0 <= reference.C_0 * (1 + 1e-9)
     assert found.u_max <= reference.u_max * (1 + 1e-9)
-    assert (found.demand.arithmetic, reference.demand.arithmetic) == ("floats", "balls")
-    need, other = found.demand, reference.demand
+    assert (found.region.arithmetic, reference.region.arithmetic) == ("floats", "balls")
+    need, other = found.region, reference.region
     assert need.matched <= other.matched * (1 + 1e-9)
     assert need.G_min >= other.G_min * (1 - 1e-9) or need.C > other.C
     shown = {row.symbol: row.how for row in found.constants}

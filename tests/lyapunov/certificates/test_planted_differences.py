@@ -370,7 +370,7 @@ class TestOfTheLoopAtHand:
             plant=plant(lambda t, x, u, p: (x[1], UPDATE(t, x, u, p)[1] + 60 * np.sin(3 * t)))
         )
         found = certify(loop)
-        assert found.demand.matched > 60
+        assert found.region.matched > 60
         assert found.C_0 > 2 * C_0
         assert found.holds
         assert largest_r(loop) <= found.C_0

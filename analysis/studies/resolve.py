@@ -15,13 +15,13 @@ from nlctl.host.former_name import present_name, warn_of_it
 from nlctl.names import unknown
 from nlctl.paper import named_example
 
-from ...catalogue import named_block
-from ...robustness import Uncertain
-from ...robustness.uncertainty.binding import check_keyword
-from ..code.loading import Admits, load_file
-from ..code.rule import Grant, check_defined, check_function, check_loop_function, check_place
-from ..kind import Kind
-from .schema import Law
+from ..catalogue import named_block
+from ..robustness import Uncertain
+from ..robustness.uncertainty.binding import check_keyword
+from .code.loading import Admits, load_file
+from .code.rule import Grant, check_defined, check_function, check_loop_function, check_place
+from .file.schema import Law
+from .kind import Kind
 
 __all__ = [
     "DEFAULT",

@@ -8,13 +8,12 @@ from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid
-from ..kind import kind_of
-from .text import without_assumptions
+from ...studies.page.text import without_assumptions
 
 if TYPE_CHECKING:
-    from ..file.asked import Asked
-    from ..finding import Finding
-    from ..result import Result
+    from ...studies.file.asked import Asked
+    from ...studies.finding import Finding
+    from ...studies.result import Result
 
 __all__ = ["claims", "refusal", "verdict"]
 
@@ -34,7 +33,7 @@ def verdict(result: Result) -> str:
         if these and result.complete:
             told.append(f"{answer.capitalize()}: {'; '.join(claimed)}.")
     asked = result.asked
-    statements = [f.sentence for f in result.findings if kind_of(asked[f.key]).is_statement]
+    statements = [f.sentence for f in result.findings if asked[f.key].definition.is_statement]
     if statements:
         told.append(statements[0])
     elif refused := refusal(result):
@@ -79,7 +78,7 @@ def _measured(finding: Finding, asked: Asked) -> dict[str, str]:
     """Return what was measured of a claim, its limit, and the margin between the two."""
     if not finding.is_answered:
         return {"measured": finding.sentence, "limit": "an answer"}
-    measured = kind_of(asked).measured
+    measured = asked.definition.measured
     if measured is None:
         told = {"measured": without_assumptions(finding.sentence), "limit": ""}
     else:

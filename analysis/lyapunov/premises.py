@@ -13,13 +13,13 @@ from nlctl.annotations import as_annotated
 from nlctl.params import equation_arguments
 from nlctl.plants import ForcedDuffing, duffing_forcing
 
-from ...intervals.arithmetic import as_ball
-from ...intervals.box import Box
-from ...intervals.branch_and_bound import enclose, upper
-from ..loop.integral import sharpest
-from .decomposition import Decomposition
-from .final_bound import Gains, alpha_0, alpha_1, total_error
-from .provenance import Constants, bound
+from ..intervals.arithmetic import as_ball
+from ..intervals.box import Box
+from ..intervals.branch_and_bound import enclose, upper
+from .bounds.decomposition import Decomposition
+from .bounds.final_bound import Gains, alpha_0, alpha_1, total_error
+from .constants import Constants, bound
+from .loop.integral import sharpest
 
 __all__ = ["Premises", "forcing_bound", "literal", "premises"]
 

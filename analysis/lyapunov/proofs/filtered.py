@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from flint import arb
 
+from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 from nlctl.wording import counted
@@ -21,33 +22,85 @@ from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, reference_bounds
 from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_function, range_of_quotient
-from ..loop.plant_form import Acceleration
+from ..bounds.starts import Starts
+from ..loop.checked import CheckedLoop
+from ..loop.plant_form import Acceleration, acceleration
+from ..loop.roles import Roles
 
-__all__ = ["Demand", "FilteredLoop", "demand", "feedforward"]
+__all__ = ["Demand", "FilteredLoop", "as_filtered", "between", "demand", "feedforward"]
 
 
-class FilteredLoop(Protocol):
-    """A loop whose controller sees the plant through the filtered error r of (14)."""
+@dataclass(frozen=True, kw_only=True)
+class FilteredLoop:
+    """A loop whose controller sees the plant through the filtered error r of (14).
+
+    Attributes
+    ----------
+    roles : Roles
+    reference : SumOfSines
+    starts : Starts
+        Initial states.
+    e0 : tuple of n arb
+        Initial errors e_1(0), ..., e_n(0): of all starts.
+    acceleration : callable
+        x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
+    disturbance : float
+        Bound of what external inputs add to the plant's v.
+    """
+
+    roles: Roles = field(repr=False)
+    reference: SumOfSines
+    starts: Starts
+    e0: tuple[arb, ...]
+    acceleration: Acceleration
+    disturbance: float = 0.0
+
+    @property
+    def law(self) -> Any:
+        """The control law."""
+        return self.roles.spec("law")
 
     @property
     def lambdas(self) -> tuple[float, ...]:
         """lambda_1, ..., lambda_{n-1} of the filtered error."""
-        ...
+        return self.roles.spec("filtered_error").lambdas
 
     @property
-    def reference(self) -> SumOfSines:
-        """What the plant shall follow."""
-        ...
+    def r_0(self) -> arb:
+        """r(0) of (14)."""
+        coefficients = (*map(arb, reversed(self.lambdas)), arb(1))
+        return sum((a * b for a, b in zip(coefficients, self.e0, strict=True)), arb(0))
 
-    @property
-    def e0(self) -> tuple[arb, ...]:
-        """Initial errors e_1(0), ..., e_n(0)."""
-        ...
+    def states(self, part: str) -> list[str]:
+        """Names of the states of a part."""
+        return self.starts.names_of(self.roles.places[part])
 
-    @property
-    def acceleration(self) -> Acceleration:
-        """x_n' as ``acceleration(t, x, v)``."""
-        ...
+
+def as_filtered(read: CheckedLoop) -> dict[str, Any]:
+    """Return the fields of a `FilteredLoop`."""
+    plant = read.roles.places["plant"]
+    return {
+        "roles": read.roles,
+        "reference": read.roles.spec("reference"),
+        "starts": read.starts,
+        "e0": _initial_errors(read),
+        "acceleration": acceleration(plant),
+        "disturbance": read.disturbance,
+    }
+
+
+def _initial_errors(read: CheckedLoop) -> tuple[arb, ...]:
+    """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
+    reference = read.roles.spec("reference")
+    yd = reference.output(0.0, (), (), equation_arguments(reference))
+    # the radius covers what double precision has lost in yd(0)
+    ends = zip(read.start("plant"), yd, strict=False)
+    return tuple(between(*x) - arb(float(y), 1e-12) for x, y in ends)
+
+
+def between(low: float, high: float) -> arb:
+    """Return an interval."""
+    return arb(low) if low == high else arb(low).union(arb(high))
 
 
 @dataclass(frozen=True, kw_only=True)

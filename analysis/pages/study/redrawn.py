@@ -7,10 +7,9 @@ from collections.abc import Callable
 from nlctl.errors import UsageError
 
 from ...robustness import Prepared
-from ..kind import kind_of
-from ..result import Result
-from ..run import reopened
-from ..sealed import RunFolderError, as_written
+from ...studies.result import Result
+from ...studies.run import reopened
+from ...studies.sealed import RunFolderError, as_written
 from .histories import Histories, histories
 
 __all__ = ["loop_again", "rows_again"]
@@ -43,7 +42,7 @@ def rows_again(
         told = [
             look(f)
             for f in result.findings
-            if (look := kind_of(result.asked[f.key]).witness) is not None and f.is_answered
+            if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
         ]
     witness = min(told, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

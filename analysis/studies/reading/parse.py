@@ -15,14 +15,22 @@ from pydantic import ValidationError
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError, UsageError
 
-from ...robustness import Experiment
 from ..code.record import study_digest
 from ..code.rule import Grant, Reach, named_in, remember_code, untrusted
-from .errors import KeyPath, Problem, StudyError, line_numbers, located, place_text, schema_problems
+from ..file.errors import (
+    KeyPath,
+    Problem,
+    StudyError,
+    line_numbers,
+    located,
+    place_text,
+    schema_problems,
+)
+from ..file.schema import Study
+from ..file.toml import check_depth, read_toml, study_text
+from ..kind import Setup
+from ..resolve import checked_definition
 from .own_kinds import model_of, own_kinds
-from .resolve import checked_definition
-from .schema import Study
-from .toml import check_depth, read_toml, study_text
 from .validate import checked_experiment
 
 __all__ = ["StudyFile", "read_study"]
@@ -37,16 +45,12 @@ _SPOKEN_OF = ("spec", "space", "runs")  # tables whose entries other parts of a 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StudyFile:
-    """A study without mistakes.
+class StudyFile(Setup):
+    """A study without mistakes, with the settings of the command line.
 
     Attributes
     ----------
     path : Path
-    study : Study
-        What stands in the file, with the settings of the command line.
-    experiment : Experiment
-        What is simulated for each row.
 
     Examples
     --------
@@ -54,13 +58,6 @@ class StudyFile:
     """
 
     path: Path
-    study: Study
-    experiment: Experiment
-
-    @property
-    def folder(self) -> Path:
-        """What paths in the study are relative to."""
-        return self.path.parent
 
 
 @as_annotated
@@ -146,7 +143,7 @@ def read_study(
         raise StudyError(str(path), sorted(placed, key=lambda p: p.line or 0))
     if trust:
         remember_code(study, grant.study, folder)
-    return StudyFile(path=folder / path.name, study=study, experiment=experiment)
+    return StudyFile(path=folder / path.name, folder=folder, study=study, experiment=experiment)
 
 
 def _refused(study: Study, grant: Grant) -> list[Problem]:

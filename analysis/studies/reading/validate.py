@@ -35,11 +35,11 @@ from ..build import (
     size_mistakes,
     times,
 )
-from ..kind import Setup, kind_of
-from .asked import Asked
-from .errors import KeyPath, Problem
-from .resolve import check_complete, loop_function, option, uncertain
-from .schema import RESERVED, Faulty, Study
+from ..file.asked import Asked
+from ..file.errors import KeyPath, Problem
+from ..file.schema import RESERVED, Faulty, Study
+from ..kind import Setup
+from ..resolve import check_complete, loop_function, option, uncertain
 
 __all__ = ["checked_experiment"]
 
@@ -113,7 +113,7 @@ def checked_experiment(
             _check_designs(study, space, large, notes)
         setup = Setup(study=study, folder=folder, experiment=made)
         for i, asked in _comparable(study, folder, notes):
-            if (check := kind_of(asked).check) is not None:
+            if (check := asked.definition.check) is not None:
                 notes.attempt(("analysis", i), check, asked, setup)
     return made, _unique(notes.problems)
 
@@ -151,7 +151,7 @@ def _comparable(study: Study, folder: Path, notes: _Notes) -> list[tuple[int, As
         return []
     before = len(notes.problems)
     for i, asked in enumerate(study.analysis):
-        for key in kind_of(asked).keywords:
+        for key in asked.definition.keywords:
             notes.attempt(("analysis", i, key), check_keyword, function, getattr(asked, key))
     lost = {problem.place[1] for problem in notes.problems[before:]}
     return [(i, asked) for i, asked in enumerate(study.analysis) if i not in lost]
@@ -263,14 +263,14 @@ def _check_analyses(
         if asked.key in seen:
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
-        if kind_of(asked).needs_rows and study.runs is None and "runs" not in known:
+        if asked.definition.needs_rows and study.runs is None and "runs" not in known:
             notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
         certain = known["spec"] and metrics is not None
-        named = _named(asked, kind_of(asked).columns) if certain else []
+        named = _named(asked, asked.definition.columns) if certain else []
         for key, name in named:
             if name not in columns:
                 notes.add(("analysis", i, key), str(unknown("column", name, columns)))
-        for key, name in _named(asked, kind_of(asked).quantities):
+        for key, name in _named(asked, asked.definition.quantities):
             if known["space"] and name not in known["space"]:
                 notes.add(("analysis", i, key), str(unknown("quantity", name, known["space"])))
 
@@ -281,7 +281,7 @@ def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:
     counts: dict[KeyPath, int] = {
         ("analysis", i): largest(asked, wide)
         for i, asked in enumerate(study.analysis)
-        if (largest := kind_of(asked).largest) is not None
+        if (largest := asked.definition.largest) is not None
     }
     if study.runs is not None:
         counts["runs",] = study.runs.size or 1
@@ -307,11 +307,11 @@ def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Note
         if not mistakes:
             notes.attempt(("runs",), main_design, study.runs, space, study.study.seed)
     for i, asked in enumerate(study.analysis):
-        if kind_of(asked).is_statement and study.runs is not None:
+        if asked.definition.is_statement and study.runs is not None:
             kind = study.runs.design
             made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
             notes.attempt(("analysis", i), check_iid, made)
-        design = kind_of(asked).design
+        design = asked.definition.design
         if design is not None and ("analysis", i) not in large:
             notes.attempt(("analysis", i), design, asked, space, study.study.seed)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
@@ -12,28 +13,125 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, vector
 from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
+from nlctl.names import unknown
 from nlctl.plants import coordinate_names
 from nlctl.wording import counted
 
-from ...intervals.arithmetic import as_ball
-from ...intervals.box import Box, visited_box
-from ...intervals.branch_and_bound import Proof, Range, enclose, prove, upper
-from ..loop.roles import Parts, read_parts
-from .decomposition import Decomposition, decompose
-from .final_bound import KAPPA, alpha_0, alpha_1, initial_V, total_error
-from .provenance import Constant, Constants, Provenance, bound, per_second
-from .sector import Sector, plant_terms, sector
-from .weights import approximation_error, network_on_grid, tightest_weights
+from ..intervals.arithmetic import as_ball
+from ..intervals.box import Box, visited_box
+from ..intervals.branch_and_bound import Proof, Range, enclose, prove, upper
+from .bounds.decomposition import Decomposition, decompose
+from .bounds.final_bound import KAPPA, alpha_0, alpha_1, final_bound, initial_V, total_error
+from .bounds.sector import Sector, plant_terms, sector
+from .bounds.weights import approximation_error, network_on_grid, tightest_weights
+from .loop.roles import Parts, read_parts
+from .proofs.result import Constant, Provenance, per_second
 
 __all__ = [
-    "Constant",
     "Constants",
+    "bound",
     "constants",
     "constants_of",
     "disturbance",
     "kappa",
     "visited_box",
 ]
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constants:
+    """All constants of the proof for one loop and one box.
+
+    ``constants["delta*"]`` is a value.  The bounds hold while the trajectory stays in the box.
+
+    Attributes
+    ----------
+    entries : tuple of Constant
+    parts : Parts
+        The records that they belong to; ``parts.gains`` are the controller's gains.
+    box : Box
+    sector : Sector
+    split : Decomposition
+        Of the actuator.
+    W : ndarray of shape (l,)
+        The ideal weights that were chosen; empty without a network.
+
+    Examples
+    --------
+    See `literal`.
+    """
+
+    entries: tuple[Constant, ...]
+    parts: Parts
+    box: Box
+    sector: Sector
+    split: Decomposition
+    W: np.ndarray
+
+    def __getitem__(self, symbol: str) -> float:
+        for entry in self.entries:
+            if entry.symbol == symbol:
+                return entry.value
+        raise unknown("constant", symbol, [entry.symbol for entry in self.entries])
+
+    def C_0(self, Q: float = 0.0) -> float:  # noqa: N802
+        """Return C_0 of (36) for Q = sup I(t), (33); infinite where alpha_1 = 0.
+
+        Parameters
+        ----------
+        Q : float, optional
+            Supremum of I(t), from 0 on.
+
+        Returns
+        -------
+        float
+            In the unit of V.
+        """
+        return bound(self["alpha_0"], self["alpha_1"], self["V(0)"], Q)
+
+    def ultimate(self, limsup_I: float = 0.0) -> float:
+        """Return the bound of limsup |r| that (34) gives for limsup I(t).
+
+        Parameters
+        ----------
+        limsup_I : float, optional
+            Limit superior of I(t).
+
+        Returns
+        -------
+        float
+            In the unit of r.
+        """
+        return bound(self["alpha_0"], self["alpha_1"], 0.0, limsup_I)
+
+    def table(self) -> pd.DataFrame:
+        """Return the constants as a table with one row each, indexed by symbol.
+
+        Returns
+        -------
+        DataFrame
+            Values with where they come from.
+        """
+        import pandas as pd
+
+        return pd.DataFrame([vars(entry) for entry in self.entries]).set_index("symbol")
+
+    def __str__(self) -> str:
+        width = max(len(entry.symbol) for entry in self.entries)
+        lines = [f"Constants over {self.box}"]
+        lines += [
+            f"  {e.symbol:<{width}}  {e.value:<10.6g} {e.unit:<7}  {e.provenance:<8}  {e.how}"
+            for e in self.entries
+        ]
+        return "\n".join(lines)
+
+
+def bound(alpha_0: float, alpha_1: float, V_0: float, Q: float) -> float:
+    """C_0 rounded up; without decay there is no bound."""
+    return upper(final_bound(as_ball(alpha_0), alpha_1, V_0, Q)) if alpha_1 > 0 else np.inf
 
 
 def kappa() -> Proof:

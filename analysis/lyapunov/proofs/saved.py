@@ -10,38 +10,28 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from flint import arb
-
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
-from nlctl.plants import coordinate_names
 
 from ...intervals.normal_form import exact
 from ...intervals.paths import Undecided
-from ...intervals.written import operations
 from ...recheck import FORMAT, Refuted, proved_bounds, recheck, seal_of
 from ..bounds.decomposition import Decomposition
-from ..bounds.error_bounds import filter_poles, reference_bounds
 from ..bounds.starts import Starts
-from .plant_bounds import Demand, FilteredLoop, demand
 
 __all__ = [
     "Content",
-    "filtered_attempts",
     "save_certificate",
     "split_content",
     "starts_content",
     "texts",
 ]
 
-_WIDER = ((0.0, 1e-3), (0.0, 1e-5), (0.01, 1e-3), (0.05, 1e-3), (0.2, 1e-3))
-# relative: how far C is raised, and by how much bounds on its box
-_POLE = Fraction(1, 2**40)  # relative: half the width of an irrational pole
 Content = dict[str, Any]
 
 
@@ -80,59 +70,6 @@ def _rounded_up(bound: Fraction) -> Fraction:
     """Return a bound with ten digits or so."""
     digits = 10 ** max(10 - len(str(int(bound))), 0)
     return Fraction(-((-bound.numerator * digits) // bound.denominator), digits)
-
-
-def filtered_attempts(
-    loop: FilteredLoop,
-    need: Demand,
-    split: Decomposition,
-    gains: Mapping[str, float],
-    states: Mapping[str, Any],
-) -> Iterator[Content]:
-    """Yield premises and proof of a loop with a filtered error, with more and more room."""
-    premises = {
-        "equation": _equation(loop),
-        "reference": {
-            column: texts(getattr(loop.reference, column))
-            for column in ("amplitudes", "frequencies", "phases")
-        },
-        "lambdas": texts(loop.lambdas),
-        "actuator": split_content(split),
-        "gains": {name: str(exact(value)) for name, value in gains.items()},
-        "starts": starts_content(loop.starts),  # type: ignore[attr-defined]
-        **states,
-    }
-    for raised, wider in _WIDER:
-        found = demand(loop, split, need.C * (1 + raised)) if raised else need
-        yield {"premises": premises, "proof": _proof(loop, found, Fraction(wider))}
-
-
-def _equation(loop: FilteredLoop) -> list[list[Any]]:
-    names = coordinate_names(len(loop.lambdas) + 1)
-    return operations(
-        ("t", *names, "v"), lambda s: loop.acceleration(s["t"], [s[x] for x in names], s["v"])
-    )
-
-
-def _proof(loop: FilteredLoop, need: Demand, wider: Fraction) -> Content:
-    """Return C, the box and the bounds on it, a little wider."""
-    wanted = [exact(y) * (1 + wider / 10) for y in reference_bounds(loop.reference)]
-    return {
-        "C": str(exact(need.C)),
-        "poles": [_pole(p) for p in filter_poles(loop.lambdas)],
-        "reference": texts(wanted),
-        "matched": str(exact(need.matched) * (1 + wider)),
-        "G_min": str(exact(need.G_min) * (1 - wider)),
-        "G_max": str(exact(need.G_max) * (1 + wider)),
-    }
-
-
-def _pole(p: arb) -> list[str]:
-    """Return a pole of the filter as an interval; without width if it is a fraction of doubles."""
-    middle = exact(float(p.mid()))
-    exactly = bool(p.contains(arb(float(middle)))) and middle.denominator < 2**40
-    room = Fraction(0) if exactly else middle * _POLE
-    return [str(middle - room), str(middle + room)]
 
 
 def texts(values: Iterable[Any]) -> list[str]:

@@ -11,8 +11,8 @@ from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError
 
 from ...response_of_loop import check_response, check_shape, own_outputs, own_parameters
-from ..nussbaum.property import GainFunction
-from .roles import read_parts
+from ..loop.roles import read_parts
+from .property import GainFunction
 
 __all__ = ["law_of_response"]
 

@@ -10,9 +10,9 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.wording import counted
 
-from ..folder import read_through
-from .contents import CONTENTS, is_part, problems_in, sealed_record
-from .page import PAGE_FILES, page_problems
+from .folder import read_through
+from .whole.contents import CONTENTS, is_part, problems_in, sealed_record
+from .whole.page import PAGE_FILES, page_problems
 
 __all__ = ["Wholeness", "verify"]
 

@@ -12,13 +12,13 @@ from pydantic import ConfigDict, Field, create_model
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.rule import Grant, untrusted
+from ..file.asked import Asked
+from ..file.errors import KeyPath, Problem
+from ..file.schema import Study
 from ..finding import Finding
 from ..kind import Ground, Kind, tagged
 from ..kinds import KINDS
-from .asked import Asked
-from .errors import KeyPath, Problem
-from .resolve import named_kind
-from .schema import Study
+from ..resolve import named_kind
 
 __all__ = ["STAND_IN", "model_of", "own_kinds", "stand_ins"]
 

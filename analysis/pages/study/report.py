@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
-from ..file.asked import Varied
-from ..file.own_kinds import STAND_IN
-from ..kind import kind_of
-from ..kinds import KINDS
-from ..result import LISTED
-from ..sealed import as_written
+from ...studies.file.asked import Varied
+from ...studies.kinds import KINDS
+from ...studies.page.running import running
+from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
+from ...studies.reading.own_kinds import STAND_IN
+from ...studies.result import LISTED
+from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text
 from .claims import claims, verdict
 from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
-from .running import running
 
 if TYPE_CHECKING:
-    from ..finding import Finding
-    from ..result import Result
+    from ...studies.finding import Finding
+    from ...studies.result import Result
 
 __all__ = ["study_part", "study_report", "study_sections"]
 
@@ -46,7 +46,7 @@ def study_report(
     published: Published | None = None,
 ) -> Report:
     """Compose the report of a study."""
-    if any(":" in a.kind and kind_of(a).name != STAND_IN for a in result.study.analysis):
+    if any(":" in a.kind and a.definition.name != STAND_IN for a in result.study.analysis):
         return _composed(
             result, kept, command, loop, published
         )  # errors of theirs are told as such
@@ -65,7 +65,7 @@ def _composed(
     return Report(
         title=result.study.study.title,
         question=result.study.study.question,
-        verdict=text.without_assumptions(verdict(result)),
+        verdict=without_assumptions(verdict(result)),
         lead=_lead(result, kept),
         claims=claims(result),
         sections=study_sections(result, kept, loop, published, limits=False),
@@ -107,7 +107,7 @@ def study_sections(
         title = "The loop as published"
         asked.append(Section(key="study_published", title=title, items=items, folded=True))
     if loop is not None:
-        asked += loop_sections(loop, result, "", 2)
+        asked += loop_sections(loop, result)
     if kept is not None:
         shown = [*fan_items(kept, f"{prefix}study")]
         asked.append(Section(key="study_fans", title="The runs over time", items=shown))
@@ -116,7 +116,7 @@ def study_sections(
         rows = [*row_items(result, table, f"{prefix}{key}")]
         asked.append(Section(key=key, title="How the runs ended", items=rows))
         asked += [
-            _section(f, result, text.without_assumptions(f.sentence), prefix)
+            _section(f, result, without_assumptions(f.sentence), prefix)
             for f in _statements(result)
         ]
     asked += _findings(result, prefix)
@@ -148,9 +148,9 @@ def _lead(result: Result, kept: Histories | None) -> Figure | None:
 
 def _assumed(result: Result) -> list[Section]:
     """Return the assumptions of all statements, each once; nothing if there are none."""
-    found = text.assumptions_in(finding.sentence for finding in result.findings)
+    found = assumptions_in(finding.sentence for finding in result.findings)
     items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in found]
-    return [Section(key="study_assumed", title=text.ASSUMED, items=items)] if found else []
+    return [Section(key="study_assumed", title=ASSUMED, items=items)] if found else []
 
 
 def study_part(
@@ -162,7 +162,7 @@ def study_part(
     rows = []
     for result, _ in studies:
         look, told = summary(claims(result))
-        words = f"{told} {text.without_assumptions(verdict(result))}"
+        words = f"{told} {without_assumptions(verdict(result))}"
         asked = result.study.study.question
         rows.append((result.study.study.title, asked, OUTCOMES.get(look, look), words))
     overview = Table(
@@ -213,8 +213,8 @@ def _brief(
         yield replace(made, key=f"{key}-assumed", level=4, folded=True)
     for finding in result.findings:
         one = asked[finding.key]
-        if kind_of(one).in_brief and finding.is_answered:
-            items = [*kind_of(one).items(finding, result, one, f"{key}-{finding.key}")]
+        if one.definition.in_brief and finding.is_answered:
+            items = [*one.definition.items(finding, result, one, f"{key}-{finding.key}")]
             yield Section(
                 key=f"{key}-map", title=_title(finding, result), items=items, level=4, folded=True
             )
@@ -222,7 +222,7 @@ def _brief(
 
 def _told(finding: Finding, asked: Any) -> str:
     """Return what was found, and what was varied if that is not everything."""
-    sentence = text.without_assumptions(finding.sentence)
+    sentence = without_assumptions(finding.sentence)
     if not (isinstance(asked, Varied) and asked.quantities):
         return sentence
     return f"{sentence} Here only {', '.join(asked.quantities)} vary, all others are nominal."
@@ -231,8 +231,8 @@ def _told(finding: Finding, asked: Any) -> str:
 def _title(finding: Finding, result: Result) -> str:
     """Return the heading that the study file gives an analysis, or one by its kind."""
     asked = result.asked[finding.key]
-    of = (getattr(asked, key) for key in kind_of(asked).columns)
-    return asked.title or kind_of(asked).title + "".join(f" of {c}" for c in of if c != "spec")
+    of = (getattr(asked, key) for key in asked.definition.columns)
+    return asked.title or asked.definition.title + "".join(f" of {c}" for c in of if c != "spec")
 
 
 def _findings(result: Result, prefix: str) -> list[Section]:
@@ -242,8 +242,8 @@ def _findings(result: Result, prefix: str) -> list[Section]:
     """
     asked = result.asked
     places = {kind: place for place, kind in enumerate(KINDS)}
-    others = [f for f in _answered(result) if not kind_of(asked[f.key]).is_statement]
-    others.sort(key=lambda f: places.get(kind_of(asked[f.key]), len(places)))
+    others = [f for f in _answered(result) if not asked[f.key].definition.is_statement]
+    others.sort(key=lambda f: places.get(asked[f.key].definition, len(places)))
     return [_section(f, result, _told(f, asked[f.key]), prefix) for f in others] + [
         Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
         for f in result.findings
@@ -254,14 +254,14 @@ def _findings(result: Result, prefix: str) -> list[Section]:
 def _section(finding: Finding, result: Result, told: str, prefix: str) -> Section:
     """Return what an analysis found, in words, with figures and tables of its kind."""
     asked = result.asked[finding.key]
-    shown = kind_of(asked).items(finding, result, asked, f"{prefix}{finding.key}")
+    shown = asked.definition.items(finding, result, asked, f"{prefix}{finding.key}")
     items = [Paragraph(text=told), *shown]
     return Section(key=finding.key, title=_title(finding, result), items=items)
 
 
 def _statements(result: Result) -> list[Finding]:
     """Return what was answered about the probability of a violation."""
-    return [f for f in _answered(result) if kind_of(result.asked[f.key]).is_statement]
+    return [f for f in _answered(result) if result.asked[f.key].definition.is_statement]
 
 
 def _answered(result: Result) -> list[Finding]:

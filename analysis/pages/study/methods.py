@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING
 
 from nlctl.wording import counted
 
-from ..kind import kind_of
-
 if TYPE_CHECKING:
-    from ..result import Result
+    from ...studies.result import Result
     from .loop import Published
 
 __all__ = ["limits", "methods"]
@@ -35,7 +33,7 @@ def methods(result: Result, published: Published | None = None) -> tuple[list[st
             f" The main table has {counted(result.rows.done, 'row')} (design: {study.runs.design})."
         )
     answered = [f.key for f in result.findings if f.is_answered]
-    kinds = dict.fromkeys(kind_of(result.asked[key]) for key in answered)
+    kinds = dict.fromkeys(result.asked[key].definition for key in answered)
     told = [kind.method for kind in kinds if kind.method]
     sources = [text for kind in kinds for text in kind.sources]
     loop = [published.citation] if published else []

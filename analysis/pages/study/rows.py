@@ -3,35 +3,33 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from nlctl.native import Status
 from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Figure, History, Item, Paragraph, Table
 from ...robustness.search.evaluation import margins_of
 from ...robustness.stl.spec import violates
+from ...studies.page.tables import known
+from ...studies.page.text import clipped, margin_text, status_text, violate
 from . import text as text
 from .claims import refusal
 from .histories import Histories
-from .text import margin_text
 
 if TYPE_CHECKING:
-    from ..result import Result
+    from ...studies.result import Result
     from .loop import Published
 
 __all__ = [
     "fan_items",
-    "known",
     "margin_items",
     "row_items",
     "setup_items",
-    "status_text",
 ]
 
 WORST = 10  # rows that are listed
@@ -65,20 +63,11 @@ def setup_items(result: Result, published: Published | None = None) -> Iterator[
     )
 
 
-def known(quantities: pd.DataFrame, *columns: str) -> Iterable[tuple[Any, ...]]:
-    """Return name and columns of every quantity, None where a choice has no such thing."""
-    table = quantities.reindex(columns=list(columns)).astype(object)
-    table = table.where(table.notna(), None)
-    if "unit" in columns:
-        table["unit"] = table["unit"].map(text.unit_text)
-    return table.itertuples(name=None)
-
-
 def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield how the rows of the main table ended, and the worst of them."""
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    told = text.violate(violated, len(table))
+    told = violate(violated, len(table))
     if refused := refusal(result):
         told += f". That is not an estimate of a probability: {refused}"
     yield Paragraph(text=f"{told}.")
@@ -103,19 +92,14 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     yield _requirements(result, table)
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + text.clipped(margins)
+    caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + clipped(margins)
     yield Figure(
         key=f"{key}-margins",
         caption=caption,
-        description=f"{caption} {text.violate(violated, margins.size)}; the median margin is "
+        description=f"{caption} {violate(violated, margins.size)}; the median margin is "
         f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
         figure=figures.margins_figure(margins),
     )
-
-
-def status_text(name: object) -> str:
-    """Return how a run ended, in words."""
-    return "reached the end" if name == Status.OK.name else str(name).lower().replace("_", " ")
 
 
 def _requirements(result: Result, table: pd.DataFrame) -> Table:

@@ -1,0 +1,253 @@
+"""What a proof finds: whether it holds, on which set, and every constant with where it is from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from nlctl.annotations import as_annotated
+from nlctl.errors import UsageError
+from nlctl.host.notebook import table_html
+
+from ...intervals.box import Box
+from ..bounds.decomposition import Decomposition
+from ..bounds.starts import Starts
+from .saved import Content, save_certificate
+
+__all__ = ["FROM_STARTS", "Certificate", "Constant", "ProofResult", "Provenance", "per_second"]
+
+FROM_STARTS = "all t, from the starts"
+Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
+Row = tuple[str, Any, str, Any, str, str]  # the fields of a Constant in their order
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant:
+    """A constant of the proof.
+
+    Attributes
+    ----------
+    symbol : str
+        As in the paper, ``"delta*"``.
+    value : float
+    unit : str
+    provenance : {"proved", "computed", "sampled", "given", "undecided"}
+        "proved": by interval branch and bound.  "computed": in closed form, from constants that
+        are themselves in the table.  "sampled": from trajectories or a grid.  "given": a choice.
+        "undecided": branch and bound found no bound, and the value is infinite.
+    how : str
+        Method, or formula.
+    over : str
+        Set for which it holds.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.lyapunov import Constant
+    >>> given = Constant(symbol="tau", value=0.2, unit="1", provenance="given", how="", over="")
+    >>> print(given.symbol, given.value, given.provenance)
+    tau 0.2 given
+    """
+
+    symbol: str
+    value: float
+    unit: str
+    provenance: Provenance
+    how: str
+    over: str
+
+
+def per_second(power: int) -> str:
+    """The unit 1/s^power; x1, u and v count as pure numbers."""
+    return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProofResult:
+    """What every proof finds.
+
+    Attributes
+    ----------
+    holds : bool
+        Whether it is proved; a statement that is not is not refuted by that.
+    reason : str
+        Why it holds, or what is missing.
+    boxes : int
+        Boxes that were looked at.
+    arithmetic : str
+        What proved it.
+    seconds : float
+
+    Examples
+    --------
+    See `certify`.
+    """
+
+    holds: bool
+    reason: str
+    boxes: int
+    arithmetic: str
+    seconds: float = field(repr=False, compare=False)
+
+    @property
+    def claim(self) -> str:
+        """What is proved, of which set, in words; or that nothing is."""
+        raise NotImplementedError
+
+    @property
+    def status(self) -> Literal["proved", "undecided"]:
+        """Whether it is proved."""
+        return "proved" if self.holds else "undecided"
+
+    @property
+    def missing(self) -> str:
+        """What a proof would need; nothing if there is one."""
+        return "" if self.holds else self.reason
+
+    @property
+    def verdict(self) -> str:
+        """What is proved, and why, in a sentence."""
+        return f"{self.claim}: {self.reason}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate(ProofResult):
+    """What `certify` proved: bounds of a loop for all time, from a set of starts.
+
+    Each kind of proof adds its own constants and bounds; these are infinite if nothing is proved.
+
+    Attributes
+    ----------
+    kind : str
+        The kind of proof, as its file and the recheck call it.
+    name : str
+        Of the loop.
+    starts : Starts
+        The initial states that the bounds hold for.
+    disturbance : float
+        Bound of what external inputs add to the plant's v.
+    split : Decomposition
+        Of the actuator.
+    region : Demand or Region
+        The box of the last step, and what was proved on it.
+    iterations : tuple of float
+        Bounds, each of what the box of the one before implies: the iteration that closed or was
+        given up.
+    params : mapping
+        Parameters of the proof that are not those of the loop as it stands.
+    loop_facts : mapping
+        What the loop consists of, see `nlctl.analysis.loop_record`.
+
+    Examples
+    --------
+    See `certify`.
+    """
+
+    kind: str
+    name: str
+    starts: Starts = field(repr=False)
+    disturbance: float
+    split: Decomposition = field(repr=False)
+    region: Any = field(repr=False)
+    iterations: tuple[float, ...]
+    params: Mapping[str, Any] = field(repr=False)
+    loop_facts: Mapping[str, Mapping[str, str]] = field(repr=False)
+
+    def _bound(self) -> str:
+        """Return the bound in words, of a certificate that holds."""
+        raise NotImplementedError
+
+    def _rows(self) -> Iterator[Row]:
+        """Yield every constant of the proof, and the bounds if there are some."""
+        raise NotImplementedError
+
+    def _attempts(self) -> Iterator[Content]:
+        """Yield premises and proof for a file, with more and more room."""
+        raise NotImplementedError
+
+    @property
+    def box(self) -> Box:
+        """What the signals of the proof stay in."""
+        return self.region.box
+
+    @property
+    def C(self) -> float:  # noqa: N802
+        """The bound that is not reached: it gives the box."""
+        return self.region.C
+
+    @property
+    def assumptions(self) -> str:
+        """From where, and with which external inputs, the bounds hold."""
+        added = f", whatever external inputs add up to {self.disturbance:.6g} to v"
+        return f"from {self.starts}{added if self.disturbance else ''}"
+
+    @property
+    def claim(self) -> str:
+        """What is proved, with the starts and inputs that it is about; or that nothing is."""
+        if self.holds:
+            return f"{self._bound()} {self.assumptions}"
+        return f"no bound is proved {self.assumptions}, and none is refuted; undecided"
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """Every constant of the proof; without the bounds if nothing is proved."""
+        return tuple(
+            Constant(symbol=s, value=float(v), unit=per, provenance=p, how=how, over=where)
+            for s, v, per, p, how, where in self._rows()
+        )
+
+    @property
+    def _sure(self) -> Provenance:
+        """What is known of a constant that the actuator's split enters."""
+        return "given" if self.split.provenance == "given" else "proved"
+
+    def _of_split(self) -> Iterator[Row]:
+        how = (self.split.provenance, self.split.how, self.split.over)
+        yield "k_1", self.split.k_1, "1", *how
+        yield "k_2", self.split.k_2, "1", *how
+        yield "eps_u*", self.split.eps_star, "1", *how
+
+    @as_annotated
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Write the proof so that others can check it: rationals, boxes and the claim, as JSON.
+
+        ``python -m nlctl.analysis.recheck FILE`` answers yes or no, with integer arithmetic of its
+        own.  Bounds are rounded up, as a rule by less than a thousandth.
+
+        Parameters
+        ----------
+        file : str or Path
+            A file of that name is replaced.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        UsageError
+            If nothing is proved, or the recheck would not follow it: equations with tables or
+            comparisons are not written.
+        """
+        if not self.holds:
+            raise UsageError(
+                f"nothing is proved of '{self.name}' that could be saved: {self.reason}"
+            )
+        return save_certificate(Path(file), self.kind, self.name, self._attempts)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        columns = ("symbol", "value", "unit", "status", "how", "for")
+        rows = [(c.symbol, c.value, c.unit, c.provenance, c.how, c.over) for c in self.constants]
+        return table_html(self.verdict, columns, rows)
+
+    def __str__(self) -> str:
+        width = max(len(c.symbol) for c in self.constants)
+        rows = [
+            f"  {c.symbol:{width}} {c.value:<11.6g} {c.provenance:9} {c.how}; {c.over}"
+            for c in self.constants
+        ]
+        return "\n".join([self.verdict, *rows])

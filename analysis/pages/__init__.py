@@ -1,0 +1,1 @@
+"""What pages are composed of: loops, runs, proofs and studies as sections of a report."""

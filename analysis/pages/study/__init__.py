@@ -1,0 +1,1 @@
+"""The page of a study, or its part of another page."""
