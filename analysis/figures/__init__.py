@@ -23,11 +23,14 @@ from .runs import (
     running_estimate,
 )
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .tuning import before_and_after, bought, margins_of_both, tried
 
 __all__ = [
     "CLIP",
     "LIMIT",
     "Limit",
+    "before_and_after",
+    "bought",
     "bounds",
     "burst",
     "degradation",
@@ -41,6 +44,7 @@ __all__ = [
     "long_zeta",
     "lyapunov_bound",
     "margins_figure",
+    "margins_of_both",
     "most_frequent",
     "paired_differences",
     "quantile",
@@ -51,6 +55,7 @@ __all__ = [
     "set_apart",
     "shares",
     "story",
+    "tried",
     "violation_rates",
     "windowed_maximum",
 ]

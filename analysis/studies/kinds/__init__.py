@@ -10,6 +10,7 @@ from .radius import RADIUS
 from .regional import REGIONAL
 from .sequential import SEQUENTIAL
 from .sobol import SOBOL
+from .tuning import TUNING
 from .worst_case import WORST_CASE
 
 __all__ = ["KINDS"]
@@ -26,4 +27,5 @@ KINDS = (  # in the order of the report
     FAILURE_MAP,
     FAULTS,
     COMPARE,
+    TUNING,
 )
