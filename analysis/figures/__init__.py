@@ -11,7 +11,7 @@ from .proof import (
     story,
     windowed_maximum,
 )
-from .rankings import paired_differences, screening, set_apart, shares, violation_rates
+from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
 from .runs import (
     CLIP,
     LIMIT,
@@ -55,6 +55,7 @@ __all__ = [
     "set_apart",
     "shares",
     "story",
+    "tornado",
     "tried",
     "violation_rates",
     "windowed_maximum",

@@ -97,6 +97,7 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(gains.index)
+    figure.set_figheight(figure.get_figheight() + 0.9)
     at = np.arange(len(gains))
     alone, rest = (_confined(gains[c].to_numpy(), before, after) for c in ("alone", "put_back"))
     ax.barh(
@@ -110,6 +111,7 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
     ax.axvline(before, color=GREY, linewidth=1.0, linestyle="--", label="before")
     ax.axvline(after, color=GREEN, linewidth=1.2, label="after")
     legend_above(ax, line=SHORT_LINE)
+    ax.margins(x=0.05)
     ax.set_xlabel(what, parse_math=False)
     return figure
 

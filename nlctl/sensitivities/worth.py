@@ -85,7 +85,8 @@ class Asked:
         low, high = self._ends
         inside = low + np.clip(cube, 0.0, 1.0) * (high - low)
         powers = np.exp(np.where(self._as_powers, inside, 0.0))
-        return np.clip(np.where(self._as_powers, powers, inside), self.low, self.high)
+        found = np.clip(np.where(self._as_powers, powers, inside), self.low, self.high)
+        return np.select([cube <= 0.0, cube >= 1.0], [self.low, self.high], found)
 
     def cube(self, values: np.ndarray) -> np.ndarray:
         """Return the point of the unit cube of some gains."""

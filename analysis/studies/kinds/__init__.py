@@ -10,6 +10,7 @@ from .radius import RADIUS
 from .regional import REGIONAL
 from .sequential import SEQUENTIAL
 from .sobol import SOBOL
+from .tornado import TORNADO
 from .tuning import TUNING
 from .worst_case import WORST_CASE
 
@@ -21,6 +22,7 @@ KINDS = (  # in the order of the report
     WORST_CASE,
     RADIUS,
     DEGRADATION,
+    TORNADO,
     MORRIS,
     SOBOL,
     REGIONAL,

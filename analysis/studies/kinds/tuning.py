@@ -208,7 +208,7 @@ def _sentence(asked: Tuning, found: Tuned, before: Violation, after: Violation) 
         for name, new, old in zip(found.names, found.values, found.start, strict=True)
     )
     numbers = "; ".join(
-        f"{_what(found, key)} {margin_text(found.before[key])} before and "
+        f"the {_what(found, key)} is {margin_text(found.before[key])} before and "
         f"{margin_text(found.after[key])} after"
         for key in found.after
     )
