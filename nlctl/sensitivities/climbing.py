@@ -25,6 +25,7 @@ _KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, mo
 _REMEMBERED = 2  # choices of gains whose slopes count as well
 _EFFORTS = (0.03, 0.005)  # of a margin: what a step as wide as the box has to bring at least
 _ENOUGH = 5e-4  # of a margin, or of a cost: less is no progress
+_ROOM = 1e-3  # that a cost leaves to all margins, so that rounding violates none
 _PATIENCE = 8  # choices of gains without progress, after which SLSQP ends
 
 WorthOf = Callable[[np.ndarray], Worth]
@@ -95,7 +96,7 @@ def lower_cost(worth_of: WorthOf, start: np.ndarray) -> None:
     own, first = _Patient(worth_of), worth_of(start)
     scale = abs(first.cost) or 1.0 if np.isfinite(first.cost) else 1.0
     within: Any = {
-        "type": "ineq", "fun": lambda x: own(x).parts, "jac": lambda x: own(x).slopes
+        "type": "ineq", "fun": lambda x: own(x).parts - _ROOM, "jac": lambda x: own(x).slopes
     }  # fmt: skip
     try:
         minimize(

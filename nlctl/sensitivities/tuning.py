@@ -21,6 +21,7 @@ from ..native.jacobians import float_parameters
 from ..params import as_numbers, checked_times, integer
 from ..responses.arguments import state_array
 from .climbing import lower_cost, raise_least_margin
+from .names import declared_bounds
 from .tuned import Tuned
 from .tuning_notes import notes
 from .worth import Asked, Runs, Worth, checked_samples
@@ -169,7 +170,7 @@ def tune(
     starts = integer("tune", "starts", starts, at_least=1)
     runs = Runs(asked)
     message = _searched(runs, asked.cube(start), float(budget), starts, seed)
-    return _found(runs, asked.cube(start), message)
+    return _found(runs, start, message)
 
 
 class _SpentError(Exception):
@@ -212,17 +213,18 @@ def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
         lower_cost(worth_of, start)
 
 
-def _found(runs: Runs, start: np.ndarray, message: str) -> Tuned:
+def _found(runs: Runs, first: np.ndarray, message: str) -> Tuned:
     """Return what was found, with what each gain has bought."""
-    asked, k = runs.asked, start.size
+    asked, k, start = runs.asked, first.size, runs.asked.cube(first)
     best = _tidied(runs, start)
     each = [np.where(np.arange(k) == j, best, start) for j in range(k)]
     others = [np.where(np.arange(k) == j, start, best) for j in range(k)]
     before, after, *rest = runs.at(np.array([start, best, *each, *others]))
     goals = np.array([worth.cost if worth.has_cost else worth.least for worth in rest])
     return Tuned(
-        names=asked.names, low=asked.low, high=asked.high, start=asked.values(start),
-        values=asked.values(best), before=_by_key(asked, before), after=_by_key(asked, after),
+        names=asked.names, low=asked.low, high=asked.high, start=first,
+        values=np.where(best == start, first, asked.values(best)),
+        before=_by_key(asked, before), after=_by_key(asked, after),
         alone=goals[:k], put_back=goals[k:], cost=asked.cost.key if asked.cost else "",
         history=_history(runs), plain_runs=runs.plain,
         differentiated_runs=runs.differentiated, counted_runs=runs.counted,
@@ -272,7 +274,7 @@ def _asked(
     margins = _margins(spec, cost)
     params, initial_state = dict(params or {}), dict(initial_state or {})
     own = _own_values(diagram, params, initial_state)
-    rows = [_row(diagram, name, value, own, params) for name, value in _bounds(space)]
+    rows = [_row(diagram, name, value, own) for name, value in _bounds(space)]
     start, low, high = np.array([row[1:] for row in rows], dtype=float).T
     asked = Asked(
         diagram=diagram, times=_times(timepts, margins), inputs=inputs, params=params,
@@ -303,7 +305,7 @@ def _times(timepts: Any, margins: Sequence[Any]) -> np.ndarray:
     if timepts is not None:
         return checked_times(timepts)
     ends = [getattr(metric, "until", np.nan) for metric in margins]
-    if not ends or not np.isfinite(ends).all():
+    if not ends or not np.isfinite(ends).all() or not max(ends) > 0:
         raise ParameterError("tune needs timepts: what is asked does not say when a run ends")
     return np.linspace(0.0, max(ends), _SAMPLES)
 
@@ -336,7 +338,7 @@ def _own_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str,
 
 
 def _row(
-    diagram: Compiled, name: str, value: Any, own: Mapping[str, float], params: Any
+    diagram: Compiled, name: str, value: Any, own: Mapping[str, float]
 ) -> tuple[str, float, float, float]:
     """Return the full name of a gain, where its search starts, and its bounds."""
     full = name if name in own else find_name("parameter", name, own)
@@ -351,6 +353,11 @@ def _row(
             f"'{name}' needs a start within its bounds, got {start:g} in [{low:g}, {high:g}]: "
             "give (start, low, high)"
         )
-    for end in () if full.endswith("(0)") else (low, high):
-        diagram.parameter_vector({**params, full: float(end)})  # its block refuses it or not
+    owner = float_parameters(diagram).get(full, (0, None))[1]
+    lowest, highest = declared_bounds(owner, full) if owner is not None else (-np.inf, np.inf)
+    if low < lowest or high > highest:
+        raise ParameterError(
+            f"'{name}' needs bounds in [{lowest:g}, {highest:g}], as its block declares, got "
+            f"{low:g}, {high:g}"
+        )
     return full, float(start), float(low), float(high)

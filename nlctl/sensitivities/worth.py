@@ -216,15 +216,30 @@ class Runs:
         for name in asked.samples[0]:
             given[name] = np.tile([sample[name] for sample in asked.samples], len(points))
         params, start = _split(given)
+        try:
+            found = self._ensemble(params, start, metrics)
+        except ParameterError:  # one of these values, or several of a block together
+            if not self.history:
+                raise
+            if len(points) > 1:
+                return np.concatenate([self._tables(p[None, :], metrics) for p in points])
+            return np.full((1, size, len(metrics)), np.nan)
+        self.plain += len(values)
+        return found.reshape(len(points), size, -1)
+
+    def _ensemble(
+        self, params: Mapping[str, Any], start: Mapping[str, Any], metrics: Sequence[MetricLike]
+    ) -> np.ndarray:
+        """Return numbers of plain runs, shape (runs, metrics)."""
+        asked = self.asked
+        count = len(next(iter((params or start).values())))
         table = ensemble_response(
             asked.diagram, asked.times, asked.inputs, {**asked.initial_state, **start},
             params={**asked.params, **params}, metrics=metrics, **asked.how,
         ).table  # fmt: skip
-        if len(table) < len(values):
+        if len(table) < count:
             raise KeyboardInterrupt
-        self.plain += len(values)
-        found = table[[m.key for m in metrics]].to_numpy(dtype=float)
-        return found.reshape(len(points), size, -1)
+        return table[[m.key for m in metrics]].to_numpy(dtype=float)
 
     def _worth(self, table: np.ndarray, **more: Any) -> Worth:
         count = len(self.asked.margins)
@@ -248,6 +263,10 @@ class Runs:
                 self.why = str(error)
                 return None
             except DivergedError:
+                made = None
+            except ParameterError:  # no block takes these together: of the start that is an error
+                if not self.history:
+                    raise
                 made = None
             self.differentiated += 1
             each.append(self._lost() if made is None else self._numbers(made))
