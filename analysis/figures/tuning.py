@@ -16,7 +16,11 @@ from .runs import clipped_margins
 
 __all__ = ["before_and_after", "bought", "margins_of_both", "tried"]
 
-_CHOSEN = {"search": (BLUE, "o"), "Sobol'": (GREY, "x")}
+_CHOSEN = {
+    "search": (BLUE, "o", "search"),
+    "Sobol'": (GREY, "x", "points of Sobol'"),
+    "put back": (GREEN, "+", "a gain put back"),
+}
 
 
 @as_annotated
@@ -65,10 +69,9 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     """
     figure, (ax,) = stacked_axes()
     y = history["cost"].to_numpy() if cost else clipped_margins(history["margin"].to_numpy())
-    for name, (colour, marker) in _CHOSEN.items():
+    for name, (colour, marker, label) in _CHOSEN.items():
         own = (history["by"] == name).to_numpy()
         if own.any():
-            label = "search" if name == "search" else "points of Sobol'"
             ax.plot(history["runs"][own], y[own], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)

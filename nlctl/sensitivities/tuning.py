@@ -99,8 +99,8 @@ def tune(
         What is asked, each a number of a run of which larger is better and > 0 holds.
     budget : float, optional
         Runs after which the search ends; one with k derivatives counts as 1 + 0.7 k, which is
-        about what it takes (``benchmarks/tune.py``).  What the gains have bought takes 2 k + 2
-        runs of each sample more.
+        about what it takes (``benchmarks/tune.py``).  To put back what buys nothing, and to
+        say what each gain has bought, takes 2 k + 2 runs of each sample or some more.
     timepts : array_like of shape (m,), optional
         Times in s at which signals are sampled; by default 1001 from 0 to the end that
         requirements look at.
@@ -216,33 +216,33 @@ def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
 def _found(runs: Runs, first: np.ndarray, message: str) -> Tuned:
     """Return what was found, with what each gain has bought."""
     asked, k, start = runs.asked, first.size, runs.asked.cube(first)
-    best = _tidied(runs, start)
+    best, without = _plainest(runs, start)
     each = [np.where(np.arange(k) == j, best, start) for j in range(k)]
-    others = [np.where(np.arange(k) == j, start, best) for j in range(k)]
-    before, after, *rest = runs.at(np.array([start, best, *each, *others]))
-    goals = np.array([worth.cost if worth.has_cost else worth.least for worth in rest])
+    before, after, *alone = runs.at(np.array([start, best, *each]))
     return Tuned(
         names=asked.names, low=asked.low, high=asked.high, start=first,
         values=np.where(best == start, first, asked.values(best)),
         before=_by_key(asked, before), after=_by_key(asked, after),
-        alone=goals[:k], put_back=goals[k:], cost=asked.cost.key if asked.cost else "",
-        history=_history(runs), plain_runs=runs.plain,
-        differentiated_runs=runs.differentiated, counted_runs=runs.counted,
-        notes=notes(runs, before), message=message,
+        alone=np.array([worth.goal for worth in alone]),
+        put_back=np.array([worth.goal for worth in without]),
+        cost=asked.cost.key if asked.cost else "", history=_history(runs),
+        plain_runs=runs.plain, differentiated_runs=runs.differentiated,
+        counted_runs=runs.counted, notes=notes(runs, before, best), message=message,
     )  # fmt: skip
 
 
-def _tidied(runs: Runs, start: np.ndarray) -> np.ndarray:
-    """Return the best gains; what nothing depends on is left at its start."""
+def _plainest(runs: Runs, start: np.ndarray) -> tuple[np.ndarray, list[Worth]]:
+    """Return the best gains, those put back that buy nothing, and what each is worth put back."""
     best, worth = runs.best()
-    idle = runs.moved == 0.0
-    if not idle.any() or np.array_equal(best[idle], start[idle]):
-        return best
-    tidy = np.where(idle, start, best)
-    (again,) = runs.at(tidy[None, :])
-    same = abs(again.least - worth.least) <= _SAME * (1 + abs(worth.least))
-    same_cost = not worth.has_cost or abs(again.cost - worth.cost) <= _SAME * abs(worth.cost)
-    return tidy if same and same_cost else best
+    while True:
+        others = np.where(np.eye(start.size, dtype=bool), start, best)
+        without = runs.at(others, "put back")
+        moved = np.flatnonzero(best != start)
+        same = [j for j in moved if without[j].is_as_good_as(worth, _SAME)]
+        if not same:
+            return best, without
+        j = max(same, key=lambda j: without[j].rank)
+        best, worth = others[j], max(worth, without[j], key=lambda each: each.rank)
 
 
 def _by_key(asked: Asked, worth: Worth) -> dict[str, float]:

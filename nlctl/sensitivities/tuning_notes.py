@@ -14,9 +14,9 @@ __all__ = ["notes"]
 _AT_BOUND = 1e-6  # of the box
 
 
-def notes(runs: Runs, before: Worth) -> tuple[str, ...]:
+def notes(runs: Runs, before: Worth, best: np.ndarray) -> tuple[str, ...]:
     """Return all of them."""
-    parts = (_start(runs, before), _flat(runs), _idle(runs), _at_bounds(runs))
+    parts = (_start(runs, before), _flat(runs), _idle(runs), _at_bounds(runs, best))
     return (*(note for part in parts for note in part), *_without_derivatives(runs))
 
 
@@ -53,9 +53,9 @@ def _idle(runs: Runs) -> Iterator[str]:
         yield f"nothing that is asked depends on {', '.join(names)}, which {are} left at the start"
 
 
-def _at_bounds(runs: Runs) -> Iterator[str]:
+def _at_bounds(runs: Runs, cube: np.ndarray) -> Iterator[str]:
     """Yield which gains end at a bound."""
-    asked, cube = runs.asked, runs.best()[0]
+    asked = runs.asked
     ends = ((cube <= _AT_BOUND, asked.low), (cube >= 1.0 - _AT_BOUND, asked.high))
     found = [
         f"{asked.names[j]} at {bound[j]:g}"

@@ -156,6 +156,16 @@ class Worth:
             return self.least, 0.0
         return min(self.least, 0.0), -np.nan_to_num(self.cost, nan=np.inf, posinf=np.inf)
 
+    @property
+    def goal(self) -> float:
+        """The cost where there is one, else the least margin."""
+        return self.cost if self.has_cost else self.least
+
+    def is_as_good_as(self, other: Worth, tolerance: float) -> bool:
+        """Whether it is no worse than another one, but for a part of a margin or of a cost."""
+        room = tolerance * np.array([1.0 + abs(other.least), abs(other.rank[1])])
+        return bool(np.all(np.array(self.rank) >= np.array(other.rank) - np.nan_to_num(room)))
+
 
 class Runs:
     """Makes runs, counts them, and keeps what each choice of gains was worth."""
