@@ -42,7 +42,6 @@ Force = Annotated[
 def register_reports(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     app.command("report")(report)
-    app.command("tune")(tune_command)
     app.command("compare")(compare_command)
     app.command("gallery")(gallery)
 
@@ -94,38 +93,6 @@ def report(
         )
         say(made)
         finish_report(page, pdf=pdf, open_=open_)
-        if code:
-            raise typer.Exit(code)
-
-
-def tune_command(
-    study: Annotated[
-        Path, typer.Argument(metavar="STUDY", help="A study file (.toml) that tunes gains.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the page; that of the run by default.")
-    ] = None,
-    jobs: Annotated[int, typer.Option(min=0, help="Threads; 0: one per core.")] = 0,
-    open_: Open = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
-    interactive: Annotated[
-        bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
-    ] = False,
-    force: Force = False,
-    trust: Trust = False,
-) -> None:
-    """Find gains with which a loop meets its spec by the largest margin, and write a page.
-
-    The study has an analysis of kind 'tuning', which says what is tuned within which bounds; what
-    is found is validated on fresh samples.  Its code is run.  Exit 1 if a claim of it fails.
-    """
-    with exit_codes(json=False):
-        from .tune import tune_study
-
-        code = tune_study(
-            study, out, jobs, open_=open_, pdf=pdf, interactive=interactive, force=force,
-            trust=trust,
-        )  # fmt: skip
         if code:
             raise typer.Exit(code)
 

@@ -49,7 +49,7 @@ gains.axvline(after, color="0.6")
 gains.set_xlim(2 * before, 1.2)
 gains.set_yticks(at, [name.removeprefix("controller.") for name in table.index])
 gains.set_xlabel("least margin: before (dashed), after, and with one gain changed")
-gains.legend(loc="lower right")
+gains.legend(loc="lower left")
 
 assert before < 0 < 0.4 < after
 assert found.counted_runs < 100

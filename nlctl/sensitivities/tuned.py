@@ -110,7 +110,7 @@ class Tuned:
     def __repr__(self) -> str:
         what = "cost" if self.cost else "least margin"
         number = counted(len(self.names), "gain")
-        lines = [f"Tuning of {number}, {self.counted_runs:.0f} runs: {self.message}"]
+        lines = [f"Tuning of {number}: {self.message}; runs as counted: {self.counted_runs:.0f}"]
         lines += [
             f"  {key}: {self.before[key]:.4g} before, {self.after[key]:.4g} after"
             for key in self.after

@@ -24,20 +24,8 @@ __all__ = ["conjunction"]
 def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
     """Return formulas whose margins have that of `formula` as the least, at the start.
 
-    Parameters
-    ----------
-    formula : Formula
-        What is taken apart.
-    until : float
-        Time (s) at which windows without an end stop.
-    pieces : int
-        Into how many pieces a window is cut.
-
-    Returns
-    -------
-    tuple of tuples of Formula
-        Pieces of the same window follow each other in a row of their own; what is no conjunction
-        is alone.
+    Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
+    same window follow each other in a row of their own.  What is not a conjunction is alone.
     """
     return tuple(_rows(formula, until, pieces))
 

@@ -314,7 +314,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield _asked_table(tables["requirements"])
     yield Figure(
         key=f"{key}-tried", caption=TRIED + text.clipped(tables["tried"]["margin"]),
-        description=f"{TRIED} {n['counted_runs']:.0f} runs as counted.",
+        description=f"{TRIED} Runs as counted: {n['counted_runs']:.0f}.",
         figure=figures.tried(tables["tried"], is_cost),
     )  # fmt: skip
 
