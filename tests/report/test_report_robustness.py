@@ -403,7 +403,7 @@ def test_an_unfinished_study_says_so(result):
     """What is done is shown."""
     part = replace(result, findings=result.findings[:2], complete=False)
     made = study_report(part)
-    assert made.verdict.startswith("Incomplete: 2 of 11 analyses done.")
+    assert made.verdict.startswith("Incomplete: 2 of 13 analyses done.")
     keys = [section.key for section in made.sections]
     assert keys == ["study_asked", "study_rows", "probability", "sequential", "study_assumed"]
 
