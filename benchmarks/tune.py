@@ -24,7 +24,7 @@ from tables import machine
 
 import nlctl
 from nlctl.analysis.robustness import Requirement, Spec, always, in_band
-from nlctl.sensitivities.worth import LOST
+from nlctl.sensitivities.worth import LOST_MARGIN
 
 SEEDS = range(7)
 GENERATIONS = 200
@@ -94,7 +94,7 @@ def evolution(problem: Problem, compiled: object, found: nlctl.Tuned, seed: int)
             compiled, TIMES, params=dict(zip(names, gains.T, strict=True)), max_steps=100_000,
             metrics=problem.spec.requirements, rtol=1e-6, atol=1e-8,
         ).table  # fmt: skip
-        margins = table[[r.key for r in problem.spec.requirements]].min(axis=1).fillna(LOST)
+        margins = table[[r.key for r in problem.spec.requirements]].min(axis=1).fillna(LOST_MARGIN)
         strategy.tell(asked, list(-margins))
         best += list(margins)
     return np.maximum.accumulate(best)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog, minimize
 
-from .worth import LOST, Worth
+from .worth import LOST_MARGIN, Worth
 
 __all__ = ["lower_cost", "raise_least_margin"]
 
@@ -100,7 +100,7 @@ def lower_cost(worth_of: WorthOf, start: np.ndarray) -> None:
     }  # fmt: skip
     try:
         minimize(
-            lambda x: own(x).cost / scale if np.isfinite(own(x).cost) else -LOST, start,
+            lambda x: own(x).cost / scale if np.isfinite(own(x).cost) else -LOST_MARGIN, start,
             jac=lambda x: own(x).cost_slopes / scale, method="SLSQP",
             bounds=[(0.0, 1.0)] * start.size, constraints=[within] if first.parts.size else [],
             options={"ftol": 1e-6, "maxiter": 1000},

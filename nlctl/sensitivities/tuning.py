@@ -24,7 +24,7 @@ from .climbing import lower_cost, raise_least_margin
 from .names import declared_bounds
 from .tuned import Tuned
 from .tuning_notes import notes
-from .worth import Asked, Runs, Worth, checked_samples
+from .worth import Runs, TuningProblem, Worth, checked_samples
 
 __all__ = ["tune"]
 
@@ -245,7 +245,7 @@ def _plainest(runs: Runs, start: np.ndarray) -> tuple[np.ndarray, list[Worth]]:
         best, worth = others[j], max(worth, without[j], key=lambda each: each.rank)
 
 
-def _by_key(asked: Asked, worth: Worth) -> dict[str, float]:
+def _by_key(asked: TuningProblem, worth: Worth) -> dict[str, float]:
     """Return the least margins over the samples, and the mean cost."""
     found = {m.key: float(worth.table[:, j].min()) for j, m in enumerate(asked.margins)}
     return found if asked.cost is None else found | {asked.cost.key: worth.cost}
@@ -265,7 +265,7 @@ def _history(runs: Runs) -> Any:
 
 def _asked(
     diagram: Any, what: tuple[Any, ...], given: tuple[Any, ...], how: dict[str, Any]
-) -> tuple[Asked, np.ndarray]:
+) -> tuple[TuningProblem, np.ndarray]:
     """Return what is asked of runs, and the gains to start from."""
     (space, spec, cost, samples), (timepts, inputs, initial_state, params) = what, given
     tolerances("tune", how["rtol"], how["atol"])
@@ -276,7 +276,7 @@ def _asked(
     own = _own_values(diagram, params, initial_state)
     rows = [_row(diagram, name, value, own) for name, value in _bounds(space)]
     start, low, high = np.array([row[1:] for row in rows], dtype=float).T
-    asked = Asked(
+    asked = TuningProblem(
         diagram=diagram, times=_times(timepts, margins), inputs=inputs, params=params,
         initial_state=initial_state, names=tuple(row[0] for row in rows), low=low, high=high,
         samples=checked_samples(samples or {}, [row[0] for row in rows]), margins=margins,

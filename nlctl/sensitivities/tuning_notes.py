@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..wording import counted
-from .worth import LOST, Runs, Worth
+from .worth import LOST_MARGIN, Runs, Worth
 
 __all__ = ["notes"]
 
@@ -22,7 +22,7 @@ def notes(runs: Runs, before: Worth, best: np.ndarray) -> tuple[str, ...]:
 
 def _start(runs: Runs, before: Worth) -> Iterator[str]:
     """Yield what is to be said of the gains to start from."""
-    if np.any(before.margins <= LOST) or (before.has_cost and not np.isfinite(before.cost)):
+    if np.any(before.margins <= LOST_MARGIN) or (before.has_cost and not np.isfinite(before.cost)):
         yield "with the gains to start from a run does not reach its end: other starts were taken"
     for key, names in runs.at_first.items():
         yield (

@@ -16,9 +16,9 @@ from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
 from .response import sensitivity_response
 
-__all__ = ["LOST", "PER_DERIVATIVE", "Asked", "Runs", "Worth", "checked_samples"]
+__all__ = ["LOST_MARGIN", "PER_DERIVATIVE", "Runs", "TuningProblem", "Worth", "checked_samples"]
 
-LOST = -1e3
+LOST_MARGIN = -1e3
 """The margin of a run that does not reach its end."""
 PER_DERIVATIVE = 0.7
 """Of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`."""
@@ -27,7 +27,7 @@ _NEAREST = 6  # parts of a requirement that count: the lowest
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Asked:
+class TuningProblem:
     """Which runs are made, and what is asked of them.
 
     Attributes
@@ -170,7 +170,7 @@ class Worth:
 class Runs:
     """Makes runs, counts them, and keeps what each choice of gains was worth."""
 
-    def __init__(self, asked: Asked) -> None:
+    def __init__(self, asked: TuningProblem) -> None:
         self.asked = asked
         self.plain = self.differentiated = 0
         self.why = ""  # there are no derivatives at all
@@ -307,7 +307,7 @@ class Runs:
         for metric, parts, rows in zip(asked.margins, asked.parts, asked.rows, strict=True):
             own = np.array([_value(part, made) for part in parts])
             lowest = _lowest(own, [len(row) for row in rows])
-            counting = np.full(own.size, -LOST)
+            counting = np.full(own.size, -LOST_MARGIN)
             counting[lowest] = own[lowest]
             values.append(counting)
             slopes.append(np.zeros((own.size, k)))
@@ -381,7 +381,10 @@ class _Part:
 
 
 def _graded(margins: np.ndarray) -> np.ndarray:
-    return np.maximum(np.nan_to_num(margins, nan=LOST, posinf=-LOST, neginf=LOST), LOST)
+    return np.maximum(
+        np.nan_to_num(margins, nan=LOST_MARGIN, posinf=-LOST_MARGIN, neginf=LOST_MARGIN),
+        LOST_MARGIN,
+    )
 
 
 def _lowest(values: np.ndarray, lengths: Sequence[int]) -> np.ndarray:

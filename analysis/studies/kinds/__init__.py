@@ -11,7 +11,7 @@ from .regional import REGIONAL
 from .sequential import SEQUENTIAL
 from .sobol import SOBOL
 from .tornado import TORNADO
-from .tuning import TUNING
+from .tuning import GAIN_TUNING
 from .worst_case import WORST_CASE
 
 __all__ = ["KINDS"]
@@ -29,5 +29,5 @@ KINDS = (  # in the order of the report
     FAILURE_MAP,
     FAULTS,
     COMPARE,
-    TUNING,
+    GAIN_TUNING,
 )

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TORNADO"]
 
-CAPTION = (
+_CAPTION = (
     "'{of}' is {value:.4g} at the nominal values. Bars: its derivative by each quantity times the "
     "distance to either end of the box; marks: a run with that quantity at that end, all others "
     "nominal. Where marks lie off the bars, it is not linear up to there."
@@ -168,7 +168,7 @@ def _asked_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the tornado."""
     n, table = finding.numbers, finding.tables["effects"]
-    caption = CAPTION.format(of=n["of"], value=n["value"])
+    caption = _CAPTION.format(of=n["of"], value=n["value"])
     yield Figure(
         key=f"{key}-tornado",
         caption=caption,

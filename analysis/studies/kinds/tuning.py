@@ -47,15 +47,15 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["TUNING"]
+__all__ = ["GAIN_TUNING"]
 
-BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
-TRIED = "What every choice of gains was worth on the samples that gains were found on."
-BOUGHT = (
+_BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
+_TRIED = "What every choice of gains was worth on the samples that gains were found on."
+_BOUGHT = (
     "What each gain has bought, on these samples: with this one alone as found, and with all but "
     "this one. What lies far outside is cut off."
 )
-FRESH = "Share of the fresh rows with at most that margin, with the same rows before and after."
+_FRESH = "Share of the fresh rows with at most that margin, with the same rows before and after."
 MADSEN = (
     "K. Madsen: An algorithm for minimax solution of overdetermined systems of non-linear "
     "equations. J. Inst. Maths Applics 16 (1975) 321–328. doi 10.1093/imamat/16.3.321."
@@ -296,25 +296,25 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     before, after = ({s: signals[f"{s}, {w}"].to_numpy() for s in names}
                      for w in ("before", "after"))  # fmt: skip
     yield Figure(
-        key=f"{key}-signals", caption=BOTH, description=f"{BOTH} {_largest_of(before, after)}",
+        key=f"{key}-signals", caption=_BOTH, description=f"{_BOTH} {_largest_of(before, after)}",
         figure=figures.before_and_after(signals["time"].to_numpy(), before, after),
     )  # fmt: skip
     yield Figure(
-        key=f"{key}-bought", caption=BOUGHT,
-        description=f"{BOUGHT} With it alone: {column_in_words(gains['alone'])}.",
+        key=f"{key}-bought", caption=_BOUGHT,
+        description=f"{_BOUGHT} With it alone: {column_in_words(gains['alone'])}.",
         figure=figures.bought(gains, n["before"], n["after"], what),
     )  # fmt: skip
     fresh = tables["fresh"]
     margins = fresh["before"].to_numpy(), fresh["after"].to_numpy()
     yield Figure(
-        key=f"{key}-fresh", caption=FRESH + text.clipped(np.concatenate(margins)),
-        description=f"{FRESH} Median before {np.median(margins[0]):.4g}, after "
+        key=f"{key}-fresh", caption=_FRESH + text.clipped(np.concatenate(margins)),
+        description=f"{_FRESH} Median before {np.median(margins[0]):.4g}, after "
         f"{np.median(margins[1]):.4g}.", figure=figures.margins_of_both(*margins),
     )  # fmt: skip
     yield _asked_table(tables["requirements"])
     yield Figure(
-        key=f"{key}-tried", caption=TRIED + text.clipped(tables["tried"]["margin"]),
-        description=f"{TRIED} Runs as counted: {n['counted_runs']:.0f}.",
+        key=f"{key}-tried", caption=_TRIED + text.clipped(tables["tried"]["margin"]),
+        description=f"{_TRIED} Runs as counted: {n['counted_runs']:.0f}.",
         figure=figures.tried(tables["tried"], is_cost),
     )  # fmt: skip
 
@@ -338,7 +338,7 @@ def _largest_of(before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray
     return " ".join(told)
 
 
-TUNING = Kind(
+GAIN_TUNING = Kind(
     name="tuning",
     schema=Tuning,
     run=_run,
