@@ -148,3 +148,30 @@ def test_bounds_of_a_block():
     assert abs(found["lag.T"] - 0.02) < 1e-8
     with pytest.raises(nlctl.errors.ParameterError, match="within its bounds"):
         nlctl.fit(lag, t, {"v": t}, {"lag.T": -1.0}, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("example", "truth"),
+    [
+        (nlctl.paper.example_1, {"b_r": 0.6, "b_l": -0.25, "slope_r": 1.1, "slope_l": 0.9}),
+        (nlctl.paper.example_2, {"c_r": 0.4, "c_l": -0.7, "m_r": 1.3, "m_l": 1.1}),
+    ],
+    ids=["dead zone", "backlash"],
+)
+def test_actuators_of_the_paper(example, truth):
+    """All four parameters of the actuator from noisy u and y of the closed loop, within 4 sigma."""
+    loop, rng, t = nlctl.compile(example()), np.random.default_rng(4), np.linspace(0, 20, 401)
+    truth = {f"actuator.{name}": value for name, value in truth.items()}
+    run = nlctl.input_output_response(loop, t, params=truth, rtol=1e-9, atol=1e-11)
+    sigma, labels = {"u": 0.05, "y": 0.005}, list(loop.system.output_labels)
+    data = {
+        name: run.outputs[labels.index(name)] + size * rng.normal(size=t.size)
+        for name, size in sigma.items()
+    }
+    published = {name: nlctl.parameters(loop.system)["value"][name] for name in truth}
+    found = nlctl.fit(loop, t, data, published, sigma=sigma)
+    assert found.success
+    assert found.unidentifiable == ()
+    assert np.all(np.abs(found.values - list(truth.values())) < 4 * found.errors)
+    assert np.all(found.errors < 0.05)
+    assert abs(found.noise - 1) < 0.1
