@@ -94,7 +94,10 @@ def _check_asks(study: Path) -> None:
 
     from ..studies.file.toml import read_toml
 
-    content = read_toml(study.read_text(encoding="utf-8"))
+    try:
+        content = read_toml(study.read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # reading the study says why, with the line
+        return
     asked = content.get("analysis", ())
     kinds = [a.get("kind") for a in asked if isinstance(a, dict)] if asked else []
     if _KIND not in kinds:

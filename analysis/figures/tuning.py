@@ -114,6 +114,7 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
     ax.axvline(before, color=GREY, linewidth=1.0, linestyle="--", label="before")
     ax.axvline(after, color=GREEN, linewidth=1.2, label="after")
     legend_above(ax, line=SHORT_LINE)
+    ax.use_sticky_edges = False
     ax.margins(x=0.05)
     ax.set_xlabel(what, parse_math=False)
     return figure
