@@ -68,7 +68,7 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
     space = prepared.experiment.space
     own, middle = _numbers(space), nominal(space)
     rows = [middle, *(middle | {q.name: end} for q in own for end in q.box)]
-    design = from_table(space, pd.DataFrame(rows)[space.names], entropy=ground.seed)
+    design = from_table(space, pd.DataFrame(rows, columns=space.names), entropy=ground.seed)
     done = ground.run_design(design)
     if not done.complete:
         return None

@@ -141,7 +141,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
     )
     both = [drawn.assign(**dict(zip(found.names, values, strict=True)))
             for values in (found.start, found.values)]  # fmt: skip
-    rows = pd.concat(both, ignore_index=True)[space.names]
+    rows = pd.concat(both, ignore_index=True).filter(space.names)
     done = ground.run_design(from_table(space, rows, entropy=ground.seed), prepared)
     if not done.complete:
         return None
@@ -325,7 +325,7 @@ def _asked_table(requirements: pd.DataFrame) -> Table:
         "mean of a metric.",
         columns=("number", "before", "after"),
         rows=[(name, margin_text(row["before"]), margin_text(row["after"]))
-              for name, row in requirements.iterrows()],
+              for name, row in requirements.to_dict("index").items()],
     )  # fmt: skip
 
 
