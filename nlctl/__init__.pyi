@@ -115,9 +115,11 @@ from .sensitivities import (
     MetricGradient,
     NoDerivative,
     SensitivityResponse,
+    Tuned,
     fit,
     metric_gradient,
     sensitivity_response,
+    tune,
 )
 from .sliding import IdealRelay
 
@@ -213,6 +215,7 @@ __all__ = [
     "SuperTwistingLaw",
     "TransportDelay",
     "TriggeredHold",
+    "Tuned",
     "UnknownNameError",
     "UsageError",
     "WingRock",
@@ -257,6 +260,7 @@ __all__ = [
     "sensitivity_response",
     "sliding_mode",
     "state_names",
+    "tune",
     "typeset",
     "with_faults",
 ]

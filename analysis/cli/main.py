@@ -11,6 +11,7 @@ from .memory import TOO_LITTLE, is_short_of_memory
 from .printing import error_line
 from .report import register_reports
 from .studies import FAILS, OPEN, register_studies
+from .tune import register_tuning
 
 UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
 
@@ -235,6 +236,7 @@ def _write_csv(path: Path, times, signals) -> None:
 
 register_reports(app)
 register_studies(app)
+register_tuning(app)
 
 
 def main() -> None:

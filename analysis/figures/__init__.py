@@ -11,7 +11,7 @@ from .proof import (
     story,
     windowed_maximum,
 )
-from .rankings import paired_differences, screening, set_apart, shares, violation_rates
+from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
 from .runs import (
     CLIP,
     LIMIT,
@@ -23,11 +23,14 @@ from .runs import (
     running_estimate,
 )
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .tuning import before_and_after, bought, margins_of_both, tried
 
 __all__ = [
     "CLIP",
     "LIMIT",
     "Limit",
+    "before_and_after",
+    "bought",
     "bounds",
     "burst",
     "degradation",
@@ -41,6 +44,7 @@ __all__ = [
     "long_zeta",
     "lyapunov_bound",
     "margins_figure",
+    "margins_of_both",
     "most_frequent",
     "paired_differences",
     "quantile",
@@ -51,6 +55,8 @@ __all__ = [
     "set_apart",
     "shares",
     "story",
+    "tornado",
+    "tried",
     "violation_rates",
     "windowed_maximum",
 ]

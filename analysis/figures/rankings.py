@@ -15,7 +15,8 @@ from nlctl.annotations import as_annotated
 from .axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 from .labels import arms, number_axes
 
-__all__ = ["paired_differences", "screening", "set_apart", "shares", "violation_rates"]
+__all__ = ["paired_differences", "screening", "set_apart", "shares", "tornado"]
+__all__ += ["violation_rates"]
 
 
 @as_annotated
@@ -62,6 +63,46 @@ def shares(indices: pd.DataFrame) -> Figure:
     _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
     legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("share of the variance (1)")
+    return figure
+
+
+@as_annotated
+def tornado(effects: pd.DataFrame, value: float) -> Figure:
+    """What each quantity does to a number at either end of its box, by derivatives and by runs.
+
+    Parameters
+    ----------
+    effects : pandas.DataFrame
+        A row for each quantity: changes ``low``, ``high`` by derivatives, ``run_low``,
+        ``run_high`` by runs.
+    value : float
+        The number at the nominal values.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
+    reach = effects[["low", "high"]].abs().max(axis=1).fillna(-1.0)
+    effects = effects.loc[reach.sort_values(ascending=False, kind="stable").index]
+    figure, ax = number_axes(effects.index)
+    figure.set_figheight(figure.get_figheight() + 0.4)
+    at, ends = np.arange(len(effects)), (("low", ORANGE, "v", "///"), ("high", BLUE, "^", ""))
+    wide = 3.0 * float(np.nanmax(effects[["low", "high"]].abs().to_numpy(), initial=0.0)) or 1.0
+    for end, colour, marker, hatch in ends:
+        name = "lower end" if end == "low" else "upper end"
+        ax.barh(
+            at, effects[end].to_numpy(), 0.6, left=value, color=colour, hatch=hatch,
+            edgecolor="white", label=f"derivative, {name}", alpha=0.85,
+        )  # fmt: skip
+        runs = np.clip(effects[f"run_{end}"].to_numpy(dtype=float), -wide, wide)
+        ax.plot(
+            value + runs, at, marker, color=colour, markeredgecolor="black", markersize=6,
+            label=f"run, {name}",
+        )  # fmt: skip
+    ax.axvline(value, color=GREY, linewidth=1.0, linestyle="--")
+    legend_above(ax, line=SHORT_LINE + 8)
+    ax.set_xlabel("value (nominal: dashed)")
     return figure
 
 

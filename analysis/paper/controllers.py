@@ -30,7 +30,7 @@ from nlctl.native import ensemble_response
 from nlctl.references import BandLimitedNoise
 
 from ..metrics import tracking_metrics
-from .tuning import Tuned, tune
+from .tuning import EvolvedGains, evolved_gains
 
 __all__ = [
     "baselines",
@@ -165,7 +165,7 @@ def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     )
 
 
-def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tuned]:
+def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, EvolvedGains]:
     """Tune the baselines of an example: where the numbers of `baselines` come from.
 
     The least IAE with max |u| at most that of the paper's controller, both with the noise of
@@ -187,7 +187,7 @@ def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, Tu
     found = {}
     for label, controller in baselines(example).items():
         loop = compiled_loop(build(controller=controller, sensor=sensor(example)))
-        found[label] = tune(
+        found[label] = evolved_gains(
             loop, bounds[label], times, cost,
             limited=limited, limit=limit, generations=generations, seed=seed,
         )  # fmt: skip

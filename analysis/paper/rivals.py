@@ -37,7 +37,7 @@ from ..metrics import tracking_metrics
 from ..robustness import independent
 from . import loops
 from .controllers import part_of, published_controller
-from .tuning import Tuned, split_samples, tune
+from .tuning import EvolvedGains, evolved_gains, split_samples
 
 __all__ = ["KNOWLEDGE", "behind", "rival_actuators", "rival_controllers", "rival_loop"]
 __all__ += ["rival_searches", "tuned_rivals"]
@@ -308,7 +308,7 @@ def _with(example: str, controller: Any, actuator: Any, noise: float) -> ct.Inte
 
 def tuned_rivals(
     example: str, *, size: int = 4, candidates: int = 240, seed: int = 0
-) -> dict[str, Tuned]:
+) -> dict[str, EvolvedGains]:
     """Tune every controller with the same budget on the same samples of the study's own space.
 
     The least mean IAE over `size` samples with the example's actuator, for max |u| at most that of
@@ -330,7 +330,7 @@ def tuned_rivals(
     for label, rival in _rivals(example).items():
         middle = {key: float(np.sqrt(low * high)) for key, (low, high) in rival.bounds.items()}
         loop = compiled_loop(_with(example, rival.make(example, middle), actuator, 0.0))
-        found[label] = tune(
+        found[label] = evolved_gains(
             loop, rival.bounds, times, cost,
             limited=limited, limit=float(table[limited.key].to_numpy().max()), samples=samples,
             generations=max(1, round(candidates / (10 * len(rival.bounds))) - 1), seed=seed,

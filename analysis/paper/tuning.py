@@ -1,4 +1,7 @@
-"""Gains of a controller by search on one loop, so that a comparison is with a tuned one."""
+"""Gains of a controller by search on one loop, so that a comparison is with a tuned one.
+
+The recorded gains of baselines and rivals come from here; `nlctl.tune` is for all else.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,14 @@ from nlctl.native import Compiled, ensemble_response
 
 from ..metrics import Metric
 
-__all__ = ["Tuned", "split_samples", "tune"]
+__all__ = ["EvolvedGains", "evolved_gains", "split_samples"]
 
 _REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
 LOST = 1e3  # what counts as the excess of a run that did not reach its end
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tuned:
+class EvolvedGains:
     """Gains that were found.
 
     Attributes
@@ -39,7 +42,7 @@ class Tuned:
     runs: int
 
 
-def tune(
+def evolved_gains(
     loop: Compiled,
     bounds: Mapping[str, tuple[float, float]],
     timepts: np.ndarray,
@@ -51,7 +54,7 @@ def tune(
     max_steps: int = 10_000,
     seed: int = 0,
     samples: Mapping[str, np.ndarray] | None = None,
-) -> Tuned:
+) -> EvolvedGains:
     """Search the gains with the least cost that keep another metric within its limit.
 
     Of several samples the mean cost counts, and the largest value of the limited metric.
@@ -64,7 +67,9 @@ def tune(
     names = list(bounds)
     for name, (low, high) in bounds.items():
         if not 0 < low < high:
-            raise ParameterError(f"tune needs 0 < low < high for '{name}', got {low:g}, {high:g}")
+            raise ParameterError(
+                f"evolved_gains needs 0 < low < high for '{name}', got {low:g}, {high:g}"
+            )
     runs, start, params = 0, *split_samples(samples or {})
     size = max([np.size(values) for values in (*start.values(), *params.values())], default=1)
 
@@ -97,7 +102,7 @@ def tune(
         )
     gains = {name: float(value) for name, value in zip(names, np.exp(found.x), strict=True)}
     largest = outcomes(found.x[:, None])[1]
-    return Tuned(gains=gains, cost=float(found.fun), limited=float(largest[0]), runs=runs)
+    return EvolvedGains(gains=gains, cost=float(found.fun), limited=float(largest[0]), runs=runs)
 
 
 def split_samples(

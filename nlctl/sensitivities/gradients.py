@@ -138,30 +138,29 @@ def metric_gradient(metric: MetricLike, response: SensitivityResponse) -> Metric
         )
     places = [response.signals.index(signal) for signal in metric.signals]
     t, y = response.time[inside], response.values[places][:, inside]
-    sides = []
+    sides, here = [], float(metric.function(t, *y.copy()))
     for j, scale in enumerate(response.scale):
         way = response.derivatives[places, j][:, inside] * scale
-        sides.append([side / scale for side in _to_both_sides(metric, t, y, way)])
+        sides.append([side / scale for side in _to_both_sides(metric, t, (y, here), way)])
     above, below = np.array(sides, dtype=float).T
     return MetricGradient(
-        key=metric.key, value=float(metric.function(t, *y.copy())),
+        key=metric.key, value=here,
         with_respect_to=response.with_respect_to, scale=response.scale, above=above, below=below,
     )  # fmt: skip
 
 
 def _to_both_sides(
-    metric: MetricLike, t: np.ndarray, y: np.ndarray, way: np.ndarray
+    metric: MetricLike, t: np.ndarray, at: tuple[np.ndarray, float], way: np.ndarray
 ) -> tuple[float, float]:
     """Return the derivatives along a way of the samples and against it, of second order each."""
+    y, here = at
     if not np.isfinite(way).all() or not np.isfinite(y).all():
         return np.nan, np.nan
     longest = np.abs(way).max(initial=0.0)
     if longest == 0.0:
         return 0.0, 0.0
     step = _STEP * max(np.abs(y).max(initial=0.0), longest) / longest
-    here, *moved = (
-        float(metric.function(t, *(y + k * step * way))) for k in (0.0, 1.0, 2.0, -1.0, -2.0)
-    )
+    moved = [float(metric.function(t, *(y + k * step * way))) for k in (1.0, 2.0, -1.0, -2.0)]
     above = (4 * moved[0] - 3 * here - moved[1]) / (2 * step)
     below = (3 * here - 4 * moved[2] + moved[3]) / (2 * step)
     return above, below

@@ -18,7 +18,8 @@ from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 from ..params import declared_params
 
-__all__ = ["Observed", "VariedQuantity", "observed_signals", "varied_quantities"]
+__all__ = ["Observed", "VariedQuantity", "declared_bounds", "observed_signals"]
+__all__ += ["varied_quantities"]
 
 _AT_START = "(0)"
 
@@ -84,7 +85,7 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
         place, owner = parameters[full]
         _check_moves(compiled, owner, full)
         check_enters_alone(owner, full)
-        lowest, highest = _bounds(owner, full)
+        lowest, highest = declared_bounds(owner, full)
         found.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
     return found
 
@@ -104,7 +105,7 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
         )
 
 
-def _bounds(owner: Any, name: str) -> tuple[float, float]:
+def declared_bounds(owner: Any, name: str) -> tuple[float, float]:
     """Return between what a block declares that a parameter lies."""
     if not isinstance(owner.system, Block):
         return -np.inf, np.inf

@@ -12,7 +12,7 @@ from nlctl.analysis.lyapunov.nussbaum.forecast import BurstForecast
 from nlctl.analysis.metrics import Metric, absolute_integral, final, peak
 from nlctl.analysis.paper import loops
 from nlctl.analysis.paper.controllers import baselines, compared_controllers, sensor
-from nlctl.analysis.paper.tuning import tune
+from nlctl.analysis.paper.tuning import evolved_gains
 from nlctl.params import equation_arguments
 
 numbers = st.floats(-50, 50)
@@ -268,7 +268,7 @@ class TestComparedControllers:
         gain = ct.nlsys(None, output, inputs=["x1", "yd"], outputs=["e", "u"], params={"k_p": 1.0})
         blocks = {"r": still, "plant": plant, "p": gain, "actuator": nlctl.Gain()}
         loop = nlctl.compile(nlctl.interconnect(blocks, outputs=["e", "u"]))
-        found = tune(
+        found = evolved_gains(
             loop,
             {"k_p": (0.1, 100.0)},
             T,

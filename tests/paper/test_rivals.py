@@ -28,7 +28,7 @@ from nlctl.analysis.paper.rivals import (
     rival_loop,
     rival_searches,
 )
-from nlctl.analysis.paper.tuning import tune
+from nlctl.analysis.paper.tuning import evolved_gains
 from nlctl.analysis.report.document import Table
 from nlctl.analysis.studies import read_study, run, shipped
 
@@ -117,7 +117,7 @@ def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
     blocks = {"r": still, "plant": nlctl.PureFeedback(order=1, f=f), "p": Proportional()}
     loop = nlctl.interconnect(blocks | {"actuator": nlctl.Gain()}, outputs=["e", "u"])
     starts = np.array([0.5, -2.0, 1.0])
-    found = tune(
+    found = evolved_gains(
         nlctl.compile(loop),
         {"p.k": (0.1, 100.0)},
         np.linspace(0, 20, 2001),

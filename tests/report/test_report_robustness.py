@@ -95,6 +95,8 @@ factors = [0.0, 0.5, 1.0]
 runs = 40
 limit = 0.3
 [[analysis]]
+kind = "tornado"
+[[analysis]]
 kind = "morris"
 trajectories = 6
 [[analysis]]
@@ -120,6 +122,13 @@ options = { one = 1.0, more = 1.5, less = 0.8 }
 runs = 40
 metrics = { iae = "smaller", late_peak = "smaller" }
 better = ["less", "one"]
+[[analysis]]
+kind = "tuning"
+gains = { "lag.scale" = [0.2, 2.0] }
+budget = 12
+samples = 2
+runs = 20
+limit = 0.5
 """
 HOSTILE = (
     "</script><img src=x onerror=alert(1)>",
@@ -394,7 +403,7 @@ def test_an_unfinished_study_says_so(result):
     """What is done is shown."""
     part = replace(result, findings=result.findings[:2], complete=False)
     made = study_report(part)
-    assert made.verdict.startswith("Incomplete: 2 of 11 analyses done.")
+    assert made.verdict.startswith("Incomplete: 2 of 13 analyses done.")
     keys = [section.key for section in made.sections]
     assert keys == ["study_asked", "study_rows", "probability", "sequential", "study_assumed"]
 

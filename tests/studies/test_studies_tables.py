@@ -75,6 +75,17 @@ requirements = ["decays"]
 runs = 4
 metrics = { iae = "smaller" }
 better = ["calm", "wild"]
+
+[[analysis]]
+kind = "tornado"
+
+[[analysis]]
+kind = "tuning"
+gains = { "lag.scale" = [0.2, 2.0] }
+budget = 8
+samples = 2
+starts = 1
+runs = 10
 """
 SMALL = '[runs]\nsize = 20\n\n[[analysis]]\nkind = "probability"\nlimit = 0.001\n'
 

@@ -16,6 +16,7 @@ from nlctl.names import unknown
 from nlctl.params import as_numbers
 
 from .formula import HOW, Formula, SampledSignals, horizon, margin_trace, signals_named
+from .parts import conjunction
 
 __all__ = [
     "FAILED",
@@ -29,6 +30,7 @@ __all__ = [
 
 FAILED = 1e6
 """No margin of a run that reached its end is below -FAILED, and none of another run above it."""
+_PIECES = 16  # of a window, where a requirement is taken apart
 
 
 @as_annotated
@@ -79,6 +81,20 @@ class Requirement:
     def signals(self) -> tuple[str, ...]:
         """Names of the signals that it looks at."""
         return signals_named(self.formula)
+
+    @property
+    def parts(self) -> tuple[tuple[Requirement, ...], ...]:
+        """Requirements whose least margin is that of this one: a row for each bound of a window.
+
+        In a row are pieces of the window: which time decides changes less often in a piece, so
+        that margins of parts have fewer kinks.
+        """
+        rows = conjunction(self.formula, self.until, _PIECES)
+        return tuple(
+            tuple(Requirement(key=f"{self.key}, {part}", formula=part, until=self.until)
+                  for part in row)
+            for row in rows
+        )  # fmt: skip
 
     def function(
         self, t: np.ndarray, *samples: np.ndarray, breaks: ArrayLike | None = None

@@ -10,6 +10,8 @@ from .radius import RADIUS
 from .regional import REGIONAL
 from .sequential import SEQUENTIAL
 from .sobol import SOBOL
+from .tornado import TORNADO
+from .tuning import GAIN_TUNING
 from .worst_case import WORST_CASE
 
 __all__ = ["KINDS"]
@@ -20,10 +22,12 @@ KINDS = (  # in the order of the report
     WORST_CASE,
     RADIUS,
     DEGRADATION,
+    TORNADO,
     MORRIS,
     SOBOL,
     REGIONAL,
     FAILURE_MAP,
     FAULTS,
     COMPARE,
+    GAIN_TUNING,
 )

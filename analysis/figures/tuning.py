@@ -1,0 +1,152 @@
+"""Figures of tuning: before and after, how it was found, and what each gain has bought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from nlctl.annotations import as_annotated
+
+from .axes import BLUE, GREEN, GREY, ORANGE, SHORT_LINE, TIME, legend_above, stacked_axes
+from .labels import number_axes, plain
+from .runs import clipped_margins
+
+__all__ = ["before_and_after", "bought", "margins_of_both", "tried"]
+
+_CHOSEN = {
+    "search": (BLUE, "o", "search"),
+    "Sobol'": (GREY, "x", "points of Sobol'"),
+    "put back": (GREEN, "+", "a gain put back"),
+}
+
+
+@as_annotated
+def before_and_after(
+    time: np.ndarray, before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]
+) -> Figure:
+    """Draw signals over time with the gains of the start and with those that were found.
+
+    Parameters
+    ----------
+    time : ndarray of shape (m,)
+        In s.
+    before, after : mapping of str to ndarray of shape (m,)
+        The same signals.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
+    figure, axes = stacked_axes(len(before), 1.8)
+    for ax, name in zip(axes, before, strict=True):
+        ax.plot(time, before[name], "--", color=ORANGE, linewidth=1.4, label="before")
+        ax.plot(time, after[name], color=BLUE, linewidth=1.4, label="after")
+        ax.set_ylabel(plain(name), parse_math=False)
+    legend_above(axes[0])
+    axes[-1].set_xlabel(TIME)
+    return figure
+
+
+@as_annotated
+def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
+    """Draw what every choice of gains was worth, by the runs until then, and the best so far.
+
+    Parameters
+    ----------
+    history : pandas.DataFrame
+        As that of `nlctl.Tuned`.
+    cost : bool, optional
+        Whether it is the cost that counts.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
+    figure, (ax,) = stacked_axes()
+    y = history["cost"].to_numpy() if cost else clipped_margins(history["margin"].to_numpy())
+    for name, (colour, marker, label) in _CHOSEN.items():
+        own = (history["by"] == name).to_numpy()
+        if own.any():
+            ax.plot(history["runs"][own], y[own], marker, color=colour, markersize=4, label=label)
+    if not cost:
+        best = np.maximum.accumulate(y)
+        ax.step(history["runs"], best, where="post", color=ORANGE, linewidth=1.4, label="best")
+    legend_above(ax)
+    ax.set(xlabel="runs (1 + 0.7 k for k derivatives)", ylabel="cost" if cost else "least margin")
+    return figure
+
+
+@as_annotated
+def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figure:
+    """Draw what each gain has bought: with it alone as found, and with all others as found.
+
+    Parameters
+    ----------
+    gains : pandas.DataFrame
+        As `nlctl.Tuned.to_pandas` returns it.
+    before, after : float
+        The least margin, or the cost, with all gains of the start and as found.
+    what : str
+        Name of the axis.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
+    figure, ax = number_axes(gains.index)
+    figure.set_figheight(figure.get_figheight() + 0.9)
+    at = np.arange(len(gains))
+    alone, rest = (_confined(gains[c].to_numpy(), before, after) for c in ("alone", "put_back"))
+    ax.barh(
+        at - 0.18, alone - before, 0.34, left=before, color=BLUE, edgecolor="white",
+        label="this one alone as found",
+    )  # fmt: skip
+    ax.barh(
+        at + 0.18, rest - after, 0.34, left=after, color=ORANGE, hatch="///", edgecolor="white",
+        label="all but this one as found",
+    )  # fmt: skip
+    ax.axvline(before, color=GREY, linewidth=1.0, linestyle="--", label="before")
+    ax.axvline(after, color=GREEN, linewidth=1.2, label="after")
+    legend_above(ax, line=SHORT_LINE)
+    ax.use_sticky_edges = False
+    ax.margins(x=0.05)
+    ax.set_xlabel(what, parse_math=False)
+    return figure
+
+
+def _confined(values: np.ndarray, before: float, after: float) -> np.ndarray:
+    """Return values within twice the gain around what was and what is: bars beyond are cut."""
+    wide = 2.0 * abs(after - before) or 1.0
+    low, high = min(before, after) - wide, max(before, after) + wide
+    return np.nan_to_num(np.clip(values, low, high), nan=low)
+
+
+@as_annotated
+def margins_of_both(before: np.ndarray, after: np.ndarray) -> Figure:
+    """Draw the share of rows with at most a margin, before and after.
+
+    Parameters
+    ----------
+    before, after : ndarray of shape (rows,)
+        Margins of the same rows.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; nothing is written or shown.
+    """
+    figure, (ax,) = stacked_axes()
+    for y, colour, style, label in ((before, ORANGE, "--", "before"), (after, BLUE, "-", "after")):
+        ordered = np.sort(clipped_margins(y))
+        share = np.arange(1, ordered.size + 1) / ordered.size
+        ax.step(ordered, share, style, where="post", color=colour, linewidth=1.4, label=label)
+    ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
+    legend_above(ax)
+    ax.set(xlabel="margin (1)", ylabel="share of the rows", ylim=(0.0, 1.02))
+    return figure

@@ -1,0 +1,199 @@
+"""Derivatives of a margin at the nominal values, times how far each quantity may go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from nlctl.errors import CompileError, ParameterError
+from nlctl.native import Compiled
+from nlctl.native.ensemble import MetricLike
+from nlctl.sensitivities import MetricGradient, metric_gradient, sensitivity_response
+from nlctl.wording import counted
+
+from ... import figures as figures
+from ...report.document import Figure
+from ...robustness import Experiment, Space, Uncertain, arguments, from_table, nominal
+from ..file.asked import Asked
+from ..finding import Finding
+from ..kind import Ground, Kind, Setup, column, made
+from ..page import text as text
+from ..page.tables import column_in_words, result_table
+
+if TYPE_CHECKING:
+    from ...report.document import Item
+    from ..result import Result
+
+__all__ = ["TORNADO"]
+
+_CAPTION = (
+    "'{of}' is {value:.4g} at the nominal values. Bars: its derivative by each quantity times the "
+    "distance to either end of the box; marks: a run with that quantity at that end, all others "
+    "nominal. Where marks lie off the bars, it is not linear up to there."
+)
+GRIEWANK = (
+    "A. Griewank, A. Walther: Evaluating Derivatives. 2nd ed. SIAM 2008. "
+    "doi 10.1137/1.9780898717761."
+)
+
+
+class Tornado(Asked):
+    """Derivatives at the nominal values, times how far each quantity may go."""
+
+    of: str = Field("spec", description="Column: a margin or a metric; spec: the least margin.")
+
+
+def _numbers(space: Space) -> list[Uncertain]:
+    """Return the quantities that there are derivatives by."""
+    return [quantity for quantity in space.quantities if not quantity.is_integer]
+
+
+def _check(asked: Tornado, setup: Setup) -> None:
+    """Refuse a space of integers and choices alone."""
+    if not _numbers(setup.experiment.space):
+        raise ParameterError("'tornado' needs quantities that are no integers, got none")
+
+
+def _runs(asked: Tornado, setup: Setup) -> int:
+    return 1 + 2 * len(_numbers(setup.experiment.space))
+
+
+def _run(asked: Tornado, ground: Ground) -> Finding | None:
+    """Differentiate the nominal run, then run every quantity at either end of its box."""
+    prepared = ground.prepared
+    space = prepared.experiment.space
+    own, middle = _numbers(space), nominal(space)
+    rows = [middle, *(middle | {q.name: end} for q in own for end in q.box)]
+    design = from_table(space, pd.DataFrame(rows, columns=space.names), entropy=ground.seed)
+    done = ground.run_design(design)
+    if not done.complete:
+        return None
+    loop = next(
+        loop for labels, loop in prepared.loops if all(middle[k] == v for k, v in labels.items())
+    )
+    found, without = _gradient(asked, prepared.experiment, loop, own)
+    at_ends = column(done, asked.of)
+    table = _table(own, found, at_ends[1:].reshape(-1, 2) - at_ends[0])
+    reach = table[["low", "high"]].abs().max(axis=1)
+    largest = ", ".join(f"{name} ({reach[name]:.3g})" for name in reach.nlargest(3).index)
+    told = (
+        f"'{asked.of}' is {found.value:.4g} at the nominal values"
+        + (f", by '{found.key}'" if found.key != asked.of else "")
+        + f"; what changes it most within its box, by its derivative: {largest} (one run with "
+        f"{counted(len(own), 'derivative')}, {counted(len(rows), 'run')} without).{without}"
+    )
+    return made(
+        asked,
+        told,
+        runs=1 + len(rows),
+        numbers={"of": asked.of, "value": found.value, "by": found.key},
+        tables={"effects": table},
+    )
+
+
+def _table(own: list[Uncertain], found: MetricGradient, runs: np.ndarray) -> pd.DataFrame:
+    """Return what derivatives say of both ends of each box, and what runs there do."""
+    rows = []
+    for j, quantity in enumerate(own):
+        low, high = (end - float(quantity.nominal or 0.0) for end in quantity.box)
+        above, below = float(found.above[j]), float(found.below[j])
+        rows.append((0.5 * (above + below), below * low, above * high, *map(float, runs[j])))
+    names = pd.Index([quantity.name for quantity in own], name="quantity")
+    columns = ["derivative", "low", "high", "run_low", "run_high"]
+    return pd.DataFrame(rows, index=names, columns=columns)
+
+
+def _gradient(
+    asked: Tornado, experiment: Experiment, loop: Compiled, own: list[Uncertain]
+) -> tuple[MetricGradient, str]:
+    """Return the derivatives of the nominal run, and by what there are none."""
+    metrics = _asked_of(asked, experiment)
+    given = arguments(experiment.space, pd.DataFrame([nominal(experiment.space)]))
+    one = {part: {name: v[0] for name, v in each.items()} for part, each in given.items()}
+    signals = list(dict.fromkeys(s for m in metrics for s in m.signals))
+    names = [quantity.name for quantity in own]
+
+    def run(by: list[str]) -> MetricGradient:
+        response = sensitivity_response(
+            loop, experiment.timepts, experiment.inputs, one["initial_state"], of=signals,
+            with_respect_to=by, params=one["params"], rtol=experiment.rtol, atol=experiment.atol,
+        )  # fmt: skip
+        lacks.extend(str(each) for each in response.missing)
+        found = [metric_gradient(metric, response) for metric in metrics]
+        return min(found, key=lambda each: each.value)
+
+    lacks: list[str] = []
+    refused = {}
+    try:
+        found = run(names)
+    except CompileError:
+        for name in names:
+            try:
+                run([name])
+            except CompileError as error:
+                refused[name] = str(error)
+        lacks.clear()
+        if len(refused) == len(names):
+            raise
+        found = _with_gaps(run([n for n in names if n not in refused]), names)
+    told = "".join(f" {why[0].upper()}{why[1:]}." for why in [*lacks, *refused.values()])
+    return found, told
+
+
+def _with_gaps(found: MetricGradient, names: list[str]) -> MetricGradient:
+    """Return derivatives by all names, NaN where there are none."""
+
+    def spread(values: np.ndarray) -> np.ndarray:
+        own = dict(zip(found.with_respect_to, values, strict=True))
+        return np.array([own.get(name, np.nan) for name in names])
+
+    return MetricGradient(
+        key=found.key, value=found.value, with_respect_to=tuple(names),
+        scale=spread(found.scale), above=spread(found.above), below=spread(found.below),
+    )  # fmt: skip
+
+
+def _asked_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
+    """Return the requirement or metric of a column; of the spec all requirements."""
+    requirements = experiment.spec.requirements
+    if asked.of == "spec":
+        return list(requirements)
+    return [m for m in (*requirements, *experiment.metrics) if m.key == asked.of]
+
+
+def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+    """Yield the tornado."""
+    n, table = finding.numbers, finding.tables["effects"]
+    caption = _CAPTION.format(of=n["of"], value=n["value"])
+    yield Figure(
+        key=f"{key}-tornado",
+        caption=caption,
+        description=f"{caption} Towards the upper end: {column_in_words(table['high'])}.",
+        figure=figures.tornado(table, n["value"]),
+    )
+    columns = {"derivative": "derivative", "low": "towards the lower end", "high": "upper end"}
+    columns |= {"run_low": "run at the lower end", "run_high": "upper end "}
+    order = table[["low", "high"]].abs().max(axis=1).sort_values(ascending=False, kind="stable")
+    yield result_table(table.loc[order.index], f"{text.SAME}, as changes.", columns)
+
+
+TORNADO = Kind(
+    name="tornado",
+    schema=Tornado,
+    run=_run,
+    title="Sensitivity: tornado of derivatives",
+    answers="derivative of a margin by each quantity, times how far that may go",
+    method=(
+        "The tornado has the derivatives of one run at the nominal values, integrated with the run "
+        "(forward sensitivities; Griewank and Walther 2008), and runs at both ends of each box."
+    ),
+    sources=(GRIEWANK,),
+    columns=("of",),
+    check=_check,
+    runs=_runs,
+    items=_items,
+)

@@ -1,0 +1,363 @@
+"""Gains by search: margins of requirements raised, or a cost lowered, with derivatives of runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..annotations import as_annotated
+from ..arguments import number, tolerances
+from ..diagrams import state_names
+from ..errors import ParameterError
+from ..names import find_name
+from ..native import Compiled
+from ..native import compile as compile_diagram
+from ..native.diagram.checks import sized
+from ..native.ensemble import MetricLike
+from ..native.jacobians import float_parameters
+from ..params import as_numbers, checked_times, integer
+from ..responses.arguments import state_array
+from .climbing import lower_cost, raise_least_margin
+from .names import declared_bounds
+from .tuned import Tuned
+from .tuning_notes import notes
+from .worth import Runs, TuningProblem, Worth, checked_samples
+
+__all__ = ["tune"]
+
+_SAMPLES = 1001  # of a run for which nobody asks when
+_SAME = 1e-3  # of a margin, or of a cost
+
+
+class QuantityLike(Protocol):
+    """What is asked of a quantity, such as `nlctl.analysis.robustness.Uncertain`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def box(self) -> tuple[float, float]: ...
+
+    @property
+    def nominal(self) -> float | None: ...
+
+
+class SpaceLike(Protocol):
+    """What is asked of a space, such as `nlctl.analysis.robustness.Space`."""
+
+    @property
+    def quantities(self) -> Sequence[QuantityLike]: ...
+
+
+class SpecLike(Protocol):
+    """What is asked of a spec, such as `nlctl.analysis.robustness.Spec`."""
+
+    @property
+    def requirements(self) -> Sequence[MetricLike]: ...
+
+
+@as_annotated
+def tune(
+    diagram: Any,
+    space: Mapping[str, Any] | SpaceLike,
+    spec: SpecLike | Sequence[MetricLike] | MetricLike,
+    budget: float = 200,
+    timepts: Any = None,
+    inputs: Any = 0.0,
+    initial_state: Mapping[str, float] | None = None,
+    *,
+    cost: MetricLike | None = None,
+    samples: Mapping[str, Any] | None = None,
+    params: Mapping[str, Any] | None = None,
+    starts: int = 3,
+    seed: int = 0,
+    rtol: float = 1e-6,
+    atol: float = 1e-8,
+    max_steps: int = 100_000,
+) -> Tuned:
+    """Find gains with which a loop meets its requirements by the largest margin.
+
+    The least of all margins is raised as far as it goes, by SciPy's linear programs in a reach that
+    adapts; with a `cost`, that is lowered as far as every margin stays positive, by SLSQP.  Both
+    take the derivatives of runs.  The first search starts from the gains as they are, the others
+    from the best of a few of Sobol's points.  Where a run has no derivative, differences of runs
+    take its place, and a note says so.  What is found is the best of what was tried, on these
+    samples: the study kind `tuning` says how it does on fresh ones.
+
+    Parameters
+    ----------
+    diagram : control.NonlinearIOSystem or Compiled
+        A diagram, or what `nlctl.compile` made of it.
+    space : mapping or Space
+        ``{"law.beta": (low, high)}``, or ``(start, low, high)``: the gains and where they are
+        searched; or quantities with their boxes, whose nominal values are the start.  Gains whose
+        bounds are positive and lie ten times apart are searched by their logarithms.
+    spec : Spec, Requirement or sequence of these
+        What is asked, each a number of a run of which larger is better and > 0 holds.
+    budget : float, optional
+        Runs after which the search ends; one with k derivatives counts as 1 + 0.7 k, which is
+        about what it takes (``benchmarks/tune.py``).  To put back what buys nothing, and to
+        say what each gain has bought, takes 2 k + 2 runs of each sample or some more.
+    timepts : array_like of shape (m,), optional
+        Times in s at which signals are sampled; by default 1001 from 0 to the end that
+        requirements look at.
+    inputs : array_like, list or float, optional
+        Inputs over `timepts`.
+    initial_state : mapping, optional
+        Initial states by name.
+    cost : Metric, optional
+        A number of a run of which smaller is better, such as `nlctl.analysis.metrics.Metric`.
+    samples : mapping, optional
+        ``{"plant.m": array of shape (n,)}``, also ``"plant.x1(0)"``: each choice of gains is run
+        with all n of these.
+    params : mapping, optional
+        Parameters that are overridden and not tuned.
+    starts : int, optional
+        How many searches are begun, at most.
+    seed : int, optional
+        Of Sobol's points.
+    rtol, atol : float, optional
+        Tolerances of the runs.
+    max_steps : int, optional
+        Attempted steps after which a run counts as one that does not reach its end.
+
+    Returns
+    -------
+    Tuned
+        Gains, margins before and after, what each gain has bought, and all that was tried; after
+        Ctrl-C as far as it came.
+
+    Raises
+    ------
+    ParameterError
+        If nothing is tuned or asked, bounds are no interval, the start does not lie within them, a
+        block does not take them, or samples are not finite numbers of one length.
+    UnknownNameError
+        If there is no such parameter, state or signal.
+    CompileError, AlgebraicLoopError
+        If the diagram cannot be compiled.
+    KeyboardInterrupt
+        If Ctrl-C comes before the first run.
+
+    Examples
+    --------
+    x' = -a x from x = 1 is at exp(-a) at t = 1, where |x| <= 0.5 is asked; the margin is the
+    largest with the largest a, 1 - exp(-2) / 0.5:
+
+    >>> import control as ct
+    >>> import numpy as np
+    >>> from nlctl.analysis.robustness import Requirement, always, in_band
+    >>> plant = ct.nlsys(
+    ...     lambda t, x, u, params: [-params["a"] * x[0]], lambda t, x, u, params: x, inputs=0,
+    ...     outputs=["x"], states=["x"], params={"a": 1.0}, name="plant",
+    ... )
+    >>> small = always(in_band("x", lower=-0.5, upper=0.5), start=1.0)
+    >>> found = nlctl.tune(
+    ...     plant, {"plant.a": (0.5, 2.0)}, Requirement(key="small", formula=small, until=1.0),
+    ...     initial_state={"plant.x": 1.0},
+    ... )
+    >>> print(found["plant.a"], round(found.margin, 4), round(1 - np.exp(-2) / 0.5, 4))
+    2.0 0.7293 0.7293
+    """
+    asked, start = _asked(
+        diagram, (space, spec, cost, samples), (timepts, inputs, initial_state, params),
+        {"rtol": rtol, "atol": atol, "max_steps": max_steps},
+    )  # fmt: skip
+    number("tune", "budget", budget, above=0)
+    starts = integer("tune", "starts", starts, at_least=1)
+    runs = Runs(asked)
+    message = _searched(runs, asked.cube(start), float(budget), starts, seed)
+    return _found(runs, start, message)
+
+
+class _SpentError(Exception):
+    """No run is left."""
+
+
+def _searched(runs: Runs, start: np.ndarray, budget: float, starts: int, seed: int) -> str:
+    """Search from one start after the other; return how that ended."""
+    points = qmc.Sobol(start.size, rng=np.random.default_rng(seed))
+    some = 1 << int(np.ceil(np.log2(2 * start.size + 2)))  # a power of 2 keeps them even
+    try:
+        _climb(runs, start, budget)
+        for _ in range(starts - 1):
+            if runs.counted + some * len(runs.asked.samples) >= budget:
+                return "the budget is spent"
+            drawn = points.random(some)
+            found = runs.at(drawn, "Sobol'")
+            _climb(runs, max(zip(drawn, found, strict=True), key=lambda p: p[1].rank)[0], budget)
+    except _SpentError:
+        return "the budget is spent"
+    except KeyboardInterrupt:
+        if not runs.history:
+            raise
+        return "interrupted"
+    return f"{starts} searches have ended" if starts > 1 else "the search has ended"
+
+
+def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
+    """Search from one start as long as there are runs."""
+    cost = runs.asked.cost
+
+    def worth_of(cube: np.ndarray) -> Worth:
+        if runs.counted >= budget:
+            raise _SpentError
+        return runs.with_slopes(cube, "search")
+
+    if cost is None:
+        raise_least_margin(worth_of, start)
+    else:
+        lower_cost(worth_of, start)
+
+
+def _found(runs: Runs, first: np.ndarray, message: str) -> Tuned:
+    """Return what was found, with what each gain has bought."""
+    asked, k, start = runs.asked, first.size, runs.asked.cube(first)
+    best, without = _plainest(runs, start)
+    each = [np.where(np.arange(k) == j, best, start) for j in range(k)]
+    before, after, *alone = runs.at(np.array([start, best, *each]))
+    return Tuned(
+        names=asked.names, low=asked.low, high=asked.high, start=first,
+        values=np.where(best == start, first, asked.values(best)),
+        before=_by_key(asked, before), after=_by_key(asked, after),
+        alone=np.array([worth.goal for worth in alone]),
+        put_back=np.array([worth.goal for worth in without]),
+        cost=asked.cost.key if asked.cost else "", history=_history(runs),
+        plain_runs=runs.plain, differentiated_runs=runs.differentiated,
+        counted_runs=runs.counted, notes=notes(runs, before, best), message=message,
+    )  # fmt: skip
+
+
+def _plainest(runs: Runs, start: np.ndarray) -> tuple[np.ndarray, list[Worth]]:
+    """Return the best gains, those put back that buy nothing, and what each is worth put back."""
+    best, worth = runs.best()
+    while True:
+        others = np.where(np.eye(start.size, dtype=bool), start, best)
+        without = runs.at(others, "put back")
+        moved = np.flatnonzero(best != start)
+        same = [j for j in moved if without[j].is_as_good_as(worth, _SAME)]
+        if not same:
+            return best, without
+        j = max(same, key=lambda j: without[j].rank)
+        best, worth = others[j], max(worth, without[j], key=lambda each: each.rank)
+
+
+def _by_key(asked: TuningProblem, worth: Worth) -> dict[str, float]:
+    """Return the least margins over the samples, and the mean cost."""
+    found = {m.key: float(worth.table[:, j].min()) for j, m in enumerate(asked.margins)}
+    return found if asked.cost is None else found | {asked.cost.key: worth.cost}
+
+
+def _history(runs: Runs) -> Any:
+    """Return all that was tried as a table."""
+    import pandas as pd
+
+    rows = [
+        {"by": by, "runs": count, "margin": worth.least, "cost": worth.cost}
+        | dict(zip(runs.asked.names, runs.asked.values(cube), strict=True))
+        for by, count, cube, worth in runs.history
+    ]
+    return pd.DataFrame(rows)
+
+
+def _asked(
+    diagram: Any, what: tuple[Any, ...], given: tuple[Any, ...], how: dict[str, Any]
+) -> tuple[TuningProblem, np.ndarray]:
+    """Return what is asked of runs, and the gains to start from."""
+    (space, spec, cost, samples), (timepts, inputs, initial_state, params) = what, given
+    tolerances("tune", how["rtol"], how["atol"])
+    if not isinstance(diagram, Compiled):
+        diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
+    margins = _margins(spec, cost)
+    params, initial_state = dict(params or {}), dict(initial_state or {})
+    own = _own_values(diagram, params, initial_state)
+    rows = [_row(diagram, name, value, own) for name, value in _bounds(space)]
+    start, low, high = np.array([row[1:] for row in rows], dtype=float).T
+    asked = TuningProblem(
+        diagram=diagram, times=_times(timepts, margins), inputs=inputs, params=params,
+        initial_state=initial_state, names=tuple(row[0] for row in rows), low=low, high=high,
+        samples=checked_samples(samples or {}, [row[0] for row in rows]), margins=margins,
+        cost=cost, how=how,
+    )  # fmt: skip
+    return asked, start
+
+
+def _margins(spec: Any, cost: Any) -> tuple[MetricLike, ...]:
+    """Return the requirements of a spec, of several, or of one."""
+    each = getattr(spec, "requirements", spec)
+    each = tuple(each) if isinstance(each, Iterable) else (each,)
+    for metric in each if cost is None else (*each, cost):
+        if not (hasattr(metric, "signals") and hasattr(metric, "function")):
+            raise ParameterError(
+                "tune needs requirements such as nlctl.analysis.robustness.Requirement and a cost "
+                f"such as nlctl.analysis.metrics.Metric, got {metric!r}"
+            )
+    if not each and cost is None:
+        raise ParameterError("tune needs at least one requirement or a cost, got neither")
+    return each
+
+
+def _times(timepts: Any, margins: Sequence[Any]) -> np.ndarray:
+    """Return when signals are sampled."""
+    if timepts is not None:
+        return checked_times(timepts)
+    ends = [getattr(metric, "until", np.nan) for metric in margins]
+    if not ends or not np.isfinite(ends).all() or not max(ends) > 0:
+        raise ParameterError("tune needs timepts: what is asked does not say when a run ends")
+    return np.linspace(0.0, max(ends), _SAMPLES)
+
+
+def _bounds(space: Any) -> list[tuple[str, Any]]:
+    """Return gains with (low, high) or (start, low, high)."""
+    if isinstance(space, Mapping):
+        rows = list(space.items())
+    elif hasattr(space, "quantities"):
+        if getattr(space, "choices", ()):
+            raise ParameterError("tune searches numbers: leave choices out of its space")
+        rows = [
+            (q.name, q.box if q.nominal is None else (q.nominal, *q.box)) for q in space.quantities
+        ]
+    else:
+        raise ParameterError(
+            f"tune needs gains with their bounds, {{'law.k': (0.1, 10.0)}}, got {space!r}"
+        )
+    if not rows:
+        raise ParameterError("tune needs at least one gain, {'law.k': (0.1, 10.0)}")
+    return rows
+
+
+def _own_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
+    """Return what parameters and initial states are before anything is tuned."""
+    p = diagram.parameter_vector(params)
+    own = {name: float(p[place]) for name, (place, _) in float_parameters(diagram).items()}
+    x0 = state_array(diagram.system, initial_state)
+    return own | {f"{n}(0)": float(x0[i]) for i, n in enumerate(state_names(diagram.system))}
+
+
+def _row(
+    diagram: Compiled, name: str, value: Any, own: Mapping[str, float]
+) -> tuple[str, float, float, float]:
+    """Return the full name of a gain, where its search starts, and its bounds."""
+    full = name if name in own else find_name("parameter", name, own)
+    row = as_numbers(value)
+    if row is None or row.shape not in ((2,), (3,)):
+        raise ParameterError(f"'{name}' needs (low, high) or (start, low, high), got {value!r}")
+    start, low, high = row if row.size == 3 else (own[full], *row)
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ParameterError(f"'{name}' needs finite bounds low < high, got {low:g}, {high:g}")
+    if not low <= start <= high:
+        raise ParameterError(
+            f"'{name}' needs a start within its bounds, got {start:g} in [{low:g}, {high:g}]: "
+            "give (start, low, high)"
+        )
+    owner = float_parameters(diagram).get(full, (0, None))[1]
+    lowest, highest = declared_bounds(owner, full) if owner is not None else (-np.inf, np.inf)
+    if low < lowest or high > highest:
+        raise ParameterError(
+            f"'{name}' needs bounds in [{lowest:g}, {highest:g}], as its block declares, got "
+            f"{low:g}, {high:g}"
+        )
+    return full, float(start), float(low), float(high)

@@ -1,0 +1,431 @@
+"""What values of gains are worth: margins and a cost of runs with them, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import CompileError, DivergedError, ParameterError
+from ..native import Compiled, ensemble_response
+from ..native.diagram.wiring import AlgebraicLoopError
+from ..native.ensemble import MetricLike
+from .gradients import metric_gradient
+from .response import sensitivity_response
+
+__all__ = ["LOST_MARGIN", "PER_DERIVATIVE", "Runs", "TuningProblem", "Worth", "checked_samples"]
+
+LOST_MARGIN = -1e3
+"""The margin of a run that does not reach its end."""
+PER_DERIVATIVE = 0.7
+"""Of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`."""
+_STEP = 1e-3  # of differences, in the unit cube
+_NEAREST = 6  # parts of a requirement that count: the lowest
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TuningProblem:
+    """Which runs are made, and what is asked of them.
+
+    Attributes
+    ----------
+    diagram : Compiled
+    times, inputs, params, initial_state
+        As `nlctl.ensemble_response` takes them.
+    samples : tuple of dict
+        What else is set in each run.
+    names : tuple of str
+        What is tuned.
+    low, high : ndarray of shape (k,)
+    margins : tuple of MetricLike
+        Larger is better, > 0 holds.
+    cost : MetricLike or None
+        Smaller is better.
+    how : mapping
+        Tolerances and steps of the runs.
+    """
+
+    diagram: Compiled
+    times: np.ndarray
+    inputs: Any
+    params: Mapping[str, Any]
+    initial_state: Mapping[str, Any]
+    samples: tuple[Mapping[str, float], ...]
+    names: tuple[str, ...]
+    low: np.ndarray
+    high: np.ndarray
+    margins: tuple[MetricLike, ...]
+    cost: MetricLike | None
+    how: Mapping[str, Any]
+
+    @property
+    def metrics(self) -> tuple[MetricLike, ...]:
+        """Margins, then the cost."""
+        return self.margins if self.cost is None else (*self.margins, self.cost)
+
+    @cached_property
+    def rows(self) -> tuple[tuple[tuple[MetricLike, ...], ...], ...]:
+        """What each margin is the least of, with fewer kinks, such as `Requirement.parts`."""
+        return tuple(getattr(m, "parts", None) or ((m,),) for m in self.margins)
+
+    @cached_property
+    def parts(self) -> tuple[tuple[MetricLike, ...], ...]:
+        """The same without rows."""
+        return tuple(tuple(p for row in rows for p in row) for rows in self.rows)
+
+    @property
+    def _as_powers(self) -> np.ndarray:
+        return (self.low > 0) & (self.high >= 10 * self.low)
+
+    def values(self, cube: np.ndarray) -> np.ndarray:
+        """Return gains at points of the unit cube: their logarithms where bounds lie far apart."""
+        low, high = self._ends
+        inside = low + np.clip(cube, 0.0, 1.0) * (high - low)
+        powers = np.exp(np.where(self._as_powers, inside, 0.0))
+        found = np.clip(np.where(self._as_powers, powers, inside), self.low, self.high)
+        return np.select([cube <= 0.0, cube >= 1.0], [self.low, self.high], found)
+
+    def cube(self, values: np.ndarray) -> np.ndarray:
+        """Return the point of the unit cube of some gains."""
+        low, high = self._ends
+        logs = np.log(np.where(self._as_powers, values, 1.0))
+        return (np.where(self._as_powers, logs, values) - low) / (high - low)
+
+    def rates(self, values: np.ndarray) -> np.ndarray:
+        """Return the derivatives of gains by coordinates of the cube."""
+        low, high = self._ends
+        return (high - low) * np.where(self._as_powers, values, 1.0)
+
+    @property
+    def _ends(self) -> np.ndarray:
+        ends = np.stack([self.low, self.high])
+        return np.where(self._as_powers, np.log(np.where(self._as_powers, ends, 1.0)), ends)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Worth:
+    """What one choice of gains is worth.
+
+    Attributes
+    ----------
+    table : ndarray of shape (samples, metrics)
+        Margins, then the cost.
+    count : int
+        Number of margins.
+    parts : ndarray of shape (n,)
+        What margins are the least of, in all samples; empty if there are no derivatives.
+    slopes : ndarray of shape (n, k)
+        Their derivatives by coordinates of the unit cube.
+    cost_slopes : ndarray of shape (k,)
+        Those of the mean cost.
+    """
+
+    table: np.ndarray
+    count: int
+    parts: np.ndarray = field(default_factory=lambda: np.empty(0))
+    slopes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    cost_slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def margins(self) -> np.ndarray:
+        """All margins in a row."""
+        return self.table[:, : self.count].reshape(-1)
+
+    @property
+    def least(self) -> float:
+        """The least margin."""
+        return float(self.margins.min(initial=np.inf))
+
+    @property
+    def cost(self) -> float:
+        """The mean cost, NaN without one or if a run does not reach its end."""
+        return float(self.table[:, self.count :].mean()) if self.has_cost else np.nan
+
+    @property
+    def has_cost(self) -> bool:
+        """Whether there is a cost."""
+        return self.table.shape[1] > self.count
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Larger is better: a cost counts where all margins hold."""
+        if not self.has_cost:
+            return self.least, 0.0
+        return min(self.least, 0.0), -np.nan_to_num(self.cost, nan=np.inf, posinf=np.inf)
+
+    @property
+    def goal(self) -> float:
+        """The cost where there is one, else the least margin."""
+        return self.cost if self.has_cost else self.least
+
+    def is_as_good_as(self, other: Worth, tolerance: float) -> bool:
+        """Whether it is no worse than another one, but for a part of a margin or of a cost."""
+        room = tolerance * np.array([1.0 + abs(other.least), abs(other.rank[1])])
+        return bool(np.all(np.array(self.rank) >= np.array(other.rank) - np.nan_to_num(room)))
+
+
+class Runs:
+    """Makes runs, counts them, and keeps what each choice of gains was worth."""
+
+    def __init__(self, asked: TuningProblem) -> None:
+        self.asked = asked
+        self.plain = self.differentiated = 0
+        self.why = ""  # there are no derivatives at all
+        self.lacking: dict[str, int] = {}  # why there were none, and how often
+        self.kinked: dict[str, int] = {}
+        self.at_first: dict[str, dict[str, None]] = {}  # of what, by what the start is at a kink
+        self.moved = np.zeros(len(asked.names))  # the largest derivative of anything by each
+        self.slope_of = np.zeros(len(asked.margins) + 1)  # the largest derivative of each
+        self.history: list[tuple[str, float, np.ndarray, Worth]] = []
+
+    @property
+    def counted(self) -> float:
+        """Number of runs; one with k derivatives counts as 1 + 0.7 k."""
+        each = 1.0 + PER_DERIVATIVE * len(self.asked.names)
+        return self.plain + each * self.differentiated
+
+    def best(self) -> tuple[np.ndarray, Worth]:
+        """Return the best gains so far, the first of equals, and what they are worth."""
+        _, _, cube, worth = max(self.history, key=lambda row: row[3].rank)
+        return cube, worth
+
+    def at(self, points: np.ndarray, chosen_by: str = "") -> list[Worth]:
+        """Return what gains at points of the unit cube are worth, without derivatives."""
+        asked = self.asked
+        found = [self._worth(table) for table in self._tables(points, asked.metrics)]
+        for cube, worth in zip(points, found, strict=True) if chosen_by else ():
+            self.history.append((chosen_by, self.counted, cube, worth))
+        return found
+
+    def with_slopes(self, cube: np.ndarray, chosen_by: str) -> Worth:
+        """Return what gains are worth, with derivatives or, where there are none, differences."""
+        worth = None if self.why else self._by_derivatives(cube)
+        if worth is None:
+            worth = self._by_differences(cube)
+        self._note(worth)
+        self.history.append((chosen_by, self.counted, cube, worth))
+        return worth
+
+    def _note(self, worth: Worth) -> None:
+        """Keep which gains have ever moved anything, and which numbers have ever been moved."""
+        asked = self.asked
+        whose = np.repeat(np.arange(len(asked.margins)), [len(parts) for parts in asked.parts])
+        rows = np.vstack([np.abs(worth.slopes), np.abs(worth.cost_slopes)])
+        self.moved = np.maximum(self.moved, rows.max(axis=0))
+        most = np.append(np.tile(whose, len(asked.samples)), len(asked.margins))
+        np.maximum.at(self.slope_of, most, rows.max(axis=1))
+
+    def _tables(self, points: np.ndarray, metrics: Sequence[MetricLike]) -> np.ndarray:
+        """Return numbers of plain runs, shape (points, samples, metrics)."""
+        asked, size = self.asked, len(self.asked.samples)
+        values = np.repeat(asked.values(points), size, axis=0)
+        given = dict(zip(asked.names, values.T, strict=True))
+        for name in asked.samples[0]:
+            given[name] = np.tile([sample[name] for sample in asked.samples], len(points))
+        params, start = _split(given)
+        try:
+            found = self._ensemble(params, start, metrics)
+        except ParameterError:  # one of these values, or several of a block together
+            if not self.history:
+                raise
+            if len(points) > 1:
+                return np.concatenate([self._tables(p[None, :], metrics) for p in points])
+            return np.full((1, size, len(metrics)), np.nan)
+        self.plain += len(values)
+        return found.reshape(len(points), size, -1)
+
+    def _ensemble(
+        self, params: Mapping[str, Any], start: Mapping[str, Any], metrics: Sequence[MetricLike]
+    ) -> np.ndarray:
+        """Return numbers of plain runs, shape (runs, metrics)."""
+        asked = self.asked
+        count = len(next(iter((params or start).values())))
+        table = ensemble_response(
+            asked.diagram, asked.times, asked.inputs, {**asked.initial_state, **start},
+            params={**asked.params, **params}, metrics=metrics, **asked.how,
+        ).table  # fmt: skip
+        if len(table) < count:
+            raise KeyboardInterrupt
+        return table[[m.key for m in metrics]].to_numpy(dtype=float)
+
+    def _worth(self, table: np.ndarray, **more: Any) -> Worth:
+        count = len(self.asked.margins)
+        table = table.copy()
+        table[:, :count] = _graded(table[:, :count])
+        return Worth(table=table, count=count, **more)
+
+    def _by_derivatives(self, cube: np.ndarray) -> Worth | None:
+        """Return what gains are worth, with derivatives; None where there are none."""
+        asked, values, each = self.asked, self.asked.values(cube), []
+        signals = list(dict.fromkeys(s for m in asked.metrics for s in m.signals))
+        for sample in asked.samples:
+            params, start = _split(dict(zip(asked.names, values, strict=True)) | dict(sample))
+            try:
+                made = sensitivity_response(
+                    asked.diagram, asked.times, asked.inputs, {**asked.initial_state, **start},
+                    of=signals, with_respect_to=list(asked.names),
+                    params={**asked.params, **params}, **asked.how,
+                )  # fmt: skip
+            except (CompileError, AlgebraicLoopError) as error:
+                self.why = str(error)
+                return None
+            except DivergedError:
+                made = None
+            except ParameterError:  # no block takes these together: of the start that is an error
+                if not self.history:
+                    raise
+                made = None
+            self.differentiated += 1
+            each.append(self._lost() if made is None else self._numbers(made))
+            if not all(np.isfinite(slopes).all() for slopes in each[-1][2:]):
+                return None
+        rates = asked.rates(values)
+        table, parts, slopes, cost_slopes = map(np.array, zip(*each, strict=True))
+        return self._worth(
+            table, parts=_graded(parts).reshape(-1), slopes=slopes.reshape(-1, rates.size) * rates,
+            cost_slopes=cost_slopes.mean(axis=0) * rates,
+        )  # fmt: skip
+
+    def _lost(self) -> tuple[np.ndarray, ...]:
+        """Return the numbers of a run that does not reach its end."""
+        asked, k = self.asked, len(self.asked.names)
+        parts = sum(map(len, asked.parts))
+        table = np.full(len(asked.metrics), np.nan)
+        return table, np.full(parts, np.nan), np.zeros((parts, k)), np.zeros(k)
+
+    def _numbers(self, made: Any) -> tuple[np.ndarray, ...]:
+        """Return margins and cost, parts of margins, and their derivatives by gains."""
+        asked, k = self.asked, len(self.asked.names)
+        for each in made.missing:
+            self.lacking[each.why] = self.lacking.get(each.why, 0) + 1
+        values, slopes, table = [], [], []
+        if not self.history:
+            self._look_for_kinks(made)
+        for metric, parts, rows in zip(asked.margins, asked.parts, asked.rows, strict=True):
+            own = np.array([_value(part, made) for part in parts])
+            lowest = _lowest(own, [len(row) for row in rows])
+            counting = np.full(own.size, -LOST_MARGIN)
+            counting[lowest] = own[lowest]
+            values.append(counting)
+            slopes.append(np.zeros((own.size, k)))
+            for i in lowest:
+                slopes[-1][i] = self._gradient(metric.key, parts[i], made)
+            table.append(_value(metric, made) if len(parts) > 1 else own[0])
+        cost_slopes = np.zeros(k)
+        if asked.cost is not None:
+            table.append(_value(asked.cost, made))
+            cost_slopes = self._gradient(asked.cost.key, asked.cost, made)
+        none = np.zeros((0, k))
+        return (
+            np.array(table), np.concatenate([np.empty(0), *values]),
+            np.concatenate([none, *slopes]), cost_slopes,
+        )  # fmt: skip
+
+    def _gradient(self, key: str, metric: MetricLike, made: Any) -> np.ndarray:
+        """Return the derivatives of a number of a run, at a kink those of the middle."""
+        found = metric_gradient(metric, made)
+        if found.one_sided:
+            self.kinked[key] = self.kinked.get(key, 0) + 1
+        return 0.5 * (found.above + found.below)
+
+    def _look_for_kinks(self, made: Any) -> None:
+        """Keep what the start is at a kink of, and by what."""
+        for metric in self.asked.metrics:
+            for name in metric_gradient(metric, made).one_sided:
+                self.at_first.setdefault(metric.key, {})[name] = None
+
+    def _by_differences(self, cube: np.ndarray) -> Worth:
+        """Return what gains are worth, with differences of runs towards the middle of the box."""
+        asked, count = self.asked, len(self.asked.margins)
+        every = (part for parts in asked.parts for part in parts)
+        parts = tuple(_Part(metric=part, key=f"part {i}") for i, part in enumerate(every))
+        steps = np.where(cube < 0.5, _STEP, -_STEP)
+        points = np.vstack([cube, cube + np.diag(steps)])
+        here, *moved = self._tables(points, (*asked.metrics, *parts))
+        wide = len(asked.metrics)
+        rates = [(each - here) / h for each, h in zip(moved, steps, strict=True)]
+        slopes = np.nan_to_num(np.stack(rates, axis=2))
+        return self._worth(
+            here[:, :wide], parts=_graded(here[:, wide:]).reshape(-1),
+            slopes=slopes[:, wide:].reshape(-1, cube.size),
+            cost_slopes=slopes[:, count:wide].mean(axis=0).reshape(-1)
+            if asked.cost is not None else np.zeros(cube.size),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Part:
+    """A metric under another name."""
+
+    metric: MetricLike
+    key: str
+
+    @property
+    def start(self) -> float:
+        return self.metric.start
+
+    @property
+    def end(self) -> float:
+        return self.metric.end
+
+    @property
+    def signals(self) -> Sequence[str]:
+        return self.metric.signals
+
+    @property
+    def function(self) -> Any:
+        return self.metric.function
+
+
+def _graded(margins: np.ndarray) -> np.ndarray:
+    return np.maximum(
+        np.nan_to_num(margins, nan=LOST_MARGIN, posinf=-LOST_MARGIN, neginf=LOST_MARGIN),
+        LOST_MARGIN,
+    )
+
+
+def _lowest(values: np.ndarray, lengths: Sequence[int]) -> np.ndarray:
+    """Return the lowest parts that are not higher than the pieces of time next to them.
+
+    Others are least where they end, at what the piece next to them has, too.
+    """
+    found, first = [], 0
+    for length in lengths:
+        row = np.pad(values[first : first + length], 1, constant_values=np.inf)
+        found.append(first + np.flatnonzero((row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])))
+        first += length
+    every = np.concatenate(found)
+    return every[np.argsort(values[every], kind="stable")[:_NEAREST]]
+
+
+def _value(metric: MetricLike, made: Any) -> float:
+    """Return a number of a run with derivatives."""
+    inside = (made.time >= metric.start) & (made.time <= metric.end)
+    places = [made.signals.index(signal) for signal in metric.signals]
+    return float(metric.function(made.time[inside], *made.values[places][:, inside].copy()))
+
+
+def _split(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return parameters and initial states."""
+    states = {n.removesuffix("(0)"): v for n, v in given.items() if n.endswith("(0)")}
+    return {n: v for n, v in given.items() if not n.endswith("(0)")}, states
+
+
+def checked_samples(samples: Mapping[str, Any], names: Sequence[str]) -> tuple[dict, ...]:
+    """Return samples as one record for each run; an empty one for the values as they are."""
+    columns = {}
+    for name, values in samples.items():
+        if name in names:
+            raise ParameterError(f"'{name}' is tuned: leave it out of samples")
+        columns[name] = np.atleast_1d(np.asarray(values, dtype=float))
+    sizes = {name: column.shape for name, column in columns.items()}
+    if any(len(shape) != 1 for shape in sizes.values()) or len(set(sizes.values())) > 1:
+        raise ParameterError(f"samples need arrays of one length, got shapes {sizes}")
+    for name, column in columns.items():
+        if not (column.size and np.isfinite(column).all()):
+            raise ParameterError(f"samples need finite numbers, got {column} for '{name}'")
+    size = next(iter(sizes.values()))[0] if sizes else 1
+    return tuple({n: float(c[i]) for n, c in columns.items()} for i in range(size))
