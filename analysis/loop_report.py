@@ -23,9 +23,9 @@ from nlctl.annotations import as_annotated
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
+from nlctl.plotting.axes import BLUE, stacked_axes
 from nlctl.wording import counted
 
-from .figures.axes import BLUE, stacked_axes
 from .loop_record import difference_text, fact_differences, loop_facts
 from .lyapunov.certificate.certify import AnyCertificate
 from .lyapunov.ledger import Ledger

@@ -30,6 +30,8 @@ from .upstream.control_internals import (
 )
 from .wording import counted
 
+Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
+
 
 class Spec(Protocol):
     """What a record offers to be made a block: names of signals, and equations.
@@ -153,6 +155,30 @@ class Block(OwnParameters):
             self.spec = self._resolved(values)
             set_parameters(self, None)
 
+    def __call__(self, u: Any, params: Any = None, squeeze: Any = None) -> Any:
+        """Return what a block without states makes of its inputs; a number is its one input.
+
+        Parameters
+        ----------
+        u : array_like of shape (m,) or float
+            Inputs.
+        params : mapping, optional
+            Overrides.
+        squeeze : bool, optional
+            As in `control.NonlinearIOSystem`.
+
+        Returns
+        -------
+        ndarray
+            The outputs.
+
+        Raises
+        ------
+        TypeError
+            If the block has states.
+        """
+        return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
+
     def answer(self, t: float, x: Any, u: Any) -> Any:
         """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
 
@@ -262,7 +288,14 @@ def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
 
 
 @as_annotated
-def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
+def block(
+    spec: Any,
+    name: str,
+    *,
+    inputs: Signals = None,
+    outputs: Signals = None,
+    dt: float | bool | None = None,
+) -> Block:
     """Make a python-control system of a record.
 
     Parameters
@@ -271,6 +304,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         Parameters and equations; see `Spec` for what is read.
     name : str
         Name of the block, and the first part of its parameters' names.
+    inputs, outputs : str, sequence of str or mapping, optional
+        Other names of its signals: of all of them in order, or of some, ``{"u": "torque"}``.
     dt : float, bool or None, optional
         Timebase as in python-control.  Records without states may have any, and with None have
         that of the diagram; one with states is in continuous time, dt = 0, unless it says
@@ -285,7 +320,10 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     Raises
     ------
     ParameterError
-        If a parameter is out of bounds, the name is none, or `dt` does not fit the record.
+        If a parameter is out of bounds, the name is none, `dt` does not fit the record, or there
+        are not as many other names as signals.
+    UnknownNameError
+        If a signal that is renamed does not exist.
     BlockError
         If `spec` lacks something that a block needs, or its equations return the wrong number
         of values, or ``feedthrough = False`` is not true.
@@ -296,6 +334,11 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     >>> actuator = nlctl.block(nlctl.DeadZone(b_r=0.6), "actuator")
     >>> print(actuator.params["actuator.b_r"], actuator.output(0, [], [0.4]))
     0.6 [0.]
+
+    Two of one kind in a diagram need signals of their own:
+
+    >>> nlctl.block(nlctl.Lag(), "left", inputs="p", outputs={"v": "q"}).output_labels
+    ['q']
     """
     _check_has_equations(spec)
     if not (name is None or (isinstance(name, str) and name)):
@@ -306,7 +349,32 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         dt = 0
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
+    for kind, given in (("inputs", inputs), ("outputs", outputs)):
+        if given is not None:
+            made.update_names(**{kind: _renamed(made, kind, given)})
     return made
+
+
+def _renamed(made: Block, kind: str, given: Any) -> list[str]:
+    """Return the names of a block's inputs or outputs after some or all of them are replaced."""
+    had = list(getattr(made.spec, kind))
+    if isinstance(given, Mapping):
+        for signal in given:
+            if signal not in had:
+                raise unknown(kind[:-1], str(signal), had, f"of block '{made.name}'")
+        names = [given.get(signal, signal) for signal in had]
+    else:
+        names = [given] if isinstance(given, str) else list(given)
+    if not (len(names) == len(set(names)) == len(had) and all(_is_label(name) for name in names)):
+        raise ParameterError(
+            f"block '{made.name}' has {counted(len(had), kind[:-1])} {_names(had)}: {kind} needs "
+            f"as many different names, got {given!r}"
+        )
+    return names
+
+
+def _is_label(name: Any) -> bool:
+    return isinstance(name, str) and bool(name) and "." not in name
 
 
 def _check_has_equations(spec: Any) -> None:

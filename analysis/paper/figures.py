@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.functions import nussbaum
-
-from ..figures.axes import (
+from nlctl.plotting.axes import (
     BLUE,
     GREY,
     STYLES,
@@ -22,6 +21,7 @@ from ..figures.axes import (
     set_style,
     stacked_axes,
 )
+
 from . import TAIL, CaseRun
 from .burst import Burst
 

@@ -21,7 +21,6 @@ from studies_example import LOOP
 from nlctl.analysis import figures as figures
 from nlctl.analysis.cli.study_report import report_study
 from nlctl.analysis.figures.labels import plain
-from nlctl.analysis.figures.runs import upper_envelope
 from nlctl.analysis.report import render_html, render_json
 from nlctl.analysis.report.document import Figure, Paragraph, Section, Table
 from nlctl.analysis.report.outline import claim_status, place_anchors
@@ -39,6 +38,7 @@ from nlctl.analysis.studies.page.rows import margin_items, row_items
 from nlctl.analysis.studies.page.running import running
 from nlctl.analysis.studies.page.text import margin_text, violate, without_assumptions
 from nlctl.errors import UsageError
+from nlctl.plotting.bands import upper_envelope
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

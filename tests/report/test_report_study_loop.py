@@ -12,8 +12,9 @@ from studies_example import HEAD, LOOP, ROWS, write
 from nlctl.analysis import figures
 from nlctl.analysis.report import Equation, Figure, Table, render_html
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
+from nlctl.analysis.robustness.stl.limits import limits_of_requirements
 from nlctl.analysis.studies import read_study, run
-from nlctl.analysis.studies.page.histories import histories, limits_of_requirements
+from nlctl.analysis.studies.page.histories import histories
 from nlctl.analysis.studies.page.loop import StudyLoop, loop_of, loop_sections
 from nlctl.analysis.studies.page.report import study_report
 
