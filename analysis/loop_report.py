@@ -23,7 +23,8 @@ from nlctl.annotations import as_annotated
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
-from nlctl.plotting.axes import BLUE, stacked_axes
+from nlctl.plotting.signals import rows_figure
+from nlctl.responses.time_response import as_response
 from nlctl.wording import counted
 
 from .loop_record import difference_text, fact_differences, loop_facts
@@ -55,7 +56,7 @@ from .studies.result import Result
 
 __all__ = ["loop_report"]
 
-_SHOWN = 6  # signals that are drawn by default
+_SHOWN = 6  # signals of a chart at first
 ONE_RUN = "Runs are samples of the model: nothing follows for other values, or for later times."
 
 
@@ -161,13 +162,9 @@ def _run(
     for name in signals:
         if name not in curves:
             raise unknown("output", name, curves, f"of '{loop.name}'")
-    shown = {name: curves[name] for name in [*signals] or [*curves][:_SHOWN]}
     t = np.asarray(response.time, dtype=float)
-    figure, axes = stacked_axes(rows=len(shown), height=1.5 if len(shown) > 1 else 2.4)
-    for ax, (name, samples) in zip(axes, shown.items(), strict=True):
-        ax.plot(t, samples, color=BLUE, linewidth=1.3)
-        ax.set_ylabel(name, parse_math=False)
-    axes[-1].set_xlabel("time t (s)")
+    shown, rows = as_response(response, loop).rows([*signals] or None)
+    figure, _ = rows_figure(t, shown, rows)
     caption = f"{', '.join(shown)} over {t[-1]:g} s."
     ranges = [
         (n, *(float(f(y)) for f in (np.min, np.max)), float(y[-1])) for n, y in curves.items()
@@ -175,7 +172,7 @@ def _run(
     told = "; ".join(f"{n} between {low:.4g} and {high:.4g}" for n, low, high, _ in ranges)
     history = History(
         key="run-history", caption=caption, description=told, time=t, signals=curves,
-        shown=tuple(shown),
+        shown=tuple(name for name in shown if name in curves)[:_SHOWN],
     )  # fmt: skip
     items: list[Item] = [
         *_own_values("This run", params),

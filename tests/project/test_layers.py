@@ -18,6 +18,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
         "nlctl.diagrams",
         "nlctl.functions",
         "nlctl.drawing",
+        "nlctl.plotting",
         "nlctl.responses",
     ]
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
@@ -37,7 +38,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.analysis.figures", "nlctl.analysis.report"],
     ["nlctl.analysis.studies"],
     ["nlctl.analysis.paper"],
-    ["nlctl.analysis.loop_report"],
+    ["nlctl.analysis.loop_report", "nlctl.analysis.loop_checks"],
     ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]
