@@ -11,6 +11,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl.arguments import ATOL, RTOL
 from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
@@ -25,7 +26,6 @@ __all__ = ["Check", "checks_of", "checks_section", "proof_of", "told"]
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
 _TIGHTER = 1e-2  # of the tolerances, for the comparison
 _SAME = 1e-4  # of a signal's range
-_RTOL, _ATOL = 1e-8, 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +113,7 @@ def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> Check:
     try:
         again = input_output_response(
             loop, response.time, response.u, response.x[:, 0], params=params,
-            rtol=_TIGHTER * _RTOL, atol=_TIGHTER * _ATOL,
+            rtol=_TIGHTER * RTOL, atol=_TIGHTER * ATOL,
         )  # fmt: skip
     except DivergedError as error:
         return Check(what=what, found=f"with tighter ones {error}", status="fail")
@@ -121,7 +121,7 @@ def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> Check:
     off = np.max(np.abs(again.y - response.y), axis=1) / scale
     worst = int(np.argmax(off))
     found = (
-        f"at rtol {_TIGHTER * _RTOL:.0e} {response.output_labels[worst]} differs most, by "
+        f"at rtol {_TIGHTER * RTOL:.0e} {response.output_labels[worst]} differs most, by "
         f"{off[worst]:.1e} of its range"
     )
     return Check(what=what, found=found, status="pass" if off[worst] <= _SAME else "caution")

@@ -14,6 +14,7 @@ import typer
 
 from nlctl.wording import counted
 
+from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
 from .own_page import STEP, UNTIL, compose_page, is_loop_name, page_folder
 from .printing import error_line, in_json, say
@@ -47,10 +48,6 @@ Set = Annotated[
 Input = Annotated[
     list[str] | None,
     typer.Option("--input", metavar="NAME=VALUE", help="A constant input of a loop; 0 by default."),
-]
-Junit = Annotated[
-    Path | None,
-    typer.Option(help="File to write: the claims as JUnit XML, a test case each."),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
 Force = Annotated[
@@ -142,26 +139,6 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
             "--set, --input, --until and --step are of a loop, path/to/file.py:function; a study "
             "has them in its file"
         )
-
-
-def check_junit(path: Path | None) -> None:
-    """Refuse, before anything is computed, a file of claims that could not be written."""
-    if path is not None:
-        from .terminal import check_file
-
-        check_file(path)
-
-
-def write_claims(path: Path | None, title: str, claims: Sequence[Claim]) -> None:
-    """Write claims as JUnit XML where that is wanted, and print where."""
-    if path is not None:
-        from nlctl.host.files import replace_file
-
-        from ..report.junit import junit
-
-        content = junit(title, claims)
-        replace_file(path, lambda file: file.write(content))
-        say(path)
 
 
 def _loop(
