@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
@@ -19,17 +19,16 @@ from ..arguments import ATOL, RTOL, one_of
 from ..arguments import number as checked_number
 from ..delays.variation import Variation
 from ..errors import ParameterError
-from ..host.notebook import table_html
 from ..names import unknown
 from ..params import checked_times, integer
 from ..responses.arguments import HOLDS, checked_params, held, input_array, with_aliases
-from ..wording import counted
 from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
+from .ensemble_result import Ensemble, MetricLike
 from .histories import variations
 from .integrate.driver import begin, finish, prepared, trajectory, watched
 from .integrate.methods.tableau import Tableau
@@ -42,68 +41,6 @@ from .settings import Settings
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class MetricLike(Protocol):
-    """What an ensemble asks of a metric; see `nlctl.analysis.metrics.Metric`."""
-
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def start(self) -> float: ...
-
-    @property
-    def end(self) -> float: ...
-
-    @property
-    def signals(self) -> Sequence[str]: ...
-
-    @property
-    def function(self) -> Callable[..., float]: ...  # (t, samples of the first signal, ...)
-
-
-ROWS = 8
-"""Rows of its table that an ensemble prints."""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Ensemble:
-    """Runs of one diagram.
-
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        One row per finished member, by its number: what was varied, ``status`` (text), ``time``
-        reached (s), ``steps``, and the metrics; those of a run that did not end well are NaN.
-    time : ndarray of shape (m,)
-    signals : dict of ndarray of shape (members, m)
-        The signals that were kept, NaN after the end of a run.
-
-    Examples
-    --------
-    See `ensemble_response`.
-    """
-
-    table: pd.DataFrame
-    time: np.ndarray
-    signals: Mapping[str, np.ndarray]
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: how the members ended, and the first of them."""
-        rows = ((n, *row) for n, *row in self.table.head(ROWS).itertuples())
-        return table_html(repr(self).splitlines()[0], ["", *map(str, self.table.columns)], rows)
-
-    def __repr__(self) -> str:
-        ended = self.table["status"].value_counts() if len(self.table) else {}
-        how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
-        kept = f"; kept: {', '.join(self.signals)}" if self.signals else ""
-        return (
-            f"Ensemble of {counted(len(self.table), 'member')}: {how}; "
-            f"{counted(self.time.size, 'time')} from "
-            f"{self.time[0]:g} to {self.time[-1]:g} s{kept}\n{self.table.head(ROWS)}"
-            + (f"\n... {len(self.table) - ROWS} more in .table" * (len(self.table) > ROWS))
-        )
 
 
 @as_annotated

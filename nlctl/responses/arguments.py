@@ -66,7 +66,8 @@ def with_aliases(
     for name, value in aliases.items():
         full = ALIASES.get(name)
         if full is None or full not in given:
-            names = [*(k for k in defaults if k != "aliases"), *ALIASES]
+            short = [alias for alias, full in ALIASES.items() if full in given]
+            names = [*(k for k in defaults if k != "aliases"), *short]
             raise unknown("argument", name, names, f"of {who}", UnknownKeywordError)
         if given[full] is not defaults[full]:
             raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")

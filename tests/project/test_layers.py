@@ -56,7 +56,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["enclosures", "jacobians"],
         ["describe"],
         ["compiled"],
-        ["integrate", "linearized", "members"],
+        ["ensemble_result", "integrate", "linearized", "members"],
         ["along", "audit", "happened", "histories", "integrators", "settings"],
         ["chattering", "known", "ship"],
         ["run"],
