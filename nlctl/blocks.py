@@ -179,6 +179,35 @@ class Block(OwnParameters):
         """
         return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
 
+    def describing_function(self, A: float) -> complex:
+        """Return its describing function; ``ct.describing_function(block, A)`` asks for it.
+
+        Parameters
+        ----------
+        A : float
+            Amplitude of the input.
+
+        Returns
+        -------
+        complex
+            As `nlctl.describing_function` has it.
+
+        Raises
+        ------
+        UsageError
+            If the block has dynamics: it depends on the frequency then.
+        ParameterError
+            If the amplitude is not positive, or it has not one input and one output.
+        """
+        from . import describing_function  # of the package: blocks know no engine
+
+        if set(self.spec.states) != set(memory_states(self.spec)):
+            raise UsageError(
+                f"the describing function of '{self.name}' depends on the frequency: "
+                "nlctl.describing_function(block, A, omega) has it"
+            )
+        return complex(describing_function(self, A))
+
     def answer(self, t: float, x: Any, u: Any) -> Any:
         """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
 

@@ -173,7 +173,7 @@ def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
     """
     given = as_numbers(states)
     if given is not None and given.ndim == 2:
-        rows = np.array([state_array(system, row) for row in given])
+        rows = np.array([_member_state(system, k, row) for k, row in enumerate(given)])
     else:
         rows = state_array(system, states)
     own = initial_state(system)
@@ -183,6 +183,13 @@ def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
         changed = np.arange(1)  # the number of members is known by it
     names = state_names(system)
     return {names[i]: columns[i] if rows.ndim == 2 else columns[i, 0] for i in changed}
+
+
+def _member_state(system: Any, number: int, row: np.ndarray) -> np.ndarray:
+    try:
+        return state_array(system, row)
+    except ParameterError as error:
+        raise ParameterError(f"{error} (member {number})") from None
 
 
 def _finite(name: str, value: Any) -> np.ndarray:

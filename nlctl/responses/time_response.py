@@ -208,7 +208,7 @@ def _in_text(values: np.ndarray) -> list[str]:
     return [", ".join(f"{v:.6g}" for v in np.ravel(own)) for own in values]
 
 
-def as_response(response: ct.TimeResponseData, system: Any) -> Response:
+def as_response(response: ct.TimeResponseData, system: Any = None) -> Response:
     """Return python-control's response of a system with what `Response` adds."""
     made = Response.__new__(Response)
     made.__dict__.update(response.__dict__)

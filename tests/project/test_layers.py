@@ -26,7 +26,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.sensitivities", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.__main__"],
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",
