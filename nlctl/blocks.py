@@ -11,7 +11,7 @@ import numpy as np
 from .annotations import as_annotated
 from .errors import BlockError, ParameterError, UsageError
 from .host.notebook import table_html
-from .names import Parameters, base_name, unknown
+from .names import Parameters, base_name, renamed, unknown
 from .params import (
     ParameterRow,
     declared_params,
@@ -156,49 +156,11 @@ class Block(OwnParameters):
             set_parameters(self, None)
 
     def __call__(self, u: Any, params: Any = None, squeeze: Any = None) -> Any:
-        """Return what a block without states makes of its inputs; a number is its one input.
-
-        Parameters
-        ----------
-        u : array_like of shape (m,) or float
-            Inputs.
-        params : mapping, optional
-            Overrides.
-        squeeze : bool, optional
-            As in `control.NonlinearIOSystem`.
-
-        Returns
-        -------
-        ndarray
-            The outputs.
-
-        Raises
-        ------
-        TypeError
-            If the block has states.
-        """
+        """Return what a block without states makes of its inputs; a number is its one input."""
         return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
 
     def describing_function(self, A: float) -> complex:
-        """Return its describing function; ``ct.describing_function(block, A)`` asks for it.
-
-        Parameters
-        ----------
-        A : float
-            Amplitude of the input.
-
-        Returns
-        -------
-        complex
-            As `nlctl.describing_function` has it.
-
-        Raises
-        ------
-        UsageError
-            If the block has dynamics: it depends on the frequency then.
-        ParameterError
-            If the amplitude is not positive, or it has not one input and one output.
-        """
+        """Return its describing function; ``ct.describing_function(block, A)`` asks for it."""
         from . import describing_function  # of the package: blocks know no engine
 
         if set(self.spec.states) != set(memory_states(self.spec)):
@@ -380,30 +342,9 @@ def block(
     _probe(made)
     for kind, given in (("inputs", inputs), ("outputs", outputs)):
         if given is not None:
-            made.update_names(**{kind: _renamed(made, kind, given)})
+            names = renamed(f"block '{name}'", kind[:-1], list(getattr(spec, kind)), given)
+            made.update_names(**{kind: names})
     return made
-
-
-def _renamed(made: Block, kind: str, given: Any) -> list[str]:
-    """Return the names of a block's inputs or outputs after some or all of them are replaced."""
-    had = list(getattr(made.spec, kind))
-    if isinstance(given, Mapping):
-        for signal in given:
-            if signal not in had:
-                raise unknown(kind[:-1], str(signal), had, f"of block '{made.name}'")
-        names = [given.get(signal, signal) for signal in had]
-    else:
-        names = [given] if isinstance(given, str) else list(given)
-    if not (len(names) == len(set(names)) == len(had) and all(_is_label(name) for name in names)):
-        raise ParameterError(
-            f"block '{made.name}' has {counted(len(had), kind[:-1])} {_names(had)}: {kind} needs "
-            f"as many different names, got {given!r}"
-        )
-    return names
-
-
-def _is_label(name: Any) -> bool:
-    return isinstance(name, str) and bool(name) and "." not in name
 
 
 def _check_has_equations(spec: Any) -> None:

@@ -29,7 +29,7 @@ FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
 @contextmanager
 def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Show a bar on stderr while the body runs; if that is no terminal, a line now and then."""
+    """Show a bar on stderr while the body runs; elsewhere a line now and then."""
     console = Console(stderr=True)
     if not console.is_terminal:
         done = [0.0]

@@ -17,23 +17,8 @@ def listed(
 ) -> Callable[..., Any]:
     """Check the names in lists of python-control; return what connects blocks by them.
 
-    Parameters
-    ----------
-    systems : sequence of control.InputOutputSystem
-        The blocks.
-    connections, inplist, outlist : object
-        As `control.interconnect` takes them.
-
-    Returns
-    -------
-    callable
-        ``(systems, inputs, outputs, name)`` returns the diagram; it raises `nlctl.DiagramError` for
-        a list that python-control refuses, and for an input that nothing feeds.
-
-    Raises
-    ------
-    UnknownNameError
-        If a text in a list names no block, or no signal of its block.
+    That takes ``(systems, inputs, outputs, name)`` and returns the diagram; it refuses what
+    python-control refuses, and an input that nothing feeds.
     """
     for what in (connections, inplist, outlist):
         for text in _texts(what):

@@ -173,7 +173,7 @@ def _defaults() -> dict[str, Any]:
 
 
 def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[MetricLike]) -> None:
-    """Refuse what is no metric, and signals that are no outputs."""
+    """Refuse what is not a metric, and signals that are not outputs."""
     for metric in metrics:
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(

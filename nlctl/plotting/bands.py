@@ -37,27 +37,9 @@ def bands(
 ) -> tuple[Figure, list[Axes]]:
     """Draw bands that hold all, 90 % and 50 % of the runs, and single runs as lines.
 
-    Parameters
-    ----------
-    time : ndarray of shape (m,)
-        Times of the samples (s).
-    signals : mapping
-        Samples of shape (runs, m) by name, NaN after a run has ended.
-    lines : mapping, optional
-        Single runs by label, each with samples of shape (m,) by name.
-    limits : mapping, optional
-        Of the spec, by signal: value, and from when to when (s) it counts.
-    units : mapping, optional
-        By signal, where they are known.
-    groups : sequence of str, optional
-        The kind of each run; each kind has a band of its own then.
-    figure : Figure, optional
-        An empty one; its size is set.
-
-    Returns
-    -------
-    tuple of (Figure, list of Axes)
-        One pair of axes for each signal.
+    `signals` are samples of shape (runs, m) by name, NaN after a run has ended, `lines` single
+    runs by label with samples of shape (m,) by name.  With `groups`, the kind of each run, each
+    kind has a band of its own.  A figure that is given is empty; its size is set.
     """
     height = 1.9 if len(signals) > 1 else 2.6
     figure, axes = stacked_axes(rows=len(signals), height=height, figure=figure)

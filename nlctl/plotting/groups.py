@@ -84,20 +84,9 @@ def _is_actuator(part: Any) -> bool:
 
 
 def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list[str]]:
-    """Return the names of signals that are drawn together, under what the row is called.
+    """Return rows of at most four names, in the order of their first signals, by their titles.
 
-    Parameters
-    ----------
-    signals : mapping
-        Samples of shape (m,) by name.
-    wires : Wires
-        Where they come from.
-
-    Returns
-    -------
-    dict
-        Rows of at most four names, in the order of their first signals; called after their block,
-        or "" where signals of several blocks are of one kind.
+    A row is called after its block, or after its signals where these are of one kind.
     """
     kind = {name: name for name in signals}
 

@@ -21,23 +21,9 @@ def rows_figure(
     rows: Mapping[str, Sequence[str]],
     figure: Figure | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Draw signals in rows above each other.
+    """Draw samples of shape (m,) by name in rows of names, with a title each, above each other.
 
-    Parameters
-    ----------
-    time : ndarray of shape (m,)
-        Times of the samples (s).
-    signals : mapping
-        Samples of shape (m,) by name.
-    rows : mapping
-        Names of signals under what their row is called.
-    figure : Figure, optional
-        An empty one; its size is set.
-
-    Returns
-    -------
-    tuple of (Figure, list of Axes)
-        One pair of axes for each row.
+    A figure that is given is empty; its size is set.
     """
     height = 1.7 if len(rows) > 1 else 2.4
     figure, axes = stacked_axes(rows=len(rows), height=height, figure=figure)

@@ -81,35 +81,11 @@ class Response(ct.TimeResponseData):
     def plot(
         self, *args: Any, signals: Sequence[str | Sequence[str]] | None = None, **kwargs: Any
     ) -> Any:
-        """Plot the response, signals of one kind in one row.
+        """Plot the response as `control.time_response_plot` does, or signals of one kind in a row.
 
-        Up to four signals have a row each, and so have those of a call with arguments of
-        `control.time_response_plot`, which makes the plot then.
-
-        Parameters
-        ----------
-        *args, **kwargs : object
-            Of `control.time_response_plot`.
-        signals : sequence, optional
-            What is shown, outputs and inputs: a name has a row, a list of names shares one.
-
-        Returns
-        -------
-        control.ControlPlot
-            Lines, axes and figure.
-
-        Raises
-        ------
-        UnknownNameError
-            If a signal does not exist.
-
-        Examples
-        --------
-        Reference and output, and below them both ends of the actuator:
-
-        >>> run = nlctl.input_output_response(nlctl.paper.example_1(), [0, 0.1, 0.2])
-        >>> run.plot(signals=[["yd", "y"], ["u", "v"]]).axes.shape
-        (2, 1)
+        Of up to four signals each has a row of its own, as with arguments of python-control's.
+        `signals` says what is shown, outputs and inputs: a name has a row, a list of names shares
+        one, ``run.plot(signals=[["yd", "y"], "u"])``.
         """
         count = (self.noutputs or 0) + (self.ninputs or 0)
         if not args and not kwargs and not self.ntraces and (signals is not None or count > _ROWS):
@@ -129,25 +105,7 @@ class Response(ct.TimeResponseData):
     def rows(
         self, wanted: Sequence[str | Sequence[str]] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
-        """Return what `plot` shows: samples by name, and names by what their row is called.
-
-        Parameters
-        ----------
-        wanted : sequence, optional
-            As `signals` of `plot`.
-
-        Returns
-        -------
-        tuple of dict
-            Samples of shape (m,), and lists of names.
-
-        Raises
-        ------
-        UnknownNameError
-            If a signal does not exist.
-        UsageError
-            If the response has several traces.
-        """
+        """Return what `plot` shows: samples by name, and names by the title of their row."""
         if self.ntraces:
             raise UsageError("rows are those of one run, and this response has several traces")
         signals: dict[str, np.ndarray] = {}
