@@ -17,7 +17,6 @@ from .errors import DivergedError, ParameterError
 from .native import Compiled
 from .native import compile as compile_diagram
 from .params import as_numbers
-from .plotting.axes import legend_above
 from .response import input_output_response
 
 __all__ = ["LimitCycle", "describing_function", "describing_function_plot", "limit_cycles"]
@@ -297,6 +296,8 @@ def _followed(
         y = np.ravel(run.outputs)
         if np.ptp(y[-_SAMPLES:]) <= 2 * _GONE * A:
             return nothing | {"found": "it dies out"}
+        if not np.max(np.abs(y)) <= A / _GONE:
+            return nothing | {"found": f"it grows beyond {A / _GONE:.3g}"}
         if passed.size < 2:
             break
         last = (times >= passed[-2]) & (times <= passed[-1])
@@ -362,7 +363,7 @@ def describing_function_plot(
             label = f"simulated: {cycle.amplitude:.3g} @ {cycle.omega:.3g} rad/s"
             crosses += ax.plot(at.real, at.imag, "kx", markersize=9, label=label)
     if crosses:
-        legend_above(ax, {str(cross.get_label()): cross for cross in crosses})
+        ax.legend(handles=crosses, framealpha=0.9)
     lines = np.empty(3, dtype=object)
     lines[:2], lines[2] = plot.lines, crosses
     return ct.ControlPlot(lines, plot.axes, plot.figure)

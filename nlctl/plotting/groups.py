@@ -94,7 +94,7 @@ def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list
         first, merged = kind[names[0]], {kind[name] for name in names}
         kind.update({name: first for name, old in kind.items() if old in merged})
 
-    for names in (*_sums(signals), *(p for p in wires.pairs if set(p) <= set(signals))):
+    for names in (*_sums(signals, wires), *(p for p in wires.pairs if set(p) <= set(signals))):
         join(names)
     sizes = {key: list(kind.values()).count(key) for key in kind.values()}
     rows: dict[tuple[bool, str], list[str]] = {}
@@ -110,16 +110,21 @@ def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list
     return found
 
 
-def _sums(signals: Mapping[str, np.ndarray]) -> Iterator[list[str]]:
-    """Yield names of signals that are equal but for their sign, or sum and summands."""
+def _sums(signals: Mapping[str, np.ndarray], wires: Wires) -> Iterator[list[str]]:
+    """Yield names of signals that are equal but for their sign, or sum and summands.
+
+    Of what is constant only an input may be one, a reference after a step: others may be equal
+    by chance.
+    """
     first = next(iter(signals.values()), np.zeros(1))
     at = np.unique(np.linspace(0, first.size - 1, _SAMPLES).astype(int))
     given = {n: y[at] for n, y in signals.items() if np.all(np.isfinite(y)) and np.any(y[at])}
     moving = [name for name, y in given.items() if np.ptp(y) > 0]
+    given = {n: y for n, y in given.items() if n in moving or n not in wires.blocks}
     if len(given) > _COMPARED:
         return
     yield from (list(two) for two in combinations(moving, 2) if _is_sum(given, two[0], two[1:]))
-    for two in combinations(moving, 2):  # the third may be constant, as after a step
+    for two in combinations(moving, 2):
         for name in given:
             if name not in two and _is_sum(given, name, two):
                 yield [name, *two]

@@ -29,7 +29,7 @@ def text_of(page):
 
 
 def test_the_commands_of_the_guide_run_one_after_the_other(tmp_path):
-    """From nothing to a loop, its picture, its page, a study with claims, and a test that passes."""
+    """From nothing to a loop, its picture, its page, a study, and a test that passes."""
     (block,) = re.findall(r"```console\n(.*?)```", START, flags=re.DOTALL)
     commands = [line.removeprefix("$ ").split() for line in block.splitlines()]
     for program, *arguments in commands:
@@ -63,7 +63,7 @@ def pid():
 
 
 def test_a_researcher_puts_another_controller_into_the_paper(tmp_path):
-    """Figure and page of a loop that lacks zeta; what the proof needs is said, and no claim fails."""
+    """Figure and page of a loop that lacks zeta, and what the proof lacks of it."""
     (tmp_path / "rival.py").write_text(RESEARCHER, encoding="utf-8")
     told("simulate", "rival.py:pid", "--until", "5", "--plot", "out.svg", cwd=tmp_path)
     assert (tmp_path / "out.svg").stat().st_size > 1e4
