@@ -57,7 +57,7 @@ def function_summaries() -> dict[str, dict[str, str]]:
     return {group: lines for group, lines in found.items() if lines}
 
 
-def named_function(name: str) -> Any:
+def making_function(name: str) -> Any:
     """Return the function of that name, which `function_summaries` has."""
     (group,) = (group for group, lines in function_summaries().items() if name in lines)
     return getattr(importlib.import_module(f"nlctl.{group}"), name)

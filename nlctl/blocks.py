@@ -30,7 +30,7 @@ from .upstream.control_internals import (
 )
 from .wording import counted
 
-Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
+_Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
 
 
 class Spec(Protocol):
@@ -160,7 +160,23 @@ class Block(OwnParameters):
         return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
 
     def describing_function(self, A: float) -> complex:
-        """Return its describing function; ``ct.describing_function(block, A)`` asks for it."""
+        """Return its describing function; ``ct.describing_function(block, A)`` asks for it.
+
+        Parameters
+        ----------
+        A : float
+            Amplitude of the input.
+
+        Returns
+        -------
+        complex
+            As `nlctl.describing_function` has it.
+
+        Raises
+        ------
+        UsageError
+            If the block has dynamics: it depends on the frequency then.
+        """
         from . import describing_function  # of the package: blocks know no engine
 
         if set(self.spec.states) != set(memory_states(self.spec)):
@@ -283,8 +299,8 @@ def block(
     spec: Any,
     name: str,
     *,
-    inputs: Signals = None,
-    outputs: Signals = None,
+    inputs: _Signals = None,
+    outputs: _Signals = None,
     dt: float | bool | None = None,
 ) -> Block:
     """Make a python-control system of a record.

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from nlctl.errors import ParameterError
 
-from ..catalogue import block_summaries, function_summaries, named_block, named_function
+from ..catalogue import block_summaries, function_summaries, making_function, named_block
 
 if TYPE_CHECKING:
     from ..studies.kind import Kind
@@ -53,7 +53,7 @@ def show(name: str) -> None:
     if name in blocks:
         return _show_block(name, named_block(name))
     if name in functions:
-        return _show_function(name, named_function(name))
+        return _show_function(name, making_function(name))
     from ..studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}

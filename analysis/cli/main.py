@@ -176,9 +176,9 @@ def new(
     folder: Annotated[Path, typer.Argument(metavar="NAME", help="Name of a new folder.")],
 ) -> None:
     """Write a loop, a study of it and a test into a new folder; they run as they are."""
-    from .starting import start
+    from .starting import start_project
 
-    made = start(folder)
+    made = start_project(folder)
     for path in made:
         say(path)
     loop, study, test = (shlex.quote(path.as_posix()) for path in made)

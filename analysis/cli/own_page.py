@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["compose_page", "is_loop_name", "page_folder"]
 
-UNTIL, STEP = 20.0, 0.01  # s, as `nlctl simulate` has them
+HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
 
 def is_loop_name(text: str) -> bool:
@@ -36,7 +36,7 @@ def compose_page(
 ) -> Report:
     """Run a loop, check what can be checked of any, and compose its page."""
     made = simulated(name, settings, inputs, until, step)
-    from ..loop_checks import Check, checks_of, checks_section, proof_of, told
+    from ..loop_checks import LoopCheck, checks_of, checks_section, proof_of, told
     from ..loop_report import loop_report
     from .terminal import progress_bar
 
@@ -45,7 +45,7 @@ def compose_page(
         advance(1)
         proof = proof_of(made.loop, until, made.start, made.params)
         advance(1)
-    applies = not isinstance(proof, Check)
+    applies = not isinstance(proof, LoopCheck)
     page = loop_report(
         made.loop,
         title=made.loop.name,
@@ -65,5 +65,7 @@ def _command(
     words = ["nlctl", "report", name]
     words += [part for text in settings for part in ("--set", text)]
     words += [part for text in inputs for part in ("--input", text)]
-    words += ["--until", f"{until:g}"] * (until != UNTIL) + ["--step", f"{step:g}"] * (step != STEP)
+    words += ["--until", f"{until:g}"] * (until != HORIZON_OF_PAGE) + ["--step", f"{step:g}"] * (
+        step != STEP_OF_PAGE
+    )
     return shlex.join(words)

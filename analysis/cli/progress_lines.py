@@ -11,7 +11,7 @@ from .printing import error_line
 
 __all__ = ["progress_lines"]
 
-FIRST, PERIOD = 2.0, 10.0  # s: what is done sooner needs no line
+FIRST_LINE, NEXT_LINE = 2.0, 10.0  # s: what is done sooner needs no line
 
 
 @contextmanager
@@ -24,11 +24,11 @@ def progress_lines(what: str, told: Callable[[], str]) -> Iterator[None]:
         error_line(f"{what}: {text}, {time.monotonic() - begun:.0f} s")
 
     def watch() -> None:
-        pause = FIRST
+        pause = FIRST_LINE
         while not done.wait(pause):
             shown.set()
             line(told())
-            pause = PERIOD
+            pause = NEXT_LINE
 
     thread = threading.Thread(target=watch, daemon=True)
     thread.start()

@@ -16,7 +16,7 @@ from nlctl.wording import counted
 
 from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
-from .own_page import STEP, UNTIL, compose_page, is_loop_name, page_folder
+from .own_page import HORIZON_OF_PAGE, STEP_OF_PAGE, compose_page, is_loop_name, page_folder
 from .printing import error_line, in_json, say
 from .studies import (
     EXIT_CODES,
@@ -108,11 +108,13 @@ def report(
         if what is None:
             made = _paper(out or Path("reports/paper"), jobs, far=far, **options)
         elif is_loop:
-            run = (set_ or [], input_ or [], until or UNTIL, step or STEP)
+            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
             made = _loop(str(what), run, out, **options)
         else:
             made = _study(what, out, jobs, trust=trust, **options)
-        say(made.told)
+        from ..report.typography import plain_text
+
+        say(plain_text(made.told))
         finish_report(made.page, pdf=pdf, open_=open_)
         write_claims(junit, made.title, made.claims)
         if made.code:

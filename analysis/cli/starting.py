@@ -9,12 +9,12 @@ from string import Template
 from nlctl.errors import ParameterError
 from nlctl.host.files import replace_file
 
-__all__ = ["start"]
+__all__ = ["start_project"]
 
 _FILES = {"loop.py": "loop.py", "study.toml": "{name}.toml", "test_loop.py": "test_loop.py"}
 
 
-def start(folder: Path) -> list[Path]:
+def start_project(folder: Path) -> list[Path]:
     """Write the files; a folder that holds anything is refused."""
     name = folder.resolve().name
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):

@@ -13,7 +13,7 @@ from ..blocks import Block, block, within
 from ..errors import DiagramError
 from ..names import Parameters, unknown
 from ..upstream.control_internals import StandIn, is_system
-from .listed import listed as _listed
+from .listed import connected_by_lists
 from .parameters import overridden
 from .places import leaves
 from .third_party import with_own_values
@@ -142,7 +142,11 @@ def interconnect(
     _check_blocks(systems)
     _check_timebases(systems)
     by_name = connections is inplist is outlist is None
-    make = _by_name(systems, inputs) if by_name else _listed(systems, connections, inplist, outlist)
+    make = (
+        _by_name(systems, inputs)
+        if by_name
+        else connected_by_lists(systems, connections, inplist, outlist)
+    )
     systems = [with_own_values(system) for system in systems]
     diagram = make(systems, inputs, outputs, name)
     if isinstance(diagram.params, Parameters):

@@ -12,7 +12,7 @@ from ..errors import DiagramError
 from ..names import unknown
 
 
-def listed(
+def connected_by_lists(
     systems: Sequence[Any], connections: Any, inplist: Any, outlist: Any
 ) -> Callable[..., Any]:
     """Check the names in lists of python-control; return what connects blocks by them.

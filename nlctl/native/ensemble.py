@@ -78,8 +78,8 @@ def ensemble_response(
     ----------
     compiled : Compiled or control.InputOutputSystem
         A diagram that is not compiled yet is compiled first.
-    timepts : array_like of shape (m,)
-        Times in s at which signals are sampled.  Also ``T``.
+    timepts : array_like of shape (m,), optional
+        Times in s at which signals are sampled; they are needed, under this name or as ``T``.
     inputs : array_like, list or float, optional
         Inputs, the same for all members, as in `nlctl.input_output_response`.  Also ``U``.
     initial_state : mapping or array_like, optional

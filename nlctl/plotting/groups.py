@@ -18,7 +18,7 @@ from ..blocks import Block, memory_states, within
 
 __all__ = ["Wires", "groups_of", "wires_of"]
 
-MOST = 4  # signals in one row: as many as there are line styles
+_MOST = 4  # signals in one row: as many as there are line styles
 _COMPARED = 40  # signals of which sums are looked for: their pairs are
 _SAMPLES = 64
 _CLOSE = 1e-9  # of the largest value: sums are rounded
@@ -103,10 +103,10 @@ def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list
         rows.setdefault((alone, wires.blocks.get(name, "") if alone else key), []).append(name)
     found: dict[str, list[str]] = {}
     for (alone, key), names in rows.items():
-        for k in range(0, len(names), MOST):
-            part = names[k : k + MOST]
+        for k in range(0, len(names), _MOST):
+            part = names[k : k + _MOST]
             title = key if alone and key else ", ".join(part)
-            found[title if title not in found else f"{title} ({k // MOST + 1})"] = part
+            found[title if title not in found else f"{title} ({k // _MOST + 1})"] = part
     return found
 
 

@@ -9,7 +9,7 @@ from command_line import nlctl_here
 from rows import each_row
 
 import nlctl
-from nlctl.analysis.catalogue import block_records, function_summaries, named_function
+from nlctl.analysis.catalogue import block_records, function_summaries, making_function
 
 FUNCTIONS = [name for lines in function_summaries().values() for name in lines]
 
@@ -27,7 +27,7 @@ def test_signals_of_a_block_are_those_of_its_record(name):
 @each_row("name", FUNCTIONS)
 def test_functions_are_found_with_all_of_their_arguments(name):
     """Those that make blocks or parts of them, by the lines of their sources."""
-    made = named_function(name)
+    made = making_function(name)
     shown = nlctl_here("list", name).stdout
     assert shown.startswith(f"{name}()")
     assert inspect.getdoc(made).splitlines()[0][:60] in shown
