@@ -82,11 +82,11 @@ def describing_function(
 
     Examples
     --------
-    Of an ideal relay, 4 / (pi A), and of a play, which lags:
+    Of a relay its magnitude is 4 / (pi A); a play lags:
 
     >>> import numpy as np
-    >>> relay = nlctl.block(nlctl.Relay(on=0.0, off=0.0), "relay")
-    >>> bool(np.isclose(nlctl.describing_function(relay, 2.0), 4 / (np.pi * 2.0)))
+    >>> relay = nlctl.block(nlctl.Relay(on=0.5, off=-0.5), "relay")
+    >>> bool(np.isclose(abs(nlctl.describing_function(relay, 2.0)), 4 / (np.pi * 2.0)))
     True
     >>> play = nlctl.block(nlctl.Backlash(), "play")
     >>> bool(nlctl.describing_function(play, 2.0).imag < 0)
