@@ -145,7 +145,7 @@ def _settled(
     times = 2 * np.pi / omega * np.arange(_PERIODS + 1)
     state: Any = None
     for _ in range(_MOST):
-        run = input_output_response(
+        run: Any = input_output_response(
             rig, times, 0, state, params=dict(params) | {"sine.A": A}, rtol=_TIGHT * RTOL,
             atol=_TIGHT * ATOL,
         )  # fmt: skip
@@ -250,7 +250,7 @@ def _response(system: Any, block: Any, amplitudes: Any, omega: Any) -> Any:
 
 def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
     """Simulate the loop from a predicted cycle on."""
-    linear = ct.ss(system)
+    linear: Any = ct.ss(system)
     linear = ct.ss(
         linear.A, linear.B, linear.C, linear.D, inputs=["u"], outputs=["y"], name="linear"
     )
@@ -288,7 +288,7 @@ def _followed(
     for _ in range(_MOST):
         times = np.linspace(0, _PERIODS * 2 * np.pi / omega, _PERIODS * _SAMPLES + 1)
         try:
-            run = input_output_response(loop, times, 0, state, events={"rises": rises})
+            run: Any = input_output_response(loop, times, 0, state, events={"rises": rises})
         except DivergedError as error:
             return nothing | {"found": f"it grows without bound: {error}"}
         state = run.x[:, -1]

@@ -63,7 +63,7 @@ class Response(ct.TimeResponseData):
     @property
     def states(self) -> Any:
         """The states, found by ``"plant.x1"`` as well as by python-control's ``"plant_x1"``."""
-        found = super().states
+        found: Any = super().states
         if len(self.state_names) == len(found.signal_labels or ()):
             found.signal_labels = StateLabels(found.signal_labels, self.state_names)
         return found
@@ -109,7 +109,8 @@ class Response(ct.TimeResponseData):
         if self.ntraces:
             raise UsageError("rows are those of one run, and this response has several traces")
         signals: dict[str, np.ndarray] = {}
-        for labels, samples in ((self.output_labels, self.y), (self.input_labels, self.u)):
+        every: Any = ((self.output_labels, self.y), (self.input_labels, self.u))
+        for labels, samples in every:
             signals |= dict(zip(labels or (), samples if labels else (), strict=True))
         if wanted is None:
             return signals, groups_of(signals, self.wires)
