@@ -1,4 +1,4 @@
-"""The blocks that come with nlctl: their records, or what their sources say of them.
+"""The blocks that come with nlctl, and the functions that make some: what their sources say.
 
 To import the blocks takes seconds, to read their sources does not.
 """
@@ -8,13 +8,14 @@ from __future__ import annotations
 import ast
 import dataclasses
 import importlib
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from nlctl import errors
 
 _GROUPS = ("plants", "actuators", "sliding", "delays", "references", "controllers")
+_OF_FUNCTIONS = (*_GROUPS, "sampling", "faults")
 
 
 def _modules() -> list[Any]:
@@ -47,19 +48,40 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
     The names are those of `block_records`, in the same order.
     """
-    return {group: _records(group) for group in _GROUPS}
+    return {group: _summaries(group, _is_record) for group in _GROUPS}
 
 
-def _records(group: str) -> dict[str, str]:
-    """Return the public records of a module, or of a package and the rooms in it."""
+def function_summaries() -> dict[str, dict[str, str]]:
+    """Return the first line of each function that makes blocks: ``{group: {name: line}}``."""
+    found = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
+    return {group: lines for group, lines in found.items() if lines}
+
+
+def making_function(name: str) -> Any:
+    """Return the function of that name, which `function_summaries` has."""
+    (group,) = (group for group, lines in function_summaries().items() if name in lines)
+    return getattr(importlib.import_module(f"nlctl.{group}"), name)
+
+
+def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
+    """Return what is chosen of the public names of a module, or of a package and its rooms."""
     folder = Path(errors.__file__).parent / group
     own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
-    found = dict(
-        line
+    found = {
+        node.name: (ast.get_docstring(node) or "").partition("\n")[0]
         for path in (sorted(folder.rglob("*.py")) or [own])
-        for line in _lines(ast.parse(path.read_bytes()))
-    )
+        for node in ast.parse(path.read_bytes()).body
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and chosen(node)
+    }
     return {name: found[name] for name in _public(ast.parse(own.read_bytes())) if name in found}
+
+
+def _is_record(node: ast.stmt) -> bool:
+    return isinstance(node, ast.ClassDef) and "record" in map(ast.unparse, node.decorator_list)
+
+
+def _is_function(node: ast.stmt) -> bool:
+    return isinstance(node, ast.FunctionDef)
 
 
 def _public(module: ast.Module) -> list[str]:
@@ -69,10 +91,3 @@ def _public(module: ast.Module) -> list[str]:
         for node in module.body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
     )
-
-
-def _lines(module: ast.Module) -> Iterator[tuple[str, str]]:
-    """Yield name and summary of each class under ``@record``."""
-    for node in module.body:
-        if isinstance(node, ast.ClassDef) and "record" in map(ast.unparse, node.decorator_list):
-            yield node.name, (ast.get_docstring(node) or "").partition("\n")[0]

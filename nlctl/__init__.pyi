@@ -76,6 +76,7 @@ from .controllers import (
     sliding_mode,
 )
 from .delays import TransportDelay
+from .describing import LimitCycle, describing_function, describing_function_plot, limit_cycles
 from .diagrams import initial_state, interconnect, parameters, state_names
 from .drawing.picture import draw
 from .equations import equation
@@ -179,6 +180,7 @@ __all__ = [
     "KnownSignLaw",
     "Lag",
     "LeakyNussbaumLaw",
+    "LimitCycle",
     "LinearRegressor",
     "LuGre",
     "MetricGradient",
@@ -229,6 +231,8 @@ __all__ = [
     "cascade",
     "compile",
     "controllers",
+    "describing_function",
+    "describing_function_plot",
     "diagonal_centres",
     "discretise",
     "draw",
@@ -244,6 +248,7 @@ __all__ = [
     "interconnect",
     "l1_adaptive",
     "latin_hypercube_centres",
+    "limit_cycles",
     "linearize",
     "metric_gradient",
     "mrac",

@@ -15,6 +15,8 @@ from .errors import ParameterError
 from .params import as_numbers, integer
 
 __all__ = [
+    "ATOL",
+    "RTOL",
     "a_function",
     "flag",
     "fraction",
@@ -30,6 +32,7 @@ __all__ = [
 ]
 
 _T = TypeVar("_T")
+RTOL, ATOL = 1e-8, 1e-10  # of every run unless it is given others: a member of an ensemble is a run
 
 
 def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:

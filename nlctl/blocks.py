@@ -11,7 +11,7 @@ import numpy as np
 from .annotations import as_annotated
 from .errors import BlockError, ParameterError, UsageError
 from .host.notebook import table_html
-from .names import Parameters, base_name, unknown
+from .names import Parameters, base_name, renamed, unknown
 from .params import (
     ParameterRow,
     declared_params,
@@ -29,6 +29,8 @@ from .upstream.control_internals import (
     set_parameters,
 )
 from .wording import counted
+
+_Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
 
 
 class Spec(Protocol):
@@ -153,6 +155,37 @@ class Block(OwnParameters):
             self.spec = self._resolved(values)
             set_parameters(self, None)
 
+    def __call__(self, u: Any, params: Any = None, squeeze: Any = None) -> Any:
+        """Return what a block without states makes of its inputs; a number is its one input."""
+        return super().__call__(np.atleast_1d(u), params=params, squeeze=squeeze)
+
+    def describing_function(self, A: float) -> complex:
+        """Return its describing function; ``ct.describing_function(block, A)`` asks for it.
+
+        Parameters
+        ----------
+        A : float
+            Amplitude of the input.
+
+        Returns
+        -------
+        complex
+            As `nlctl.describing_function` has it.
+
+        Raises
+        ------
+        UsageError
+            If the block has dynamics: it depends on the frequency then.
+        """
+        from . import describing_function  # of the package: blocks know no engine
+
+        if set(self.spec.states) != set(memory_states(self.spec)):
+            raise UsageError(
+                f"the describing function of '{self.name}' depends on the frequency: "
+                "nlctl.describing_function(block, A, omega) has it"
+            )
+        return complex(describing_function(self, A))
+
     def answer(self, t: float, x: Any, u: Any) -> Any:
         """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
 
@@ -262,7 +295,14 @@ def parameter_rows(block: Block, path: str = "") -> list[ParameterRow]:
 
 
 @as_annotated
-def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
+def block(
+    spec: Any,
+    name: str,
+    *,
+    inputs: _Signals = None,
+    outputs: _Signals = None,
+    dt: float | bool | None = None,
+) -> Block:
     """Make a python-control system of a record.
 
     Parameters
@@ -271,6 +311,8 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         Parameters and equations; see `Spec` for what is read.
     name : str
         Name of the block, and the first part of its parameters' names.
+    inputs, outputs : str, sequence of str or mapping, optional
+        Other names of its signals: of all of them in order, or of some, ``{"u": "torque"}``.
     dt : float, bool or None, optional
         Timebase as in python-control.  Records without states may have any, and with None have
         that of the diagram; one with states is in continuous time, dt = 0, unless it says
@@ -285,7 +327,10 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     Raises
     ------
     ParameterError
-        If a parameter is out of bounds, the name is none, or `dt` does not fit the record.
+        If a parameter is out of bounds, the name is none, `dt` does not fit the record, or there
+        are not as many other names as signals.
+    UnknownNameError
+        If a signal that is renamed does not exist.
     BlockError
         If `spec` lacks something that a block needs, or its equations return the wrong number
         of values, or ``feedthrough = False`` is not true.
@@ -296,6 +341,11 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
     >>> actuator = nlctl.block(nlctl.DeadZone(b_r=0.6), "actuator")
     >>> print(actuator.params["actuator.b_r"], actuator.output(0, [], [0.4]))
     0.6 [0.]
+
+    Two of one kind in a diagram need signals of their own:
+
+    >>> nlctl.block(nlctl.Lag(), "left", inputs="p", outputs={"v": "q"}).output_labels
+    ['q']
     """
     _check_has_equations(spec)
     if not (name is None or (isinstance(name, str) and name)):
@@ -306,6 +356,10 @@ def block(spec: Any, name: str, *, dt: float | bool | None = None) -> Block:
         dt = 0
     made = Block(spec, name, **({} if dt is None else {"dt": dt}))
     _probe(made)
+    for kind, given in (("inputs", inputs), ("outputs", outputs)):
+        if given is not None:
+            names = renamed(f"block '{name}'", kind[:-1], list(getattr(spec, kind)), given)
+            made.update_names(**{kind: names})
     return made
 
 

@@ -26,7 +26,7 @@ class ParameterError(UsageError):
     --------
     >>> nlctl.DeadZone(b_r=-0.1)
     Traceback (most recent call last):
-    nlctl.errors.ParameterError: DeadZone needs b_r > 0, got -0.1
+    nlctl.errors.ParameterError: DeadZone needs b_r >= 0, got -0.1
     """
 
 

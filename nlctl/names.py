@@ -19,7 +19,8 @@ from typing import Any
 
 import control as ct
 
-from .errors import AmbiguousNameError, UnknownNameError
+from .errors import AmbiguousNameError, ParameterError, UnknownNameError
+from .wording import counted
 
 _LISTED = 24  # names that a message lists; it says how many more there are
 
@@ -66,6 +67,24 @@ def find_name(kind: str, name: str, known: Mapping[str, Any], clashes: Iterable[
             "nlctl.interconnect(..., name=...), which puts their name in front"
         )
     return matches[0]
+
+
+def renamed(who: str, kind: str, had: list[str], given: Any) -> list[str]:
+    """Return the names of signals after all, or those in a mapping, are given others."""
+    if isinstance(given, Mapping):
+        for signal in given:
+            if signal not in had:
+                raise unknown(kind, str(signal), had, f"of {who}")
+        names = [given.get(signal, signal) for signal in had]
+    else:
+        names = [given] if isinstance(given, str) else list(given)
+    are_labels = all(isinstance(name, str) and name and "." not in name for name in names)
+    if not (are_labels and len(names) == len(set(names)) == len(had)):
+        raise ParameterError(
+            f"{who} has {counted(len(had), kind)} ({', '.join(had)}): {kind}s needs as many "
+            f"different names without dots, got {given!r}"
+        )
+    return names
 
 
 class Parameters(dict[str, Any]):

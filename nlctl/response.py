@@ -12,17 +12,25 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 
 from .annotations import as_annotated
-from .arguments import number, tolerances
+from .arguments import ATOL, RTOL, number, one_of, tolerances
 from .blocks import sampling_of
 from .diagrams import leaves, supplied_blocks
 from .errors import ParameterError
 from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
-from .responses.arguments import RunArguments, checked_params, unified, with_aliases
+from .responses.arguments import (
+    HOLDS,
+    RunArguments,
+    checked_params,
+    held,
+    input_array,
+    unified,
+    with_aliases,
+)
 from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.relay import SLIDING
-from .upstream.control_internals import is_system
+from .upstream.control_internals import StandIn, is_system
 
 if TYPE_CHECKING:
     from .native import Compiled, Tableau
@@ -64,9 +72,10 @@ def input_output_response(
     params: Mapping[str, Any] | None = None,
     engine: str | None = "auto",
     method: str | Tableau | None = None,
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
+    rtol: float = RTOL,
+    atol: float = ATOL,
     evaluation_times: Any = "T",
+    hold: str = "foh",
     squeeze: bool | None = None,
     transpose: bool = False,
     return_states: bool = False,
@@ -126,6 +135,9 @@ def input_output_response(
         Times in s at which the response is wanted, if not at `timepts`; they lie within these.
         A sampled diagram starts with the first of them.  With None python-control takes the
         integrator's own steps, which machine code does not keep.  Also ``t_eval``.
+    hold : {"foh", "zoh"}, optional
+        What inputs are between `timepts`, by the names that `control.sample_system` has for it:
+        linear, or constant, with a step at each time to the value that is given there.
     squeeze, transpose, return_states : bool, optional
         Form of the response, as in python-control: whether outputs lose axes of length 1, whether
         time is the first axis, and whether the response unpacks as time, outputs, states.  Also
@@ -212,6 +224,7 @@ def input_output_response(
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
     named |= {"evaluation_times": evaluation_times, "return_states": return_states}
     named = with_aliases(named, aliases, _defaults())
+    one_of("input_output_response", "hold", hold, HOLDS)
     form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
     run = RunArguments(
         system=system,
@@ -230,11 +243,23 @@ def input_output_response(
             **{"solve_ivp_method": solve_ivp_method, "solve_ivp_kwargs": solve_ivp_kwargs},
         },
         watched=watched_functions(stop_when, events),
+        hold=hold,
     )
-    made = _computed(unified(run), "auto" if engine is None else engine)
+    made = _computed(_held(unified(run)), "auto" if engine is None else engine)
     if run.watched and made.success is not False:
         check_moves(run.watched, (made.t, made.x, made.u), params)
     return made
+
+
+def _held(run: RunArguments) -> RunArguments:
+    """Return a run with the inputs of a zero-order hold as steps, in continuous time."""
+    system = run.system.system if isinstance(run.system, StandIn) else run.system
+    if run.hold == "foh" or not (is_system(system) and ct.isctime(system) and system.ninputs):
+        return run
+    times, inputs = held(run.times, input_array(system, run.inputs, run.times))
+    wanted = run.evaluation_times
+    wanted = run.times if isinstance(wanted, str) and wanted == "T" else wanted
+    return replace(run, times=times, inputs=inputs, evaluation_times=wanted)
 
 
 @functools.cache

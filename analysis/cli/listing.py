@@ -12,7 +12,7 @@ from rich.text import Text
 
 from nlctl.errors import ParameterError
 
-from ..catalogue import block_summaries, named_block
+from ..catalogue import block_summaries, function_summaries, making_function, named_block
 
 if TYPE_CHECKING:
     from ..studies.kind import Kind
@@ -20,15 +20,19 @@ if TYPE_CHECKING:
 __all__ = ["show", "show_all"]
 
 _KINDS = "kinds"
+_WIDEST = 120  # characters of a table that no terminal shows
 HELP = """
-nlctl list NAME shows the parameters of a block, nlctl list kinds the
-kinds of analysis of a study, nlctl list file.py:NAME one of your own."""
+nlctl list NAME shows signals and parameters of a block, or the arguments of a
+function, nlctl list kinds the kinds of analysis of a study, nlctl list
+file.py:NAME one of your own."""
 
 
 def show_all() -> None:
-    """Print the blocks in groups, one line each, and the examples."""
-    console = Console()
-    groups = block_summaries()
+    """Print the blocks and the functions that make some in groups, and the examples."""
+    console = _console()
+    groups = {title: dict(lines) for title, lines in block_summaries().items()}
+    for title, lines in function_summaries().items():
+        groups.setdefault(title, {}).update({f"{name}()": line for name, line in lines.items()})
     width = max(len(name) for group in groups.values() for name in group)
     for title, lines in groups.items():
         _show_group(title.capitalize(), lines, width)
@@ -37,14 +41,19 @@ def show_all() -> None:
 
 
 def show(name: str) -> None:
-    """Print the parameters of a block, the keys of a kind of analysis, or the kinds."""
+    """Print a block, a function that makes some, a kind of analysis, or the kinds."""
     if ":" in name:
         from ..studies.resolve import named
 
         return _show(name, named(name, Path.cwd()))
     blocks = [block for group in block_summaries().values() for block in group]
+    functions = [made for group in function_summaries().values() for made in group]
+    known = {each.lower(): each for each in (*functions, *blocks)}
+    name = known.get(name.removesuffix("()").lower(), name)
     if name in blocks:
         return _show_block(name, named_block(name))
+    if name in functions:
+        return _show_function(name, making_function(name))
     from ..studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}
@@ -54,8 +63,14 @@ def show(name: str) -> None:
     if name not in kinds:
         from nlctl.names import unknown
 
-        raise unknown("block", name, [*blocks, *kinds, _KINDS])
+        raise unknown("block", name, [*blocks, *functions, *kinds, _KINDS])
     return _show_kind(name, kinds[name])
+
+
+def _console() -> Console:
+    """Return the terminal; where lines are read by something else, they are not cut."""
+    console = Console()
+    return console if console.is_terminal else Console(width=_WIDEST)
 
 
 def _show(name: str, thing: Any) -> None:
@@ -74,10 +89,12 @@ def _show(name: str, thing: Any) -> None:
 
 
 def _show_group(title: str, lines: dict[str, str], width: int) -> None:
-    console = Console()
+    console = _console()
     console.print(f"[bold]{title}[/bold]", highlight=False)
     for name, told in lines.items():
-        console.print(Text(f"  {name:<{width}}  {told}"), no_wrap=True, overflow="ellipsis")
+        line = Text(f"  {name:<{width}}  {told}")
+        cut = {"no_wrap": True, "overflow": "ellipsis"} if console.is_terminal else {}
+        console.print(line, soft_wrap=not console.is_terminal, **cut)
 
 
 def _show_block(name: str, record: type) -> None:
@@ -91,8 +108,61 @@ def _show_block(name: str, record: type) -> None:
     for field, rule in declared_params(record).items():
         default = np.asarray(defaults[field])
         text = str(defaults[field]) if default.size <= 4 else f"{default.shape} values"
-        table.add_row(field, text, rule.unit, rule.bounds, rule.meaning)
-    _show_table(name, _summary(record), table)
+        table.add_row(field, *map(Text, (text, rule.unit, rule.bounds, rule.meaning)))
+    _show_table(name, _summary(record), table, _signals(record))
+
+
+def _signals(record: type) -> str:
+    """Return what a block takes and outputs with its own parameters, if it has such."""
+    from nlctl.errors import UsageError
+
+    try:
+        made = record()
+        states = f"; states {', '.join(made.states)}" if made.states else ""
+        return f"({', '.join(made.inputs)}) -> ({', '.join(made.outputs)}){states}"
+    except (UsageError, TypeError):
+        return ""
+
+
+def _show_function(name: str, function: Any) -> None:
+    """Print the arguments of a function that makes blocks, and what signals these have."""
+    import inspect
+
+    table = Table("argument", "default", "meaning", title=None)
+    told = _told_arguments(inspect.getdoc(function) or "")
+    rows: dict[tuple[str, str], list[str]] = {}
+    for key, argument in inspect.signature(function).parameters.items():
+        default = "needed" if argument.default is argument.empty else repr(argument.default)
+        rows.setdefault((default, told.get(key) or key), []).append(key)
+    for (default, meaning), keys in rows.items():
+        table.add_row(
+            ", ".join(keys), Text(default), Text("" if meaning in keys else _plain(meaning))
+        )
+    _show_table(f"{name}()", _summary(function), table, _made_signals(function))
+
+
+def _told_arguments(docstring: str) -> dict[str, str]:
+    """Return what the section Parameters of a docstring says of each argument."""
+    section = docstring.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
+    found: dict[str, str] = {}
+    names: list[str] = []
+    for line in section.splitlines():
+        if not line.startswith(" "):
+            names = [name.strip(" *") for name in line.partition(" : ")[0].split(",")]
+        else:
+            found |= {name: f"{found.get(name, '')} {line.strip()}".strip() for name in names}
+    return found
+
+
+def _made_signals(function: Any) -> str:
+    """Return the signals of what a function makes of its defaults, if it makes anything of them."""
+    from nlctl.errors import UsageError
+
+    try:
+        made = function()
+        return f"({', '.join(made.input_labels)}) -> ({', '.join(made.output_labels)})"
+    except (UsageError, TypeError, AttributeError):
+        return ""
 
 
 def _show_kind(name: str, kind: Kind) -> None:
@@ -101,14 +171,16 @@ def _show_kind(name: str, kind: Kind) -> None:
     for key, field in kind.schema.model_fields.items():
         if key != "kind":
             default = "needed" if field.is_required() else repr(field.default)
-            table.add_row(key, default, field.description or "")
+            table.add_row(key, Text(default), Text(field.description or ""))
     told = f"{_plain(kind.answers)}; claim: {_plain(kind.claims)}" if kind.claims else kind.answers
     _show_table(name, told or kind.title, table)
 
 
-def _show_table(name: str, told: str, table: Table) -> None:
-    console = Console()
+def _show_table(name: str, told: str, table: Table, signals: str = "") -> None:
+    console = _console()
     console.print(Text.assemble((name, "bold"), f"  {told}"))
+    if signals:
+        console.print(Text(f"  {signals}"))
     if table.row_count:
         console.print(table)
 
@@ -117,5 +189,5 @@ def _plain(markdown: str) -> str:
     return markdown.replace("`", "")
 
 
-def _summary(record: type) -> str:
-    return (record.__doc__ or "").strip().splitlines()[0]
+def _summary(made: Any) -> str:
+    return (made.__doc__ or "").strip().splitlines()[0]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line
-from .report import register_reports
+from .printing import error_line, say
+from .report import Input, Set, register_reports
 from .studies import FAILS, OPEN, register_studies
 from .tune import register_tuning
 
@@ -22,14 +23,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="NAME=VALUE",
-        help='A parameter ("actuator.b_r=0.6") or an initial state ("plant.x1(0)=0.8").',
-    ),
-]
 LoopArgument = Annotated[
     str,
     typer.Argument(
@@ -61,10 +54,7 @@ def version(
 def simulate(
     loop: LoopArgument,
     set_: Set = None,
-    input_: Annotated[
-        list[str] | None,
-        typer.Option("--input", metavar="NAME=VALUE", help="A constant input; 0 by default."),
-    ] = None,
+    input_: Input = None,
     engine: Annotated[
         str,
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
@@ -74,39 +64,29 @@ def simulate(
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
-    """Simulate a loop, with parameters, initial states and inputs changed at will."""
-    from nlctl.response import input_output_response
+    """Simulate a loop, with parameters, initial states and inputs changed at will.
 
-    from .loops import assignments, input_values, named_loop, sampled_times
-    from .terminal import check_figure, check_file, progress_bar, show_metrics, write_figure
+    A table of its signals is printed: peaks, root mean squares, and last values.
+    """
+    from .simulation import simulated
+    from .terminal import check_figure, check_file, show_metrics, write_figure
 
-    times = sampled_times(until, step)
     if plot is not None:
         check_figure(plot)
     if csv is not None:
         check_file(csv)
-    diagram = named_loop(loop)
-    params, initial = assignments(diagram, set_ or [])
-    inputs = input_values(diagram, input_ or [])[:, None] + 0 * times
-    with progress_bar(f"simulating {loop}", until) as advance:
-        reached = [0.0]
-
-        def progress(t: float) -> None:
-            advance(t - reached[0])
-            reached[0] = t
-
-        response = input_output_response(
-            diagram, times, inputs, initial, params=params, engine=engine, progress=progress
-        )
-    signals = {name: response.y[i] for name, i in diagram.output_index.items()}
+    response = simulated(loop, set_ or [], input_ or [], until, step, engine).response
+    times = response.time
+    signals = dict(zip(response.output_labels, response.y, strict=True))
     show_metrics(times, signals)
     if csv is not None:
         _write_csv(csv, times, signals)
         print(csv)
     if plot is not None:
-        from ..paper.figures import overview
+        from nlctl.plotting.signals import rows_figure
 
-        write_figure(plot, overview(times, signals))
+        figure, _ = rows_figure(times, *response.rows())
+        write_figure(plot, figure)
         print(plot)
 
 
@@ -190,6 +170,23 @@ def check(
             print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member, engine, k)}")
     if found.answer in UNPROVED:
         raise typer.Exit(UNPROVED[found.answer])
+
+
+@app.command()
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="NAME", help="Name of a new folder.")],
+) -> None:
+    """Write a loop, a study of it and a test into a new folder; they run as they are."""
+    from .starting import start_project
+
+    made = start_project(folder)
+    for path in made:
+        say(path)
+    loop, study, test = (shlex.quote(path.as_posix()) for path in made)
+    say(f"nlctl simulate {loop}:make --plot {shlex.quote(folder.as_posix())}/run.svg")
+    say(f"nlctl report {loop}:make    # its page")
+    say(f"nlctl report {study}    # the study, and its page")
+    say(f"pytest {test}")
 
 
 @app.command("list")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +14,9 @@ import typer
 
 from nlctl.wording import counted
 
+from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
+from .own_page import HORIZON_OF_PAGE, STEP_OF_PAGE, compose_page, is_loop_name, page_folder
 from .printing import error_line, in_json, say
 from .studies import (
     EXIT_CODES,
@@ -33,6 +35,20 @@ if TYPE_CHECKING:
 
     from nlctl.errors import UsageError
 
+    from ..report.document import Claim
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help='A parameter ("actuator.b_r=0.6") or an initial state ("plant.x1(0)=0.8") of a loop.',
+    ),
+]
+Input = Annotated[
+    list[str] | None,
+    typer.Option("--input", metavar="NAME=VALUE", help="A constant input of a loop; 0 by default."),
+]
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
 Force = Annotated[
     bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
@@ -47,25 +63,33 @@ def register_reports(app: typer.Typer) -> None:
 
 
 def report(
-    study: Annotated[
+    what: Annotated[
         Path | None,
         typer.Argument(
-            metavar="STUDY",
-            help="A study file (.toml), which is run or taken up, or the folder of a run. "
+            metavar="WHAT",
+            help="A study file (.toml), which is run or taken up, the folder of a run, or a loop: "
+            "path/to/file.py:function or package.module:function. "
             "Without it, the paper: both examples, the proof, and a quick study of each.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the report; reports/paper, or that of the run."),
+        typer.Option(help="Folder of the report; reports/paper, reports/FILE, or that of the run."),
     ] = None,
     jobs: Annotated[int, typer.Option(min=0, help="Threads; 0: one per core.")] = 0,
     far: Annotated[
         bool,
         typer.Option("--far", help="Run Example 2 to its burst instead of showing the record."),
     ] = False,
+    set_: Set = None,
+    input_: Input = None,
+    until: Annotated[float | None, typer.Option(help="Horizon of a loop in s; 20.")] = None,
+    step: Annotated[
+        float | None, typer.Option(help="Sampling interval of a loop, s; 0.01.")
+    ] = None,
     open_: Open = False,
     pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    junit: Junit = None,
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
@@ -76,31 +100,65 @@ def report(
 
     Rows of a study are drawn from its loop: the code that the study names is run.
     """
+    options: dict[str, Any] = {"pdf": pdf, "interactive": interactive, "force": force}
     with exit_codes(json=False):
-        made, page, code = (
-            _paper(
-                out or Path("reports/paper"),
-                jobs,
-                far=far,
-                pdf=pdf,
-                interactive=interactive,
-                force=force,
-            )
-            if study is None
-            else _study(
-                study, out, jobs, pdf=pdf, interactive=interactive, force=force, trust=trust
-            )
+        is_loop = what is not None and is_loop_name(str(what))
+        _check_loop_options(is_loop, set_, input_, until, step)
+        check_junit(junit)
+        if what is None:
+            made = _paper(out or Path("reports/paper"), jobs, far=far, **options)
+        elif is_loop:
+            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
+            made = _loop(str(what), run, out, **options)
+        else:
+            made = _study(what, out, jobs, trust=trust, **options)
+        from ..report.typography import plain_text
+
+        say(plain_text(made.told))
+        finish_report(made.page, pdf=pdf, open_=open_)
+        write_claims(junit, made.title, made.claims)
+        if made.code:
+            raise typer.Exit(made.code)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """A page that was written: its verdict, its claims, and the exit code of the command."""
+
+    told: str
+    title: str
+    claims: Sequence[Claim]
+    page: Path
+    code: int
+
+
+def _check_loop_options(is_loop: bool, *options: object) -> None:
+    """Refuse what is set of a loop where there is none."""
+    from nlctl.errors import UsageError
+
+    if not is_loop and any(option is not None for option in options):
+        raise UsageError(
+            "--set, --input, --until and --step are of a loop, path/to/file.py:function; a study "
+            "has them in its file"
         )
-        say(made)
-        finish_report(page, pdf=pdf, open_=open_)
-        if code:
-            raise typer.Exit(code)
 
 
-def _paper(
-    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool
-) -> tuple[str, Path, int]:
-    """Reproduce the paper; return the verdict, the page and the exit code."""
+def _loop(
+    name: str, run: Any, out: Path | None, *, pdf: bool, interactive: bool, force: bool
+) -> Made:
+    """Report a loop of the user's."""
+    folder = out or page_folder(name)
+    check_report_options(folder, pdf=pdf, force=force)
+    from ..report.render import write_report
+
+    made = compose_page(name, *run)
+    page = write_report(made, folder, interactive=interactive, force=force)
+    code = int(not all(claim.holds for claim in made.claims))
+    return Made(told=made.verdict, title=made.title, claims=made.claims, page=page, code=code)
+
+
+def _paper(out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool) -> Made:
+    """Reproduce the paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead)  # first of all: imports there and here take seconds
         check_report_options(out, pdf=pdf, force=force)
@@ -118,7 +176,10 @@ def _paper(
         page = write_report(
             report, out, interactive=interactive, force=force, pool=beside, drawn=made.drawn
         )
-    return report.verdict, page, int(not made.passed)
+    return Made(
+        told=report.verdict, title=report.title, claims=report.claims, page=page,
+        code=int(not made.passed),
+    )  # fmt: skip
 
 
 def _import_ahead() -> None:
@@ -150,8 +211,9 @@ def _study(
     interactive: bool,
     force: bool,
     trust: bool,
-) -> tuple[str, Path, int]:
-    """Report a study; return the verdict, the page and the exit code."""
+) -> Made:
+    """Report a study."""
+    from ..studies.page.claims import claims
     from .study_report import report_study
     from .sweep_progress import sweep_bar
 
@@ -171,11 +233,13 @@ def _study(
         force=force,
         trust=trust,
     )
-    if result.complete:
-        return result.verdict, page, EXIT_CODES.get(result.answer, 0)
-    if study.suffix == ".toml":
-        error_line("nlctl: incomplete; the same command resumes")
-    return result.verdict, page, INTERRUPTED if result.interrupted else INCOMPLETE
+    code = EXIT_CODES.get(result.answer, 0)
+    if not result.complete:
+        code = INTERRUPTED if result.interrupted else INCOMPLETE
+        if study.suffix == ".toml":
+            error_line("nlctl: incomplete; the same command resumes")
+    title = result.study.study.title
+    return Made(told=result.verdict, title=title, claims=claims(result), page=page, code=code)
 
 
 def compare_command(

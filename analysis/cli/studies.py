@@ -20,6 +20,7 @@ import typer
 
 from nlctl.wording import counted
 
+from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
 from .printing import error_line, in_json, say
 
@@ -72,6 +73,7 @@ def run_command(
         Path | None, typer.Option(help="Folder for the results; reports/NAME by default.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Use a folder with other files.")] = False,
+    junit: Junit = None,
     trust: Trust = False,
     json: Json = False,
 ) -> None:
@@ -87,6 +89,7 @@ def run_command(
     options += [] if out is None else ["--out", str(out)]
     options += [] if executor == "threads" else ["--executor", executor]
     options += ["--jobs", str(jobs)] if jobs else []
+    options += [] if junit is None else ["--junit", str(junit)]
     options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
     with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
@@ -97,6 +100,7 @@ def run_command(
 
         check_memory()
         check_study_path(study)
+        check_junit(junit)
         file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
         with _executor(executor, jobs) as pool:
             result = run_study(
@@ -109,6 +113,7 @@ def run_command(
                 watch=sweep_bar,
             )
         _show(result, json)
+        _write_study_claims(junit, result)
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
         if result.answer in EXIT_CODES:
@@ -393,6 +398,14 @@ def _show(result: Any, json: bool) -> None:
         if finding.claim:
             say(f"  Claim: {finding.claim}: {finding.told}.")
     say(f"\n{result.folder}")
+
+
+def _write_study_claims(path: Path | None, result: Any) -> None:
+    """Write the claims of a study where that is wanted."""
+    if path is not None:
+        from ..studies.page.claims import claims
+
+        write_claims(path, result.study.study.title, claims(result))
 
 
 def _duration(seconds: float) -> str:

@@ -12,6 +12,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from nlctl.wording import counted
 
+from .progress_lines import progress_lines
+
 if TYPE_CHECKING:
     from ..robustness.runs.progress import Progress as SweepProgress
 
@@ -22,12 +24,17 @@ PERIOD = 0.25  # s between updates: drawing a bar takes as long as a run
 def sweep_bar(
     what: str, console: Console | None = None, confidence: float = 0.99
 ) -> Iterator[Callable[[SweepProgress], None]]:
-    """Show a bar on stderr while the body runs, if that is a terminal.
+    """Show a bar on stderr while the body runs; elsewhere a line now and then.
 
-    Behind the bar stand the rows, the rate, the remaining time, the violations so far and, for
+    With the bar stand the rows, the rate, the remaining time, the violations so far and, for
     independent draws, bounds of their probability that may be looked at any time.
     """
     console = console or Console(stderr=True)
+    if not console.is_terminal:
+        now: list[SweepProgress] = []
+        with progress_lines(what, lambda: _line(now[-1], confidence) if now else "begun"):
+            yield lambda progress: now.__setitem__(slice(None), [progress])
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))
     with Progress(
         *columns,
@@ -35,7 +42,6 @@ def sweep_bar(
         TextColumn("{task.fields[found]}"),
         console=console,
         refresh_per_second=1 / PERIOD,
-        disable=not console.is_terminal,
     ) as bar:
         task = bar.add_task(what, total=None, rows="", found="")
         shown = float("-inf")
@@ -49,11 +55,20 @@ def sweep_bar(
                 task,
                 total=progress.total,
                 completed=progress.done,
-                rows=f"{progress.done}/{counted(progress.total, 'row')}, {progress.rate:.3g}/s",
+                rows=rows_text(progress),
                 found=found_text(progress, confidence),
             )
 
         yield show
+
+
+def _line(progress: SweepProgress, confidence: float) -> str:
+    return f"{rows_text(progress)}, {found_text(progress, confidence)}"
+
+
+def rows_text(progress: SweepProgress) -> str:
+    """Return how many rows are done, and how fast."""
+    return f"{progress.done}/{counted(progress.total, 'row')}, {progress.rate:.3g}/s"
 
 
 def found_text(progress: SweepProgress, confidence: float = 0.99) -> str:

@@ -19,6 +19,8 @@ from nlctl.errors import ParameterError
 from nlctl.host.checkout import SOURCES
 from nlctl.host.files import replace_file
 
+from .progress_lines import progress_lines
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -27,12 +29,19 @@ FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
 @contextmanager
 def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Show a bar on stderr while the body runs, if that is a terminal."""
+    """Show a bar on stderr while the body runs; elsewhere a line now and then."""
     console = Console(stderr=True)
+    if not console.is_terminal:
+        done = [0.0]
+
+        def add(amount: float) -> None:
+            done[0] += amount
+
+        with progress_lines(what, lambda: f"{100 * done[0] / total:.0f} %"):
+            yield add
+        return
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(
-        *columns, TimeRemainingColumn(), console=console, disable=not console.is_terminal
-    ) as bar:
+    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
         task = bar.add_task(what, total=total)
         yield lambda amount: bar.advance(task, amount)
 

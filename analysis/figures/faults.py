@@ -7,9 +7,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.annotations import as_annotated
+from nlctl.plotting.axes import BLUE, GREY, ORANGE, WIDTH
 
 from ..robustness.stl.spec import violates
-from .axes import BLUE, GREY, ORANGE, WIDTH
 from .labels import number_axes, plain
 from .searches import COLOURS, MAP_INK, centred
 

@@ -10,10 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
 from nlctl.annotations import as_annotated
-
-from ..lyapunov.loop.signals import Margin
-from ..lyapunov.nussbaum.long_run import LongRun
-from .axes import (
+from nlctl.plotting.axes import (
     BLUE,
     GREEN,
     GREY,
@@ -26,6 +23,9 @@ from .axes import (
     set_style,
     stacked_axes,
 )
+
+from ..lyapunov.loop.signals import Margin
+from ..lyapunov.nussbaum.long_run import LongRun
 
 __all__ = [
     "bounds",

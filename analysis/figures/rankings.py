@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from nlctl.annotations import as_annotated
+from nlctl.plotting.axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 
-from .axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 from .labels import arms, number_axes
 
 __all__ = ["paired_differences", "screening", "set_apart", "shares", "tornado"]

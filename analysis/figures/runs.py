@@ -6,34 +6,30 @@ end, are drawn as violations.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from nlctl.annotations import as_annotated
-
-from ..robustness.stl.spec import violates
-from .axes import (
+from nlctl.plotting.axes import (
     BLUE,
     GREY,
     ORANGE,
-    PURPLE,
     SHORT_LINE,
-    STYLES,
-    TIME,
     WIDTH,
     legend_above,
     set_style,
     stacked_axes,
 )
-from .labels import arms, plain
+from nlctl.plotting.bands import LIMIT, Limit, bands, most_frequent, quantile
+
+from ..robustness.stl.spec import violates
+from .labels import arms
 
 __all__ = [
     "CLIP",
@@ -49,11 +45,7 @@ __all__ = [
 
 CLIP = 2.0
 """Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""
-BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
-LIMIT = "limit of the spec"
-Limit = tuple[float, float, float]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
-STRETCHES = 240  # of time, in which the ends of a band are drawn as lines
 
 
 def clipped_margins(values: object) -> np.ndarray:
@@ -187,127 +179,6 @@ def fans(
     Figure
         Of matplotlib; nothing is written or shown.
     """
-    figure, axes = stacked_axes(rows=len(signals), height=1.9 if len(signals) > 1 else 2.6)
-    nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
-    for ax, (name, samples) in zip(axes, signals.items(), strict=True):
-        own = tuple(limits.get(name, ()))
-        lines = np.array([nominal[name], worst[name]])
-        low, high = _range(np.concatenate([samples, lines]), [value for value, *_ in own])
-        if groups:
-            _kinds(ax, time, samples, groups, (low, high), nodes)
-        else:
-            for start, end, opacity in BANDS:
-                band = np.clip(_band(samples, start, end, nodes), low, high)
-                inside = f"{100 * (end - start):.0f} % of the runs"
-                ax.fill_between(
-                    time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
-                )
-        ax.plot(time, np.clip(worst[name], low, high), "--", color=PURPLE, label="worst run")
-        ax.plot(time, np.clip(nominal[name], low, high), color=GREY, label="nominal")
-        for value, start, end in own:
-            ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)
-        unit = units.get(name, "")
-        ax.set_ylabel(plain(name) + (f" ({plain(unit)})" if unit else ""), parse_math=False)
-    _one_legend(axes)
-    axes[-1].set_xlabel(TIME)
+    lines = {"worst run": worst, "nominal": nominal}
+    figure, _ = bands(time, signals, lines, limits=limits, units=units, groups=groups)
     return figure
-
-
-def _kinds(
-    ax: Axes,
-    time: np.ndarray,
-    samples: np.ndarray,
-    groups: Sequence[str],
-    ends: tuple[float, float],
-    nodes: np.ndarray,
-) -> None:
-    """Draw a band and a median for each of the kinds that there are most runs of."""
-    kinds = np.asarray(groups, dtype=object)
-    for name, (colour, style) in zip(most_frequent(groups), STYLES, strict=False):
-        own = samples[kinds == name]
-        band = np.clip(_band(own, 0.05, 0.95, nodes), *ends)
-        ax.fill_between(time[nodes], *band, color=colour, alpha=0.25, linewidth=0)
-        middle = np.clip(quantile(own, 0.5, np.inf)[nodes], *ends)
-        ax.plot(time[nodes], middle, style, color=colour, linewidth=1.3, label=plain(name))
-
-
-@as_annotated
-def most_frequent(groups: Sequence[str]) -> list[str]:
-    """Return the kinds of runs that `fans` shows: at most as many as there are line styles.
-
-    Parameters
-    ----------
-    groups : sequence of str
-        The kind of each run.
-
-    Returns
-    -------
-    list of str
-        The most frequent first.
-    """
-    return [name for name, _ in Counter(groups).most_common(len(STYLES))]
-
-
-def _band(samples: np.ndarray, start: float, end: float, nodes: np.ndarray) -> np.ndarray:
-    """Return both ends of a band of quantiles at the nodes; nothing between them is outside."""
-    lower = -upper_envelope(-quantile(samples, start, -np.inf), nodes)
-    return np.array([lower, upper_envelope(quantile(samples, end, np.inf), nodes)])
-
-
-def _one_legend(axes: Sequence[Axes]) -> None:
-    """Put one legend above the first axes, with everything that any of them shows once."""
-    shown = {}
-    for ax in axes:
-        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            shown.setdefault(label, handle)
-    legend_above(axes[0], shown)
-
-
-@as_annotated
-def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
-    """Return a quantile over the runs (axis 0), one of their values; NaN counts as `missing`.
-
-    It is the next value outwards: upwards if `missing` is positive, otherwise downwards.
-
-    Parameters
-    ----------
-    samples : ndarray of shape (runs, ...)
-        One row for each run.
-    part : float
-        Of the runs, between 0 and 1.
-    missing : float
-        What NaN counts as; its sign says which way is outwards.
-
-    Returns
-    -------
-    ndarray of shape (...)
-        In the unit of the samples.
-    """
-    ordered = np.sort(np.where(np.isnan(samples), missing, samples), axis=0)
-    place = part * (len(ordered) - 1)
-    return ordered[int(np.ceil(place) if missing > 0 else np.floor(place))]
-
-
-def upper_envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return values at some samples so that the lines between them lie nowhere below `y`.
-
-    Shapes: `y` (m,), `nodes` (k,).
-    """
-    most = np.maximum.reduceat(y, nodes[:-1])
-    most[-1] = max(most[-1], y[-1])
-    return np.maximum(np.append(most[0], most), np.append(most, most[-1]))
-
-
-def _range(samples: np.ndarray, limits: Sequence[float]) -> tuple[float, float]:
-    """Return the range that is drawn: of all samples, unless few of them lie far outside.
-
-    Limits are in it, unless they lie so far away that the samples would be a line.
-    """
-    finite = samples[np.isfinite(samples)]
-    if not finite.size:
-        return -1.0, 1.0
-    inner = np.quantile(finite, (0.005, 0.995))
-    spread = float(inner[1] - inner[0]) or 1.0
-    low, high = max(finite.min(), inner[0] - spread), min(finite.max(), inner[1] + spread)
-    near = [x for x in limits if inner[0] - 2 * spread <= x <= inner[1] + 2 * spread]
-    return float(min([low, *near])), float(max([high, *near]))

@@ -13,9 +13,19 @@ from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from nlctl.annotations import as_annotated
+from nlctl.plotting.axes import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SHORT_LINE,
+    WIDTH,
+    legend_above,
+    stacked_axes,
+)
 
 from ..robustness.stl.spec import violates
-from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, SHORT_LINE, WIDTH, legend_above, stacked_axes
 from .labels import arms, number_axes, plain
 from .runs import clipped_margins
 

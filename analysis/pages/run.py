@@ -10,13 +10,14 @@ import numpy as np
 
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
+from nlctl.plotting.signals import rows_figure
+from nlctl.responses.time_response import as_response
 
-from ..figures.axes import BLUE, stacked_axes
 from ..report.document import Figure, History, Item, Paragraph, Section, Table
 
 __all__ = ["outputs_of_run", "own_values", "run_section"]
 
-_SHOWN = 6  # signals that are drawn by default
+_SHOWN = 6  # signals of a chart at first
 
 
 def run_section(
@@ -27,13 +28,9 @@ def run_section(
     for name in signals:
         if name not in curves:
             raise unknown("output", name, curves, f"of '{loop.name}'")
-    shown = {name: curves[name] for name in [*signals] or [*curves][:_SHOWN]}
     t = np.asarray(response.time, dtype=float)
-    figure, axes = stacked_axes(rows=len(shown), height=1.5 if len(shown) > 1 else 2.4)
-    for ax, (name, samples) in zip(axes, shown.items(), strict=True):
-        ax.plot(t, samples, color=BLUE, linewidth=1.3)
-        ax.set_ylabel(name, parse_math=False)
-    axes[-1].set_xlabel("time t (s)")
+    shown, rows = as_response(response, loop).rows([*signals] or None)
+    figure, _ = rows_figure(t, shown, rows)
     caption = f"{', '.join(shown)} over {t[-1]:g} s."
     ranges = [
         (n, *(float(f(y)) for f in (np.min, np.max)), float(y[-1])) for n, y in curves.items()
@@ -41,7 +38,7 @@ def run_section(
     told = "; ".join(f"{n} between {low:.4g} and {high:.4g}" for n, low, high, _ in ranges)
     history = History(
         key="run-history", caption=caption, description=told, time=t, signals=curves,
-        shown=tuple(shown),
+        shown=tuple(name for name in shown if name in curves)[:_SHOWN],
     )  # fmt: skip
     items: list[Item] = [
         *own_values("This run", params),

@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.functions import nussbaum
-
-from ..figures.axes import (
+from nlctl.plotting.axes import (
     BLUE,
     GREY,
     STYLES,
@@ -22,6 +21,7 @@ from ..figures.axes import (
     set_style,
     stacked_axes,
 )
+
 from . import TAIL, CaseRun
 from .burst import Burst
 
@@ -34,7 +34,6 @@ __all__ = [
     "control_input",
     "error_comparison",
     "nussbaum_gain",
-    "overview",
     "sampling_errors",
     "tracking",
     "tracking_error",
@@ -154,18 +153,6 @@ def error_comparison(runs: Sequence[CaseRun], labels: Sequence[str]) -> Figure:
     """Tracking errors of up to four runs above each other."""
     curves = dict(zip(labels, (run.signals["e"] for run in runs), strict=True))
     return _one(runs[0].time, curves, "tracking error $e_1$")
-
-
-def overview(time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Figure:
-    """Tracking, input and Nussbaum argument of one run above each other."""
-    figure, (top, middle, bottom) = stacked_axes(rows=3, height=2.0)
-    draw_lines(top, time, {"$y$": signals["y"], "$y_d$": signals["yd"], "$e_1$": signals["e"]})
-    draw_lines(middle, time, {"$u$": signals["u"], "$v$": signals["v"]})
-    draw_lines(bottom, time, {"$\\zeta$": signals["zeta"], "$\\hat\\delta$": signals["delta_hat"]})
-    top.set(ylabel="output, error")
-    middle.set(ylabel="input")
-    bottom.set(xlabel=TIME, ylabel="$\\zeta$, $\\hat\\delta$")
-    return figure
 
 
 def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float) -> Figure:

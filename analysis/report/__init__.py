@@ -4,6 +4,7 @@ from .browser import write_pdf
 from .compare import compare_contents
 from .document import Claim, Equation, Figure, History, Paragraph, Report, Section, Table
 from .gallery import write_gallery
+from .junit import junit
 from .render import file_hashes, framed, render_html, render_json, write_report
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "compare_contents",
     "file_hashes",
     "framed",
+    "junit",
     "render_html",
     "render_json",
     "write_gallery",

@@ -17,8 +17,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl.drawing import picture
+from nlctl.plotting import axes
 
-from ..figures import axes
 from .document import Figure, Section
 from .typography import plain_text
 

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
+from nlctl.plotting.axes import BLUE, ORANGE, TIME, stacked_axes
 from nlctl.wording import counted
 
-from ..figures.axes import BLUE, ORANGE, TIME, stacked_axes
 from ..robustness import Experiment, Prepared, evaluate, prepare
 from ..robustness.runs.experiment import by_diagram, simulate_rows
 from ..robustness.stl.formula import Band, parts_of

@@ -4,7 +4,8 @@ Make a report of one's own
 
 ``loop_report`` composes a page from what you have of a loop: a response, a ledger, a study, your own sections.
 It is the template of all reports of nlctl: one file, no network, and whatever you write is text, never markup.
-Here it is about an inverted pendulum of python-control's kind, held upright by state feedback.
+``nlctl report my/loop.py:make`` makes such a page at once; this one has more to say.
+It is about an inverted pendulum of python-control's kind, held upright by state feedback.
 """
 
 import tempfile

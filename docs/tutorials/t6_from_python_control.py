@@ -39,6 +39,38 @@ print(type(exact).__name__, exact.nstates, "states")
 assert isinstance(exact, ct.StateSpace)
 
 # %%
+# ``nlctl.interconnect`` takes python-control's ``connections``, ``inplist``, ``outlist`` and ``params`` too, and refuses
+# what these leave open. Or give the signals of a block other names:
+left = nlctl.block(nlctl.Lag(T=0.1), "left", outputs="p")
+right = nlctl.block(nlctl.Lag(T=0.2), "right", inputs="p")
+by_name = nlctl.interconnect([left, right], inputs=["u"], outputs=["v"])
+by_lists = nlctl.interconnect(
+    {"left": nlctl.Lag(T=0.1), "right": nlctl.Lag()},
+    connections=[["right.u", "left.v"]],
+    inplist="left.u",
+    outlist="right.v",
+    params={"right.T": 0.2},
+)
+steps = [nlctl.input_output_response(each, t, 1.0).outputs for each in (by_name, by_lists)]
+assert np.array_equal(*steps)
+
+# %%
+# Ensembles take ``T``, ``U`` and ``X0``. ``hold="zoh"`` keeps inputs constant from one time to the next, as
+# ``ct.sample_system(..., "zoh")`` has it:
+u = np.sin(3 * t[::25])
+sampled = ct.sample_system(ct.ss(ct.tf(1, [1, 1, 0])), 0.5, "zoh")
+held = nlctl.ensemble_response(ct.ss(ct.tf(1, [1, 1, 0])), T=t[::25], U=u, X0=[[0, 0], [1, 0]],
+                               keep=["y[0]"], hold="zoh")  # fmt: skip
+assert np.allclose(held.signals["y[0]"][0], ct.forced_response(sampled, t[::25], u).outputs)
+
+# %%
+# ``ct.describing_function`` takes every block, and states of a response go by their qualified names:
+relay = nlctl.block(nlctl.Relay(on=0.5, off=-0.5), "relay")
+print(ct.describing_function(relay, [1.0, 2.0]).round(4))
+run = nlctl.input_output_response(example, t)
+assert np.array_equal(run.states["plant.x1"], run.states["plant_x1"])
+
+# %%
 # What is different:
 #
 # * parameters are qualified, ``"actuator.b_r"``: two blocks never share one by accident;

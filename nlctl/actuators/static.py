@@ -35,8 +35,8 @@ class DeadZone:
     ripple_r: float = param(0.3, unit="1", meaning="ripple of the right slope, sin u")
     slope_l: float = param(0.8, unit="1", meaning="mean slope on the left", above=0)
     ripple_l: float = param(0.2, unit="1", meaning="ripple of the left slope, cos u")
-    b_r: float = param(0.5, unit="1", meaning="right break point", above=0)
-    b_l: float = param(-0.3, unit="1", meaning="left break point", below=0)
+    b_r: float = param(0.5, unit="1", meaning="right break point", at_least=0)
+    b_l: float = param(-0.3, unit="1", meaning="left break point", at_most=0)
 
     inputs = ("u",)
     outputs = ("v",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -13,6 +13,8 @@ from ..blocks import Block, block, within
 from ..errors import DiagramError
 from ..names import Parameters, unknown
 from ..upstream.control_internals import StandIn, is_system
+from .listed import connected_by_lists
+from .parameters import overridden
 from .places import leaves
 from .third_party import with_own_values
 
@@ -53,6 +55,10 @@ def _check_not_compiled(thing: Any, name: str) -> None:
 @as_annotated
 def interconnect(
     blocks: Mapping[str, Any] | Sequence[ct.InputOutputSystem],
+    connections: Sequence[Any] | None = None,
+    inplist: Any = None,
+    outlist: Any = None,
+    params: Mapping[str, Any] | None = None,
     *,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] | None = None,
@@ -60,21 +66,31 @@ def interconnect(
 ) -> ct.InterconnectedSystem:
     """Connect blocks by the names of their signals: `control.interconnect` that refuses mistakes.
 
-    An input is fed by the output of the same name.  The result is an ordinary
-    `control.InterconnectedSystem`; what is added are checks (a misspelt signal is an error, not
-    a warning), parameters of third-party blocks that go by their block's name as those of nlctl's
-    do (python-control has one value for all blocks whose parameters have one name), and, when the
-    diagram is nested in another one, its name in front of the names of its parameters.
+    An input is fed by the output of the same name, or, with `connections`, by what these say, as in
+    python-control.  The result is an ordinary `control.InterconnectedSystem`; what is added are
+    checks (a misspelt signal is an error, not a warning), parameters of third-party blocks that go
+    by their block's name as those of nlctl's do (python-control has one value for all blocks whose
+    parameters have one name), and, when the diagram is nested in another one, its name in front of
+    the names of its parameters.
 
     Parameters
     ----------
     blocks : mapping or sequence
         ``{"plant": record or python-control system, ...}``, or a list of systems.  List them in
         the order of the signal flow: python-control then needs the fewest passes.
+    connections : sequence of list, optional
+        python-control's ``[["plant.u", "law.u"], ["law.e", "r.y", "-plant.y"]]``: an input, then
+        what is added to feed it.  Nothing else is connected then.
+    inplist, outlist : sequence, optional
+        python-control's: which inputs of blocks an input of the diagram feeds, and which signals
+        its outputs are.  By default they are those that `inputs` and `outputs` name.
+    params : mapping, optional
+        Values that parameters have in this diagram, ``{"actuator.b_r": 0.6}``.
     inputs : sequence of str, optional
         Signals that come from outside.
     outputs : sequence of str, optional
-        Outputs of the diagram; by default every output of every block.
+        Outputs of the diagram; by default every output of every block, ``"block_signal"`` where
+        two have one name.
     name : str, optional
         Name of the diagram.
 
@@ -90,7 +106,11 @@ def interconnect(
         twice, if one block stands in the diagram twice, if timebases differ, or if a controller is
         for plants of a lower order than the one that it is connected to.
     UnknownNameError
-        If `outputs` names a signal that is the output of no block, or `inputs` one that none takes.
+        If `outputs` names a signal that is the output of no block, `inputs` one that none takes,
+        `connections`, `inplist` or `outlist` a block or a signal that does not exist, or `params`
+        a parameter that nothing reads.
+    ParameterError
+        If a value of `params` is refused.
 
     Examples
     --------
@@ -98,6 +118,15 @@ def interconnect(
     >>> loop = nlctl.interconnect({"limit": nlctl.Saturation(limit=2)}, inputs=["u"], outputs=["v"])
     >>> print(loop.output(0, [], [3.0]))
     [2.]
+
+    One kind twice, connected as in python-control:
+
+    >>> two = nlctl.interconnect(
+    ...     {"a": nlctl.Gain(k=2), "b": nlctl.Gain(k=3)},
+    ...     connections=[["b.u", "-a.v"]], inplist="a.u", outlist="b.v", params={"a.k": 5},
+    ... )
+    >>> print(two.output(0, [], [1.0]))
+    [-15.]
     """
     if not isinstance(blocks, Mapping | Sequence) or isinstance(blocks, str) or not len(blocks):
         raise DiagramError(
@@ -112,25 +141,49 @@ def interconnect(
     outputs = [outputs] if isinstance(outputs, str) else outputs
     _check_blocks(systems)
     _check_timebases(systems)
+    by_name = connections is inplist is outlist is None
+    make = (
+        _by_name(systems, inputs)
+        if by_name
+        else connected_by_lists(systems, connections, inplist, outlist)
+    )
+    systems = [with_own_values(system) for system in systems]
+    diagram = make(systems, inputs, outputs, name)
+    if isinstance(diagram.params, Parameters):
+        diagram.params.scope = diagram
+    return _with_values(diagram, params)
+
+
+def _by_name(systems: Sequence[Any], inputs: Sequence[str]) -> Callable[..., Any]:
+    """Check signals that are connected by their names; return what connects them."""
     sources = _signal_sources(systems)
     _check_inputs(systems, sources, inputs)
     _check_orders(systems, sources)
-    systems = [with_own_values(system) for system in systems]
-    outputs = list(sources) if outputs is None else list(outputs)
-    for signal in outputs:
-        if signal not in sources:
-            raise unknown("output signal", signal, sources)
-    diagram = ct.interconnect(
-        systems,
-        inputs=inputs,
-        inplist=[[f"{s.name}.{i}" for s in systems if i in s.input_labels] for i in inputs],
-        outputs=outputs,
-        outlist=[f"{sources[signal]}.{signal}" for signal in outputs],
-        name=name,
-        check_unused=False,  # our own checks above raise where python-control warns
-    )
-    if isinstance(diagram.params, Parameters):
-        diagram.params.scope = diagram
+
+    def connected(systems: Any, inputs: Any, outputs: Any, name: str | None) -> Any:
+        outputs = list(sources) if outputs is None else list(outputs)
+        for signal in outputs:
+            if signal not in sources:
+                raise unknown("output signal", signal, sources)
+        return ct.interconnect(
+            systems,
+            inputs=inputs,
+            inplist=[[f"{s.name}.{i}" for s in systems if i in s.input_labels] for i in inputs],
+            outputs=outputs,
+            outlist=[f"{sources[signal]}.{signal}" for signal in outputs],
+            name=name,
+            check_unused=False,  # our own checks above raise where python-control warns
+        )
+
+    return connected
+
+
+def _with_values(diagram: Any, params: Mapping[str, Any] | None) -> Any:
+    """Let a diagram's parameters have values of its own."""
+    if params:
+        overridden(diagram, params)  # refuses names and values
+        for name, value in params.items():
+            diagram.params[name] = value
     return diagram
 
 

@@ -17,7 +17,8 @@ from .ahead import compile_ahead
 from .audit import AuditError
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
-from .ensemble import Ensemble, ensemble_response
+from .ensemble import ensemble_response
+from .ensemble_result import Ensemble
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status

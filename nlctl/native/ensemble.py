@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
+from ..arguments import ATOL, RTOL, one_of
 from ..arguments import number as checked_number
 from ..delays.variation import Variation
 from ..errors import ParameterError
-from ..host.notebook import table_html
 from ..names import unknown
 from ..params import checked_times, integer
-from ..responses.arguments import checked_params, input_array
-from ..wording import counted
+from ..responses.arguments import HOLDS, checked_params, held, input_array, with_aliases
 from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
+from .ensemble_result import Ensemble, MetricLike
 from .histories import variations
 from .integrate.driver import begin, finish, prepared, trajectory, watched
 from .integrate.methods.tableau import Tableau
@@ -41,86 +43,26 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class MetricLike(Protocol):
-    """What an ensemble asks of a metric; see `nlctl.analysis.metrics.Metric`."""
-
-    @property
-    def key(self) -> str: ...
-
-    @property
-    def start(self) -> float: ...
-
-    @property
-    def end(self) -> float: ...
-
-    @property
-    def signals(self) -> Sequence[str]: ...
-
-    @property
-    def function(self) -> Callable[..., float]: ...  # (t, samples of the first signal, ...)
-
-
-ROWS = 8
-"""Rows of its table that an ensemble prints."""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Ensemble:
-    """Runs of one diagram.
-
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        One row per finished member, by its number: what was varied, ``status`` (text), ``time``
-        reached (s), ``steps``, and the metrics; those of a run that did not end well are NaN.
-    time : ndarray of shape (m,)
-    signals : dict of ndarray of shape (members, m)
-        The signals that were kept, NaN after the end of a run.
-
-    Examples
-    --------
-    See `ensemble_response`.
-    """
-
-    table: pd.DataFrame
-    time: np.ndarray
-    signals: Mapping[str, np.ndarray]
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows: how the members ended, and the first of them."""
-        rows = ((n, *row) for n, *row in self.table.head(ROWS).itertuples())
-        return table_html(repr(self).splitlines()[0], ["", *map(str, self.table.columns)], rows)
-
-    def __repr__(self) -> str:
-        ended = self.table["status"].value_counts() if len(self.table) else {}
-        how = ", ".join(f"{count} {status}" for status, count in ended.items()) or "none finished"
-        kept = f"; kept: {', '.join(self.signals)}" if self.signals else ""
-        return (
-            f"Ensemble of {counted(len(self.table), 'member')}: {how}; "
-            f"{counted(self.time.size, 'time')} from "
-            f"{self.time[0]:g} to {self.time[-1]:g} s{kept}\n{self.table.head(ROWS)}"
-            + (f"\n... {len(self.table) - ROWS} more in .table" * (len(self.table) > ROWS))
-        )
-
-
 @as_annotated
 def ensemble_response(
     compiled: Compiled | ct.InputOutputSystem,
-    timepts: Any,
+    timepts: Any = None,
     inputs: Any = 0.0,
-    initial_state: Mapping[str, Any] | None = None,
+    initial_state: Any = None,
     *,
     params: Mapping[str, Any] | None = None,
     metrics: Sequence[MetricLike] = (),
     keep: Sequence[str] = (),
     threads: int | None = None,
-    rtol: float = 1e-6,
-    atol: float = 1e-8,
+    rtol: float = RTOL,
+    atol: float = ATOL,
     max_steps: int = 1_000_000,
     max_step: float | None = None,
     method: str | Tableau | None = None,
+    hold: str = "foh",
     progress: Callable[[int], object] | None = None,
     audit: Audit = True,
+    **aliases: Any,
 ) -> Ensemble:
     """Simulate many members that differ in parameters and initial states.
 
@@ -136,11 +78,15 @@ def ensemble_response(
     ----------
     compiled : Compiled or control.InputOutputSystem
         A diagram that is not compiled yet is compiled first.
-    timepts : array_like of shape (m,)
-        Times in s at which signals are sampled.
+    timepts : array_like of shape (m,), optional
+        Times in s at which signals are sampled; they are needed, under this name or as ``T``.
     inputs : array_like, list or float, optional
-        Inputs, the same for all members, as in `nlctl.input_output_response`.
-    initial_state, params : mapping, optional
+        Inputs, the same for all members, as in `nlctl.input_output_response`.  Also ``U``.
+    initial_state : mapping or array_like, optional
+        ``{"plant.x1": array of shape (members,)}``; a number holds for all members.  An array of
+        shape (n,) or a number is the state of all of them, as in `nlctl.input_output_response`,
+        one of shape (members, n) has a row for each.  Also ``X0``.
+    params : mapping, optional
         ``{"plant.p1": array of shape (members,)}``; a number holds for all members.
     metrics : sequence, optional
         Numbers to take of each member, such as `nlctl.analysis.metrics.Metric`.  A function that
@@ -158,10 +104,14 @@ def ensemble_response(
         Longest step of the integrator (s), the same for all members.
     method : str or Tableau, optional
         As in `nlctl.input_output_response`.
+    hold : {"foh", "zoh"}, optional
+        As in `nlctl.input_output_response`: what inputs are between `timepts`.
     progress : callable, optional
         Called with the number of finished members.
     audit : bool or "every run", optional
         As in `nlctl.input_output_response`, for some of the members.
+    **aliases : object
+        python-control's short names: ``T``, ``U``, ``X0``.
 
     Returns
     -------
@@ -177,7 +127,7 @@ def ensemble_response(
         different lengths, or a value is refused; the message then names the member.  Inputs and
         initial states must be finite.
     UnknownNameError
-        If a parameter, state or signal does not exist.
+        If a parameter, state, signal or argument of that name does not exist.
 
     Examples
     --------
@@ -192,49 +142,85 @@ def ensemble_response(
     >>> print(many.signals["v"][:, 2], many.table["status"].tolist())
     [1. 2. 3.] ['OK', 'OK', 'OK']
     """
-    times = checked_times(timepts)
+    given = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
+    given = with_aliases(given, aliases, _defaults(), "ensemble_response")
+    times = checked_times(given["timepts"])
     if not isinstance(compiled, Compiled):
         compiled = compile_diagram(compiled)
     if threads is not None:
         threads = integer("ensemble_response", "threads", threads, at_least=1)
+    one_of("ensemble_response", "hold", hold, HOLDS)
+    every = members(compiled, checked_params(params) or {}, given["initial_state"])
+    _check_signals(compiled, keep, metrics)
+    settings = Settings(
+        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method,
+        max_step=_longest(max_step),
+    )  # fmt: skip
+    grid, u = times, input_array(compiled.system, given["inputs"], times)
+    if hold == "zoh" and ct.isctime(compiled.system) and u.size:
+        grid, u = held(times, u)
+    asked = _Asked(times=times, grid=grid, inputs=u, settings=settings, metrics=metrics)
+    kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
+    rows = _run(_runner(every, asked, kept, audit), every.size, threads or cores(), progress)
+    return Ensemble(table=_table(every, rows), time=times, signals=kept)
+
+
+@functools.cache
+def _defaults() -> dict[str, Any]:
+    """Return the arguments of `ensemble_response` with their defaults."""
+    parameters = inspect.signature(ensemble_response).parameters
+    return {name: parameter.default for name, parameter in parameters.items()}
+
+
+def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[MetricLike]) -> None:
+    """Refuse what is not a metric, and signals that are not outputs."""
     for metric in metrics:
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(
                 "ensemble_response needs metrics such as nlctl.analysis.metrics.Metric, "
                 f"got {metric!r}"
             )
-    states = {} if initial_state is None else initial_state
-    every = members(compiled, checked_params(params) or {}, states)
     labels = compiled.system.output_labels
     for signal in (*keep, *(s for m in metrics for s in m.signals)):
         if signal not in labels:
             raise unknown("signal", signal, labels)
-    u = input_array(compiled.system, inputs, times)
-    settings = Settings(
-        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method,
-        max_step=_longest(max_step),
-    )  # fmt: skip
-    varied = variations(compiled, times)  # once for all members
-    kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Asked:
+    """What each member is asked: times of its samples among those of the run, inputs, metrics."""
+
+    times: np.ndarray
+    grid: np.ndarray
+    inputs: np.ndarray
+    settings: Settings
+    metrics: Sequence[MetricLike]
+
+
+def _runner(
+    every: Members, asked: _Asked, kept: Mapping[str, np.ndarray], audit: Audit
+) -> Callable[[range, _Stop], dict[int, dict[str, Any]]]:
+    """Return what runs a group of members, keeps their signals and returns their rows."""
+    compiled = every.compiled
+    labels = compiled.system.output_labels
+    varied = variations(compiled, asked.grid)  # once for all members
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
     compile_for(compiled, p, ENSEMBLE_WIDTH)  # once, before the threads start
-
     audited = {0, every.size // 2, every.size - 1} if audit else ()
 
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
-        for number, run in zip(
-            numbers, _group(every, numbers, times, u, settings, varied, stop), strict=False
-        ):
-            for signal, samples in kept.items():
-                samples[number, : run.time.size] = run.outputs[labels.index(signal)]
-            rows[number] = _row(run, labels, metrics)
+        runs = _group(every, numbers, asked.grid, asked.inputs, asked.settings, varied, stop)
+        for number, run in zip(numbers, runs, strict=False):
             if number in audited:
                 _audit(every, number, run, audit)
+            run = run if asked.grid is asked.times else _sampled_at(run, asked.times)
+            for signal, samples in kept.items():
+                samples[number, : run.time.size] = run.outputs[labels.index(signal)]
+            rows[number] = _row(run, labels, asked.metrics)
         return rows
 
-    rows = _run(one, every.size, threads or cores(), progress)
-    return Ensemble(table=_table(every, rows), time=times, signals=kept)
+    return one
 
 
 def _longest(max_step: float | None) -> float:
@@ -253,6 +239,15 @@ def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:
         width=ENSEMBLE_WIDTH,
     )  # fmt: skip
     compare(every.compiled, trial, wanted)
+
+
+def _sampled_at(run: Trajectory, times: np.ndarray) -> Trajectory:
+    """Return a run at some of its times only."""
+    shown = np.isin(run.time, times)
+    return replace(
+        run, time=run.time[shown], outputs=run.outputs[:, shown], states=run.states[:, shown],
+        inputs=run.inputs[:, shown],
+    )  # fmt: skip
 
 
 class _Stop:

@@ -15,6 +15,7 @@ from ..diagrams.addresses import divided
 from ..errors import ParameterError, UsageError
 from ..names import Parameters, base_name, find_name
 from ..params import as_numbers, equation_arguments, with_overrides
+from ..responses.arguments import state_array
 from .compiled import Compiled
 from .diagram.parameters import Slot, filled
 
@@ -143,17 +144,14 @@ class Members:
         return [(nodes[i], layout[i], names) for i, names in found.items()]
 
 
-def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, Any]) -> Members:
+def members(compiled: Compiled, params: Mapping[str, Any], states: Any) -> Members:
     """Gather the members of an ensemble."""
-    if not isinstance(states, Mapping):
-        raise ParameterError(
-            "initial_state of an ensemble goes by name, {'plant.x1': array of shape (members,)}, "
-            f"got {type(states).__name__}"
-        )
+    if states is not None and not isinstance(states, Mapping):
+        states = _by_name(compiled.system, states)
     index = dict.fromkeys(state_names(compiled.system))
     values = {name: np.asarray(value) for name, value in params.items()}
     initial = {}
-    for name, value in states.items():
+    for name, value in (states or {}).items():
         full = find_name("state", name, index)
         initial[full] = _finite(full, value)
     columns = {**values, **{f"{k}(0)": v for k, v in initial.items()}}
@@ -166,6 +164,32 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, 
             f"an ensemble needs at least one member, got no values of '{next(iter(sizes))}'"
         )
     return Members(compiled=compiled, params=values, states=initial, size=size)
+
+
+def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
+    """Return states by name that are given as one state, or as a row for each member.
+
+    States that no member changes are left out.
+    """
+    given = as_numbers(states)
+    if given is not None and given.ndim == 2:
+        rows = np.array([_member_state(system, k, row) for k, row in enumerate(given)])
+    else:
+        rows = state_array(system, states)
+    own = initial_state(system)
+    columns = rows.reshape(-1, own.size).T
+    changed = np.flatnonzero((columns != own[:, None]).any(axis=1))
+    if rows.ndim == 2 and rows.size and not changed.size:
+        changed = np.arange(1)  # the number of members is known by it
+    names = state_names(system)
+    return {names[i]: columns[i] if rows.ndim == 2 else columns[i, 0] for i in changed}
+
+
+def _member_state(system: Any, number: int, row: np.ndarray) -> np.ndarray:
+    try:
+        return state_array(system, row)
+    except ParameterError as error:
+        raise ParameterError(f"{error} (member {number})") from None
 
 
 def _finite(name: str, value: Any) -> np.ndarray:

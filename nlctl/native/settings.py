@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import ATOL, RTOL
 from ..errors import ParameterError
 from ..names import unknown
 from .integrate.methods import EXPLICIT_PAIRS
@@ -62,8 +63,8 @@ class Settings:
         Longest step (s), under error control too.
     """
 
-    rtol: float = 1e-8
-    atol: float = 1e-10
+    rtol: float = RTOL
+    atol: float = ATOL
     max_steps: int = 10_000_000_000
     method: str | Tableau = "auto"
     step: float = 0.0

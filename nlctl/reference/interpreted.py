@@ -173,7 +173,7 @@ def _by_python_control(run: RunArguments, inputs: Any, x0: Any, wanted: Any, how
         raise
     if not np.all(np.isfinite(found.y)):
         raise _diverged(system, float(run.times[0]))
-    return as_response(found)
+    return as_response(found, run.system)
 
 
 def _overflows(system: Any, t: float, x: Any, u: np.ndarray) -> bool:

@@ -40,6 +40,10 @@ class RunArguments:
     form: Mapping[str, Any]  # squeeze, transpose, return_states
     solver: Mapping[str, Any]  # method, rtol, ..., and what SciPy is told
     watched: tuple[Watched, ...] = ()  # functions whose changes of sign are events
+    hold: str = "foh"  # what inputs are between their times
+
+
+HOLDS = ("foh", "zoh")  # first-order and zero-order hold, as python-control calls them
 
 
 def checked_params(params: Any) -> Mapping[str, Any] | None:
@@ -52,16 +56,19 @@ def checked_params(params: Any) -> Mapping[str, Any] | None:
 
 
 def with_aliases(
-    given: Mapping[str, Any], aliases: Mapping[str, Any], defaults: Mapping[str, Any]
+    given: Mapping[str, Any],
+    aliases: Mapping[str, Any],
+    defaults: Mapping[str, Any],
+    who: str = "input_output_response",
 ) -> dict[str, Any]:
     """Return arguments by their full names."""
     found = dict(given)
     for name, value in aliases.items():
         full = ALIASES.get(name)
-        if full is None:
-            names = [*(k for k in defaults if k != "aliases"), *ALIASES]
-            where = "of input_output_response"
-            raise unknown("argument", name, names, where, UnknownKeywordError)
+        if full is None or full not in given:
+            short = [alias for alias, full in ALIASES.items() if full in given]
+            names = [*(k for k in defaults if k != "aliases"), *short]
+            raise unknown("argument", name, names, f"of {who}", UnknownKeywordError)
         if given[full] is not defaults[full]:
             raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")
         found[full] = value
@@ -185,6 +192,17 @@ def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
             f"evaluation_times has {t:g} s, outside of timepts from {times[0]:g} to {times[-1]:g} s"
         )
     return wanted
+
+
+def held(times: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and inputs, linear in between, that step at each of the given times.
+
+    The value before lasts until the float before the time: no run has an instant between the two.
+    Shapes: `times` (m,), `inputs` (ninputs, m); returns (2 m - 1,) and (ninputs, 2 m - 1).
+    """
+    steps, u = np.empty(2 * times.size - 1), np.repeat(inputs, 2, axis=1)
+    steps[::2], steps[1::2] = times, np.nextafter(times[1:], -np.inf)
+    return steps, np.ascontiguousarray(u[:, :-1])
 
 
 def interpolated(inputs: np.ndarray, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, Any
 import control as ct
 import numpy as np
 
+from ..diagrams import state_names
+from ..errors import UsageError
 from ..host.notebook import table_html
+from ..names import find_name, unknown
+from ..plotting.groups import Wires, groups_of, wires_of
+from ..upstream.control_internals import is_system
 from ..wording import counted
 from .event_log import NO_EVENTS, EventLog
 
@@ -16,6 +21,23 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SHOWN = 6  # names that are listed before the rest is only counted
+_ROWS = 4  # signals that have room in a row each
+_BY_KIND = "signals by kind"  # a figure that python-control does not know
+_ROW = 1.2  # in, the least height of a row
+
+
+class StateLabels(list[str]):
+    """python-control's labels of states, ``"plant_x1"``, found by ``"plant.x1"`` as well."""
+
+    def __init__(self, labels: Sequence[str], names: Sequence[str]) -> None:
+        super().__init__(labels)
+        self.names = {name: k for k, name in enumerate(names)}
+
+    def index(self, name: Any, *args: Any) -> int:
+        """Return the place of a state by its label, its qualified name or the end of one."""
+        if name in self:
+            return super().index(name, *args)
+        return self.names[find_name("state", name, self.names)]
 
 
 class Response(ct.TimeResponseData):
@@ -27,10 +49,24 @@ class Response(ct.TimeResponseData):
         Status, time reached, steps and events of a run in machine code.
     happened : EventLog
         What is in `events`.
+    state_names : list of str
+        Qualified names of the states, ``"plant.x1"``.
+    wires : Wires
+        Where the outputs come from.
     """
 
     statistics: Any = None
     happened: EventLog = NO_EVENTS
+    state_names: Sequence[str] = ()
+    wires: Wires = Wires()
+
+    @property
+    def states(self) -> Any:
+        """The states, found by ``"plant.x1"`` as well as by python-control's ``"plant_x1"``."""
+        found: Any = super().states
+        if len(self.state_names) == len(found.signal_labels or ()):
+            found.signal_labels = StateLabels(found.signal_labels, self.state_names)
+        return found
 
     @property
     def events(self) -> pd.DataFrame:
@@ -42,11 +78,64 @@ class Response(ct.TimeResponseData):
         """
         return self.happened.table()
 
-    def plot(self, *args: Any, **kwargs: Any) -> Any:
-        """Plot the response as `control.time_response_plot` does, also without inputs."""
+    def plot(
+        self, *args: Any, signals: Sequence[str | Sequence[str]] | None = None, **kwargs: Any
+    ) -> Any:
+        """Plot the response as `control.time_response_plot` does, or signals of one kind in a row.
+
+        Of up to four signals each has a row of its own, as with arguments of python-control's.
+        `signals` says what is shown, outputs and inputs: a name has a row, a list of names shares
+        one, ``run.plot(signals=[["yd", "y"], "u"])``.
+        """
+        count = (self.noutputs or 0) + (self.ninputs or 0)
+        if not args and not kwargs and not self.ntraces and (signals is not None or count > _ROWS):
+            return self._plot_rows(signals)
+        if signals is not None:
+            raise UsageError("signals= has no meaning next to arguments of time_response_plot")
+        import matplotlib.pyplot as plt
+
         if not self.ninputs:
             kwargs.setdefault("plot_inputs", False)
-        return super().plot(*args, **kwargs)
+        if plt.get_fignums() and plt.gcf().get_label() == _BY_KIND:
+            plt.figure()  # python-control draws into the current figure where the rows fit
+        width, height = plt.rcParams["figure.figsize"]
+        with plt.rc_context({"figure.figsize": (width, max(height, _ROW * count))}):
+            return super().plot(*args, **kwargs)
+
+    def rows(
+        self, wanted: Sequence[str | Sequence[str]] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
+        """Return what `plot` shows: samples by name, and names by the title of their row."""
+        if self.ntraces:
+            raise UsageError("rows are those of one run, and this response has several traces")
+        signals: dict[str, np.ndarray] = {}
+        every: Any = ((self.output_labels, self.y), (self.input_labels, self.u))
+        for labels, samples in every:
+            signals |= dict(zip(labels or (), samples if labels else (), strict=True))
+        if wanted is None:
+            return signals, groups_of(signals, self.wires)
+        rows = {}
+        for row in wanted:
+            names = [row] if isinstance(row, str) else list(row)
+            for name in names:
+                if name not in signals:
+                    raise unknown("signal", str(name), signals, f"of '{self.sysname}'")
+            rows[", ".join(names)] = names
+        return {name: signals[name] for names in rows.values() for name in names}, rows
+
+    def _plot_rows(self, wanted: Sequence[str | Sequence[str]] | None) -> Any:
+        import matplotlib.pyplot as plt
+
+        from ..plotting.signals import rows_figure
+
+        signals, rows = self.rows(wanted)
+        figure, axes = rows_figure(self.time, signals, rows, plt.figure(layout="constrained"))
+        figure.set_label(_BY_KIND)
+        figure.suptitle(self.title or "", fontsize="medium")
+        lines = np.empty((len(axes), 1), dtype=object)
+        for k, ax in enumerate(axes):
+            lines[k, 0] = list(ax.lines)
+        return ct.ControlPlot(lines, np.array(axes)[:, None], figure)
 
     def __repr__(self) -> str:
         t, run = np.atleast_1d(self.time), self.statistics
@@ -78,10 +167,17 @@ def _in_text(values: np.ndarray) -> list[str]:
     return [", ".join(f"{v:.6g}" for v in np.ravel(own)) for own in values]
 
 
-def as_response(response: ct.TimeResponseData) -> Response:
-    """Return python-control's response with what `Response` adds."""
+def as_response(response: ct.TimeResponseData, system: Any = None) -> Response:
+    """Return python-control's response of a system with what `Response` adds."""
     made = Response.__new__(Response)
     made.__dict__.update(response.__dict__)
+    return _with_names(made, system)
+
+
+def _with_names(made: Response, system: Any) -> Response:
+    """Let a response know where its signals and states come from."""
+    if is_system(system):
+        made.state_names, made.wires = state_names(system), wires_of(system)
     return made
 
 
@@ -93,7 +189,7 @@ def response_of(
     **more: Any,
 ) -> Response:
     """Return a response of a system."""
-    return Response(
+    made = Response(
         *signals,
         issiso=system.issiso(),
         params=dict(system.params) | dict(params or {}),
@@ -107,6 +203,7 @@ def response_of(
         return_x=bool(form.get("return_states")),
         **more,
     )
+    return _with_names(made, system)
 
 
 def _names(labels: Any) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from ..annotations import as_annotated
 from ..errors import ParameterError
 from ..names import unknown
-from ..native.ensemble import MetricLike
+from ..native.ensemble_result import MetricLike
 from .record import SensitivityResponse
 
 __all__ = ["MetricGradient", "metric_gradient"]

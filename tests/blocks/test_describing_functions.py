@@ -3,6 +3,7 @@
 import functools
 
 import control as ct
+import matplotlib as mpl
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -212,3 +213,95 @@ def oscillator(omega, zeta, width):
         outputs=["y", "s"],
         name="oscillator",
     )
+
+
+class TestPythonControls:
+    """`ct.describing_function` takes every block, and what it predicts is simulated."""
+
+    PAIRS = (
+        (nlctl.Saturation(limit=0.7), ct.saturation_nonlinearity(0.7)),
+        (nlctl.Relay(on=0.4, off=-0.4), ct.relay_hysteresis_nonlinearity(1.0, 0.4)),
+        (
+            nlctl.Backlash(c_r=0.3, c_l=-0.3, m_r=1.0, m_l=1.0),
+            ct.friction_backlash_nonlinearity(0.6),
+        ),
+    )
+
+    @pytest.mark.parametrize(("record", "theirs"), PAIRS, ids=lambda each: type(each).__name__)
+    def test_it_is_that_of_python_controls_own_nonlinearities(self, record, theirs):
+        """Closed forms there, simulation here."""
+        A = np.array([[0.5, 1.0], [2.0, 5.0]])
+        found = ct.describing_function(nlctl.block(record, "block"), A)
+        assert found.shape == A.shape
+        np.testing.assert_allclose(found, np.vectorize(theirs.describing_function)(A), atol=1e-7)
+
+    @given(A=amplitudes, omega=st.floats(0.1, 10))
+    @settings(max_examples=8, deadline=None)
+    def test_of_a_lag_it_is_the_frequency_response(self, A, omega):
+        """1 / (1 + j omega T), whatever the amplitude; python-control asks for no frequency."""
+        lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
+        found = nlctl.describing_function(lag, A, omega)
+        assert found == pytest.approx(1 / (1 + 0.5j * omega), abs=1e-6)
+        with pytest.raises(nlctl.UsageError, match="depends on the frequency"):
+            ct.describing_function(lag, A)
+
+    @given(A=amplitudes, h=shares, omega=st.floats(0.1, 10))
+    @settings(max_examples=8, deadline=None)
+    def test_of_memories_it_is_the_same_at_every_frequency(self, A, h, omega):
+        """And parameters are overridden by name."""
+        play = nlctl.block(nlctl.Backlash(m_r=1.0, m_l=1.0), "play")
+        params = {"play.c_r": h * A, "play.c_l": -h * A}
+        found = nlctl.describing_function(play, A, omega, params=params)
+        assert found == pytest.approx(of_play(h), abs=1e-6)
+
+    @given(width=st.floats(0.02, 0.3))
+    @settings(max_examples=4, deadline=None)
+    def test_the_simulated_cycle_of_a_relay_is_tsypkins(self, width):
+        """G = 1 / (s (s + 1)): tanh(h / 2) - h / 2 + width = 0 for half a period h."""
+        relay = nlctl.block(nlctl.Relay(on=width, off=-width), "relay")
+        h = brentq(lambda h: np.tanh(h / 2) - h / 2 + width, 1e-3, 20)
+        A = np.linspace(1.05 * width, 2, 80)
+        (cycle,) = nlctl.limit_cycles(ct.tf([1], [1, 1, 0]), relay, A, np.logspace(-1, 1.5, 400))
+        assert cycle.omega == pytest.approx(np.pi / h, rel=1e-5)
+        assert cycle.omega == pytest.approx(cycle.predicted_omega, rel=0.05)
+        assert cycle.found == "it settles"
+
+    def test_a_cycle_that_is_not_stable_is_said_not_to_settle(self):
+        """x'' = x + ... behind a dead zone: from just inside of the predicted cycle it dies out."""
+        zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0, slope_l=1, b_l=-0.5), "zone")
+        G = ct.tf([8], [1, 2, 2, 1])
+        (cycle,) = nlctl.limit_cycles(G, zone, np.linspace(0.6, 3, 20), np.logspace(-1, 1, 300))
+        assert cycle.found != "it settles"
+        assert np.isnan(cycle.omega)
+
+    def test_the_plot_has_the_simulated_cycle_on_the_nyquist_curve(self):
+        """Below both curves of python-control's plot; at G(j omega) of its own frequency."""
+        mpl.use("Agg")
+        G = ct.tf([8], [1, 2, 2, 1])
+        limit = nlctl.block(nlctl.Saturation(limit=1.0), "limit")
+        A = np.linspace(1.2, 5, 12)
+        (cycle,) = nlctl.limit_cycles(G, limit, A)
+        (cross,) = nlctl.describing_function_plot(G, limit, A).lines[-1]
+        mpl.pyplot.close("all")
+        at = G(1j * cycle.omega)
+        assert (cross.get_xdata()[0], cross.get_ydata()[0]) == pytest.approx((at.real, at.imag))
+
+    def test_what_is_refused(self):
+        """Amplitudes that are not positive, and blocks with more signals."""
+        limit = nlctl.block(nlctl.Saturation(), "limit")
+        for wrong in (0.0, -1.0, np.nan, "2", [1.0, 0.0]):
+            with pytest.raises(nlctl.ParameterError, match="amplitudes > 0"):
+                nlctl.describing_function(limit, wrong)
+        with pytest.raises(nlctl.ParameterError, match="one input and one output"):
+            nlctl.describing_function(nlctl.block(nlctl.PID(), "law"), 1.0)
+        with pytest.raises(nlctl.ParameterError, match="two amplitudes > 0 or more"):
+            nlctl.limit_cycles(ct.tf([1], [1, 1]), limit, [1.0])
+
+
+def test_a_block_without_states_takes_a_number():
+    """As a function; with states it is not one."""
+    zone = nlctl.block(nlctl.DeadZone(b_r=0, b_l=0, ripple_r=0, ripple_l=0, slope_l=2), "zone")
+    assert [float(zone(u)) for u in (-0.5, 0.0, 0.25)] == [-1.0, 0.0, 0.25]
+    assert np.isnan(zone(np.nan))
+    with pytest.raises(TypeError, match="static"):
+        nlctl.block(nlctl.Lag(), "lag")(1.0)

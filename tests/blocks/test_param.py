@@ -224,7 +224,7 @@ class TestOverrides:
         actuator = nlctl.block(nlctl.DeadZone(), "actuator")
         with pytest.raises(ParameterError) as error:
             actuator.output(0, [], [1.0], params={"actuator.b_r": -0.1})
-        assert str(error.value) == "DeadZone needs b_r > 0, got -0.1 (block 'actuator')"
+        assert str(error.value) == "DeadZone needs b_r >= 0, got -0.1 (block 'actuator')"
 
     @given(row=st.integers(0, 2), column=st.integers(0, 1), value=st.floats(-9, 9))
     def test_one_element_of_a_matrix(self, row, column, value):

@@ -74,7 +74,7 @@ def test_simulate_writes_what_was_asked_for(tmp_path):
     ("setting", "message"),
     [
         ("actuator.b_x=1", "unknown parameter 'actuator.b_x'; nearest: 'actuator.b_r'"),
-        ("actuator.b_r=-0.1", "DeadZone needs b_r > 0, got -0.1 (block 'actuator')"),
+        ("actuator.b_r=-0.1", "DeadZone needs b_r >= 0, got -0.1 (block 'actuator')"),
         ("actuator.b_r=wide", "actuator.b_r needs a number, got 'wide'"),
         ("actuator.b_r", "--set needs NAME=VALUE, got 'actuator.b_r'"),
         ("plant.x7(0)=1", "unknown state 'plant.x7'; nearest: 'plant.x2', 'plant.x1'"),

@@ -304,7 +304,7 @@ class TestRefused:
 
 
 class TestEnsembles:
-    """Members start from finite numbers, by name."""
+    """Members start from finite numbers."""
 
     def test_values_that_are_no_numbers(self):
         """The member is named."""
@@ -317,5 +317,7 @@ class TestEnsembles:
             run(COMPILED["three"], T, 0, {"q": [[0.0]]})
         with pytest.raises(nlctl.ParameterError, match="inputs has nan at 'c', t = 0 s"):
             run(COMPILED["three"], T, [0.0, 1.0, np.nan])
-        with pytest.raises(nlctl.ParameterError, match=r"goes by name.*got list"):
-            run(COMPILED["three"], T, 0, [0.0, 1.0])
+        with pytest.raises(nlctl.ParameterError, match=r"needs real numbers, got '0.5'"):
+            run(COMPILED["three"], T, 0, "0.5")
+        with pytest.raises(nlctl.ParameterError, match=r"nan at 'three\.p.*\(member 1\)"):
+            run(COMPILED["three"], T, 0, [[0.0, 1.0], [np.nan, 1.0]])

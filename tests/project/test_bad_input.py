@@ -47,7 +47,7 @@ def refused(error, *told):
         ("RobustTerm", {"tau": -0.2}, ["tau > 0", "-0.2"]),
         ("RobustTerm", {"sigma_2": -1e-3}, ["sigma_2 >= 0", "-0.001"]),
         ("NussbaumLaw", {"beta": np.nan}, ["a finite beta", "nan"]),
-        ("DeadZone", {"b_l": 0.3}, ["b_l < 0", "0.3"]),
+        ("DeadZone", {"b_l": 0.3}, ["b_l <= 0", "0.3"]),
         ("DeadZone", {"ripple_l": 0.9}, ["|ripple_l| < slope_l", "0.9 and 0.8"]),
         ("Backlash", {"c_l": 0.5}, ["c_l < c_r", "0.5 and 0.5"]),
         ("Genesio", {"gain_mean": -np.inf}, ["a finite gain_mean", "-inf"]),

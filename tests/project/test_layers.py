@@ -18,6 +18,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
         "nlctl.diagrams",
         "nlctl.functions",
         "nlctl.drawing",
+        "nlctl.plotting",
         "nlctl.responses",
     ]
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
@@ -25,7 +26,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.sensitivities", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.__main__"],
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",
@@ -37,7 +38,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.analysis.figures", "nlctl.analysis.report"],
     ["nlctl.analysis.studies"],
     ["nlctl.analysis.pages"],
-    ["nlctl.analysis.loop_report"],
+    ["nlctl.analysis.loop_report", "nlctl.analysis.loop_checks"],
     ["nlctl.analysis.paper"],
     ["nlctl.analysis.cli"],
 ]
@@ -56,7 +57,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["enclosures", "jacobians"],
         ["describe"],
         ["compiled"],
-        ["integrate", "linearized", "members"],
+        ["ensemble_result", "integrate", "linearized", "members"],
         ["along", "audit", "happened", "histories", "integrators", "laid", "settings"],
         ["chattering", "known", "ship"],
         ["run"],

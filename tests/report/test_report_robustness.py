@@ -39,6 +39,7 @@ from nlctl.analysis.studies.page.deviations import deviations_table
 from nlctl.analysis.studies.page.running import running
 from nlctl.analysis.studies.page.text import margin_text, violate, without_assumptions
 from nlctl.errors import UsageError
+from nlctl.plotting.bands import upper_envelope
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

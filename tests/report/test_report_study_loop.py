@@ -10,11 +10,12 @@ from rows import each_row
 from studies_example import HEAD, LOOP, ROWS, write
 
 from nlctl.analysis import figures
-from nlctl.analysis.pages.study.histories import histories, limits_of_requirements
+from nlctl.analysis.pages.study.histories import histories
 from nlctl.analysis.pages.study.loop import StudyLoop, loop_of, loop_sections
 from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.report import Equation, Figure, Table, render_html
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
+from nlctl.analysis.robustness.stl.limits import limits_of_requirements
 from nlctl.analysis.studies import read_study, run
 
 

@@ -227,7 +227,7 @@ def test_a_file_that_is_no_toml_names_the_line(tmp_path):
 
 def test_the_study_is_what_the_file_says(tmp_path):
     """Laws, spec, times, metrics, solver, and the loop from a file beside it."""
-    extra = "[solver]\nrtol = 1e-8\n\n[options]\nlag = { function = 'loop.py:Lag', gain = 0.1 }\n"
+    extra = "[solver]\nrtol = 1e-9\n\n[options]\nlag = { function = 'loop.py:Lag', gain = 0.1 }\n"
     file = read_study(write(tmp_path, HEAD, extra, ROWS))
     experiment = file.experiment
     rate, start = experiment.space.quantities
@@ -239,7 +239,7 @@ def test_the_study_is_what_the_file_says(tmp_path):
     ]
     np.testing.assert_array_equal(experiment.timepts, np.linspace(0, 2, 101))
     assert {m.signal for m in experiment.metrics} == {"y", "z"}  # the loop has no v and no zeta
-    assert (experiment.rtol, experiment.atol) == (1e-8, 1e-8)
+    assert (experiment.rtol, experiment.atol) == (1e-9, 1e-10)
     diagram = experiment.build()
     assert diagram.params["lag.gain"] == 0.1
     assert nominal(resolved(experiment.space, diagram)) == {"lag.rate": 1.0, "lag.x(0)": 1.0}

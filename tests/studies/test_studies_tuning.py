@@ -6,10 +6,10 @@ from command_line import nlctl_here
 from rows import each_row
 from studies_example import write
 
+from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.robustness import violation_probability
 from nlctl.analysis.robustness.uncertainty.design import independent
 from nlctl.analysis.studies import StudyError, load_result, plan, read_study, replay, run
-from nlctl.analysis.studies.page.report import study_report
 
 HEAD = """
 loop = "loop.py:loop"

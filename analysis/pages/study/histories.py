@@ -15,10 +15,9 @@ from ... import metrics
 from ...figures import Limit
 from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
 from ...robustness.search.evaluation import as_table, margins_of
-from ...robustness.stl.formula import Always, And, Band, Formula
 from ...robustness.uncertainty.space import nominal
 
-__all__ = ["Histories", "histories", "limits_of_requirements"]
+__all__ = ["Histories", "histories"]
 
 _MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
@@ -88,31 +87,10 @@ def histories(
         worst={name: samples[1] for name, samples in signals.items()},
         margin=margin,
         ended=int(np.sum(status[2:] != Status.OK.name)),
-        limits=limits_of_requirements(prepared.experiment.spec.requirements),
+        limits=prepared.experiment.spec.limits,
         units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
         groups=_groups(table.iloc[:count], [choice.name for choice in space.choices]),
     )
-
-
-def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
-    """Return what requirements always ask of each signal; what they ask else is not a line."""
-    found: dict[str, list[Limit]] = {}
-
-    def walk(formula: Formula, start: float, end: float, until: float) -> None:
-        if isinstance(formula, And):
-            for part in formula.parts:
-                walk(part, start, end, until)
-        elif isinstance(formula, Always):
-            walk(formula.part, start + formula.start, end + formula.end, until)
-        elif isinstance(formula, Band) and end > start:
-            for value in (formula.lower, formula.upper):
-                line = (value, start, min(end, until))
-                if np.isfinite(value) and line not in found.setdefault(formula.signal, []):
-                    found[formula.signal].append(line)
-
-    for requirement in requirements:
-        walk(requirement.formula, 0.0, 0.0, requirement.until)
-    return found
 
 
 def _groups(rows: pd.DataFrame, choices: Sequence[str]) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import pandas as pd
 
 from nlctl import native
 from nlctl.annotations import as_annotated
-from nlctl.arguments import a_function, of_type
+from nlctl.arguments import ATOL, RTOL, a_function, of_type
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
@@ -86,8 +86,8 @@ class Experiment:
     timepts: np.ndarray
     metrics: tuple[Metric, ...] = ()
     inputs: Any = 0.0
-    rtol: float = 1e-6
-    atol: float = 1e-8
+    rtol: float = RTOL
+    atol: float = ATOL
     max_steps: int = 1_000_000
     method: str = "auto"
 

@@ -65,7 +65,7 @@ def largest_scale(
 
     Examples
     --------
-    A dead zone needs b_r > 0, so that a box of 0.5 +- 0.2 may grow to 2.5 times its size:
+    A dead zone needs b_r >= 0, so that a box of 0.5 +- 0.2 may grow to 2.5 times its size:
 
     >>> import numpy as np
     >>> import nlctl

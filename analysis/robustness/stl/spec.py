@@ -14,8 +14,10 @@ from nlctl.arguments import number, of_type, text, tuple_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers
+from nlctl.plotting.bands import Limit
 
 from .formula import HOW, Formula, SampledSignals, horizon, margin_trace, signals_named
+from .limits import limits_of_requirements
 from .parts import conjunction
 
 __all__ = [
@@ -143,6 +145,11 @@ class Spec:
                 "a spec needs at least one requirement, each with its own key other than 'spec', "
                 f"got {keys}"
             )
+
+    @property
+    def limits(self) -> dict[str, list[Limit]]:
+        """By signal what is always required: values, and from when to when (s); for figures."""
+        return limits_of_requirements(self.requirements)
 
 
 def violates(margins: ArrayLike) -> np.ndarray:

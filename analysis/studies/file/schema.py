@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, SerializeAsAny
 
+from nlctl.arguments import ATOL, RTOL
+
 from .asked import Asked
 from .field_types import Number, Pair, Size, Strict, Whole
 
@@ -102,8 +104,8 @@ class Measured(Strict):
 class SolverTable(Strict):
     """How runs are integrated."""
 
-    rtol: Number = Field(1e-6, gt=0, lt=1, description="Relative tolerance.")
-    atol: Number = Field(1e-8, gt=0, description="Absolute tolerance.")
+    rtol: Number = Field(RTOL, gt=0, lt=1, description="Relative tolerance.")
+    atol: Number = Field(ATOL, gt=0, description="Absolute tolerance.")
     max_steps: Whole = Field(
         1_000_000, ge=1, le=10**15, description="A run that needs more has failed."
     )

@@ -197,7 +197,7 @@ def test_a_folder_with_rows_is_not_taken_without_a_word(made, design, tmp_path):
 
 
 CHANGES = {
-    "settings.rtol was 1e-06, now 1e-07": {"rtol": 1e-7},
+    "settings.rtol was 1e-08, now 1e-07": {"rtol": 1e-7},
     "spec.small.formula": {
         "spec": Spec(
             requirements=(

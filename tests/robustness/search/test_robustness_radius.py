@@ -141,7 +141,7 @@ def test_draws_that_contradict_the_search_lower_the_bound():
 def test_refused_draws_leave_the_search_as_it_is():
     def refusing(table):
         if len(table) == 33:
-            raise nlctl.ParameterError("DeadZone needs b_r > 0, got -1")
+            raise nlctl.ParameterError("DeadZone needs b_r >= 0, got -1")
         return function(lambda t: 1 - t["x0"])(table)
 
     made = robustness_radius(refusing, box(1.0), runs=20, draws=33, entropy=1)

@@ -59,7 +59,7 @@ def test_names_units_and_nominal_values_come_from_the_diagram(loop):
     [
         ({"name": "actuator.br", "bounds": (0, 1)}, nlctl.UnknownNameError, "nearest: 'actuator.b"),
         ({"name": "plant.x9(0)", "bounds": (0, 1)}, nlctl.UnknownNameError, "nearest: 'plant.x"),
-        ({"name": "b_r", "bounds": (-0.1, 1)}, nlctl.ParameterError, "b_r > 0, got -0.1.*actuator"),
+        ({"name": "b_r", "bounds": (-0.1, 1)}, nlctl.ParameterError, "b_r >= 0, got -0.1.*act"),
         ({"name": "lambdas", "bounds": (1, 2)}, SpaceError, r"shape \(1,\): address.*lambdas\[0\]"),
         ({"name": "centres", "bounds": (1, 2)}, nlctl.ParameterError, "centres to be a matrix"),
         ({"name": "lambdas[7]", "bounds": (1, 2)}, nlctl.ParameterError, "not an element of it"),

@@ -33,9 +33,13 @@ WIDTH = 6.2  # in, with letters that can still be read on a phone
 LINE, SHORT_LINE = 62, 42  # characters that a legend above the axes has room for
 
 
-def stacked_axes(rows: int = 1, height: float = 2.4) -> tuple[Figure, list[Axes]]:
+def stacked_axes(
+    rows: int = 1, height: float = 2.4, figure: Figure | None = None
+) -> tuple[Figure, list[Axes]]:
     """Return a figure with axes above each other, which share their horizontal axis."""
-    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    if figure is None:
+        figure = Figure(layout="constrained")
+    figure.set_size_inches(WIDTH, height * rows)
     axes = list(np.ravel(figure.subplots(rows, 1, sharex=rows > 1)))
     for ax in axes:
         set_style(ax)

@@ -1,0 +1,71 @@
+"""The body of ``nlctl report file.py:make``: the page of a loop that a function returns."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .simulation import simulated
+
+if TYPE_CHECKING:
+    from ..report.document import Report
+
+__all__ = ["compose_page", "is_loop_name", "page_folder"]
+
+HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
+
+
+def is_loop_name(text: str) -> bool:
+    """Whether a text is ``file.py:function`` or ``package.module:function``, and no path."""
+    place, colon, function = text.rpartition(":")
+    return bool(colon and place) and function.isidentifier() and not Path(text).exists()
+
+
+def page_folder(name: str) -> Path:
+    """Return where the page of a loop is kept by default."""
+    place, _, function = name.rpartition(":")
+    stem = Path(place).stem if place.endswith(".py") else place.rpartition(".")[2]
+    return Path("reports") / (stem if function == "make" else f"{stem}-{function}")
+
+
+def compose_page(
+    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
+) -> Report:
+    """Run a loop, check what can be checked of any, and compose its page."""
+    made = simulated(name, settings, inputs, until, step)
+    from ..loop_checks import LoopCheck, checks_of, checks_section, proof_of, told
+    from ..loop_report import loop_report
+    from .terminal import progress_bar
+
+    with progress_bar("checking the loop", 2) as advance:
+        checks = checks_of(made.loop, made.response, made.params)
+        advance(1)
+        proof = proof_of(made.loop, until, made.start, made.params)
+        advance(1)
+    applies = not isinstance(proof, LoopCheck)
+    page = loop_report(
+        made.loop,
+        title=made.loop.name,
+        response=made.response,
+        params=made.params,
+        ledger=proof if applies else None,
+        sections=[checks_section(checks if applies else [*checks, proof])],
+        command=_command(name, settings, inputs, until, step),
+    )
+    return replace(page, verdict=f"{page.verdict} {told(checks)}")
+
+
+def _command(
+    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
+) -> str:
+    """Return what makes the page again."""
+    words = ["nlctl", "report", name]
+    words += [part for text in settings for part in ("--set", text)]
+    words += [part for text in inputs for part in ("--input", text)]
+    words += ["--until", f"{until:g}"] * (until != HORIZON_OF_PAGE) + ["--step", f"{step:g}"] * (
+        step != STEP_OF_PAGE
+    )
+    return shlex.join(words)

@@ -1,0 +1,150 @@
+"""What is checked of a loop that nobody has claimed anything of: its run, and where it comes to."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl import native
+from nlctl.arguments import ATOL, RTOL
+from nlctl.diagrams.points import rates_and_outputs
+from nlctl.errors import DivergedError, InexactWarning, UsageError
+from nlctl.native.describe import called
+from nlctl.response import input_output_response
+from nlctl.wording import counted
+
+from .lyapunov.ledger import Ledger, ledger
+from .report.document import Section, Table
+
+__all__ = ["LoopCheck", "checks_of", "checks_section", "proof_of", "told"]
+
+_REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
+_TIGHTER = 1e-2  # of the tolerances, for the comparison
+_SAME = 1e-4  # of a signal's range
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopCheck:
+    """One thing that was checked.
+
+    Attributes
+    ----------
+    what, found : str
+    status : {"pass", "caution", "fail", "not applicable"}
+    """
+
+    what: str
+    found: str
+    status: str
+
+
+def checks_of(loop: Any, response: Any, params: Mapping[str, Any]) -> list[LoopCheck]:
+    """Return what is checked of a loop and one run of it; a check that has no meaning says why."""
+    return [
+        *_engine(loop, response, params),
+        _tolerance(loop, response, params),
+        _rest(loop, response, params),
+    ]
+
+
+def told(checks: list[LoopCheck]) -> str:
+    """Return a sentence that sums checks up; what applies and does not pass is named."""
+    applied = [check for check in checks if check.status != "not applicable"]
+    open_ = [check.what[0].lower() + check.what[1:] for check in applied if check.status != "pass"]
+    if open_:
+        return f"Not so, or not known: {'; '.join(open_)}."
+    return (
+        f"{counted(len(applied), 'check')} of the run {'pass' if len(applied) > 1 else 'passes'}."
+    )
+
+
+def checks_section(checks: list[LoopCheck]) -> Section:
+    """Return checks as a section."""
+    table = Table(
+        caption="What was checked of this loop and of this run.",
+        columns=("check", "status", "found"),
+        rows=[(check.what, check.status, check.found) for check in checks],
+        status="status",
+    )
+    return Section(key="checks", title="Checks", items=[table])
+
+
+def proof_of(
+    loop: Any, horizon: float, start: Mapping[str, float], params: Mapping[str, Any]
+) -> Ledger | LoopCheck:
+    """Return the paper's proof line by line for a loop of its kind, else why it does not apply."""
+    try:
+        return ledger(loop, horizon, start=dict(start), params=dict(params))
+    except (UsageError, DivergedError) as error:
+        what = "The proof of Lv et al. (2017), line by line"
+        return LoopCheck(what=what, found=str(error), status="not applicable")
+
+
+def _engine(loop: Any, response: Any, params: Mapping[str, Any]) -> Iterator[LoopCheck]:
+    """Yield who has computed the run, and what is known of its conditions."""
+    run, what = response.statistics, "The equations of the run are python-control's"
+    if run is None:
+        yield LoopCheck(what=what, found="python-control ran them itself", status="pass")
+        return
+    steps = f"{counted(run.accepted, 'step')}, {counted(run.events, 'event')}"
+    found = f"machine code was compared with them along the run, which took {steps}"
+    yield LoopCheck(what=what, found=found, status="pass")
+    reading = native.compile(loop, params=dict(params))
+    what = "Steps end where equations switch"
+    opaque = list(called(reading))
+    if opaque:
+        yield LoopCheck(what=what, found=f"not known of: {'; '.join(opaque)}", status="caution")
+    else:
+        number = counted(run.conditions, "condition")
+        found = f"{number} of the equations located" if run.conditions else "nothing switches"
+        yield LoopCheck(what=what, found=found, status="pass")
+
+
+def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
+    """Compare a run with one of tighter tolerances."""
+    what = "The run does not depend on its tolerances"
+    if not ct.isctime(loop):
+        return LoopCheck(what=what, found="discrete time has none", status="not applicable")
+    try:
+        again = input_output_response(
+            loop, response.time, response.u, response.x[:, 0], params=params,
+            rtol=_TIGHTER * RTOL, atol=_TIGHTER * ATOL,
+        )  # fmt: skip
+    except DivergedError as error:
+        return LoopCheck(what=what, found=f"with tighter ones {error}", status="fail")
+    scale = np.maximum(np.ptp(response.y, axis=1), np.finfo(float).tiny)
+    off = np.max(np.abs(again.y - response.y), axis=1) / scale
+    worst = int(np.argmax(off))
+    found = (
+        f"at rtol {_TIGHTER * RTOL:.0e} {response.output_labels[worst]} differs most, by "
+        f"{off[worst]:.1e} of its range"
+    )
+    return LoopCheck(what=what, found=found, status="pass" if off[worst] <= _SAME else "caution")
+
+
+def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
+    """Say whether the loop is at rest at the end, and what its linearisation there says."""
+    what = "The state at the end is a stable equilibrium"
+    if not (ct.isctime(loop) and loop.nstates):
+        return LoopCheck(what=what, found="the loop has no rates", status="not applicable")
+    t, x, u = float(response.time[-1]), response.x[:, -1], response.u[:, -1]
+    rates, _ = rates_and_outputs(loop, dict(params))(t, x, u)
+    moved = np.ptp(response.x, axis=1) + np.finfo(float).eps * np.max(np.abs(response.x), axis=1)
+    share = np.abs(rates) * (t - float(response.time[0])) / np.maximum(moved, np.finfo(float).tiny)
+    if not np.max(share) <= _REST:
+        name = response.state_names[int(np.argmax(share))]
+        return LoopCheck(what=what, found=f"{name} still moves at the end", status="not applicable")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InexactWarning)  # that is said in another line
+            A = native.compile(loop, params=dict(params)).linearize(x, u, t, dict(params)).A
+    except UsageError as error:
+        return LoopCheck(what=what, found=str(error), status="not applicable")
+    slowest = float(np.max(np.linalg.eigvals(A).real))
+    found = f"the largest real part of an eigenvalue of its linearisation is {slowest:.4g} 1/s"
+    return LoopCheck(what=what, found=found, status="pass" if slowest < 0 else "caution")

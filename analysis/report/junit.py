@@ -1,0 +1,77 @@
+"""Claims as JUnit XML, which continuous integration shows: a test case each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+from nlctl.annotations import as_annotated
+
+from .document import Claim
+from .outline import claim_status
+
+__all__ = ["junit"]
+
+_NO_XML = re.compile("[^\\t\\n\\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@as_annotated
+def junit(title: str, claims: Sequence[Claim]) -> bytes:
+    """Return claims as JUnit XML.
+
+    A claim that fails or is refuted is a failure, one that is open an error; one of somebody else,
+    such as a paper's, that is refuted is skipped, since nothing of ours has failed.
+
+    Parameters
+    ----------
+    title : str
+        Of the report: the name of the suite.
+    claims : sequence of Claim
+        The test cases.
+
+    Returns
+    -------
+    bytes
+        In UTF-8.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.report import Claim
+    >>> claim = Claim(text="|e| <= 0.1", measured="0.2", limit="0.1", holds=False, evidence="")
+    >>> print(junit("Arm", [claim]).decode().splitlines()[1])
+    <testsuite name="Arm" tests="1" failures="1" errors="0" skipped="0">
+    """
+    verdicts = [_verdict(claim) for claim in claims]
+    count = {what: str(verdicts.count(what)) for what in ("failure", "error", "skipped")}
+    suite = ElementTree.Element(
+        "testsuite", name=_text(title), tests=str(len(claims)), failures=count["failure"],
+        errors=count["error"], skipped=count["skipped"],
+    )  # fmt: skip
+    for claim, verdict in zip(claims, verdicts, strict=True):
+        case = ElementTree.SubElement(
+            suite, "testcase", classname=_text(title), name=_text(claim.text)
+        )
+        found = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
+        if verdict:
+            told = ElementTree.SubElement(case, verdict, message=_text(found))
+            told.text = _text(f"evidence: {claim.evidence}") if claim.evidence else None
+        else:
+            ElementTree.SubElement(case, "system-out").text = _text(found)
+    ElementTree.indent(suite)
+    return ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _verdict(claim: Claim) -> str:
+    """Return the element that says how a claim ended; none where it holds."""
+    if claim.holds:
+        return ""
+    look = claim_status(claim)[1]
+    if look == "caution":
+        return "error"
+    return "skipped" if claim.by else "failure"
+
+
+def _text(text: str) -> str:
+    """Return a text without what XML cannot hold."""
+    return _NO_XML.sub("\ufffd", text)

@@ -1,0 +1,1 @@
+"""Signals over time as figures: of one run, in groups, and of many."""
