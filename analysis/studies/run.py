@@ -18,6 +18,7 @@ from nlctl.host.files import replace_file
 
 from ..robustness import Design, Prepared, evaluate, nominal, prepare
 from ..robustness.runs.progress import Progress
+from ..robustness.runs.parquet import parquet
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
@@ -151,6 +152,7 @@ def run(
     ('The claim is shown.', 'The claim is shown.')
     """
     folder = Path(folder)
+    parquet()  # before hours of runs
     with locked(folder, RunFolderError):
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
