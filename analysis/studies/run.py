@@ -17,8 +17,8 @@ from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
 from ..robustness import Design, Prepared, evaluate, nominal, prepare
-from ..robustness.runs.progress import Progress
 from ..robustness.runs.parquet import parquet
+from ..robustness.runs.progress import Progress
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
