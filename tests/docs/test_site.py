@@ -27,7 +27,7 @@ PUBLIC = [
         "nlctl.analysis.robustness",
         "nlctl.analysis.studies",
     ),
-    *("nlctl.analysis.report", "nlctl.analysis.loop_report"),
+    *("nlctl.analysis.report", "nlctl.analysis.loop_report", "nlctl.analysis.metrics"),
 ]
 
 
