@@ -160,12 +160,13 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     Raises
     ------
     ParameterError
-        If the solver finds no solution.
+        If the solver finds no solution, or the network has not as many nodes as W_hat(0).
 
     Examples
     --------
     A larger sigma_1 makes weights dear: they become smaller than those that approximate best.
 
+    >>> import dataclasses
     >>> import numpy as np
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import read_parts, tightest_weights
@@ -173,11 +174,18 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     >>> x = np.linspace(0, 1, 11)[:, None]
     >>> network = Network(psi=np.ones((11, 1)), g=x[:, 0] ** 2, points=x)
     >>> gains = read_parts(nlctl.paper.example_1()).gains
+    >>> gains = dataclasses.replace(gains, W_hat_0=(0.0,))
     >>> W = tightest_weights(network, gains, delta_rest=0.0)
     >>> bool(0.0 < W[0] <= 0.5)
     True
     """
-    P, q = _cost_of_weights(gains, delta_rest, network.psi.shape[1])
+    nodes = network.psi.shape[1]
+    if len(gains.W_hat_0) != nodes:
+        raise ParameterError(
+            f"tightest_weights needs as many nodes in the network as in W_hat(0), got {nodes} and "
+            f"{len(gains.W_hat_0)}: take the basis of the controller"
+        )
+    P, q = _cost_of_weights(gains, delta_rest)
     error = -np.ones((len(network.g), 1))
     limits = [
         at_most(np.hstack([network.psi, error]), network.g),
@@ -189,7 +197,7 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     return x[:-1]
 
 
-def _cost_of_weights(gains: Gains, delta_rest: float, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+def _cost_of_weights(gains: Gains, delta_rest: float) -> tuple[np.ndarray, np.ndarray]:
     """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*).
 
     The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
@@ -201,8 +209,8 @@ def _cost_of_weights(gains: Gains, delta_rest: float, nodes: int) -> tuple[np.nd
         by_eps = by_eps / rate + initial_V(gains, delta_rest + one, 0.0)
         by_W, by_W_error = by_W / rate, initial_V(gains, 0.0, one)
     of_W, of_W_error = by_W.deriv()(0.0), by_W_error.deriv()(0.0)
-    start = np.array(gains.W_hat_0) if gains.W_hat_0 else np.zeros(nodes)
-    P = np.diag(np.append(np.full(nodes, 2 * (of_W + of_W_error)), by_eps.deriv(2)(0.0)))
+    start = np.array(gains.W_hat_0)
+    P = np.diag(np.append(np.full(start.size, 2 * (of_W + of_W_error)), by_eps.deriv(2)(0.0)))
     return P, np.append(-2 * of_W_error * start, by_eps.deriv()(0.0))
 
 
