@@ -13,7 +13,7 @@ from tuning import Tuned, split_samples, tune
 from nlctl import paper
 from nlctl.analysis.metrics import tracking_metrics
 from nlctl.analysis.paper.controllers import part_of, published_controller
-from nlctl.analysis.paper.rivals import loop_of, made_with, rival_actuators
+from nlctl.analysis.paper.rivals import example_with, made_with, rival_actuators
 from nlctl.analysis.robustness import independent
 from nlctl.analysis.studies import read_study, shipped
 from nlctl.native import compile as compiled_loop
@@ -65,12 +65,12 @@ def tuned_rivals(
     cost, limited = by_key["iae"], by_key["peak_u"]
     actuator = rival_actuators(example)[TRAINED_BEHIND[example]]
     start, params = split_samples(samples)
-    printed = compiled_loop(loop_of(example, published_controller(example), actuator))
+    printed = compiled_loop(example_with(example, published_controller(example), actuator))
     table = ensemble_response(printed, times, 0.0, start, params=params, metrics=(limited,)).table
     found = {}
     for label, bounds in search_bounds(example).items():
         middle = {key: float(np.sqrt(low * high)) for key, (low, high) in bounds.items()}
-        loop = compiled_loop(loop_of(example, made_with(example, label, middle), actuator))
+        loop = compiled_loop(example_with(example, made_with(example, label, middle), actuator))
         found[label] = tune(
             loop, bounds, times, cost,
             limited=limited, limit=float(table[limited.key].to_numpy().max()), samples=samples,

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Limit", "at_least", "at_most", "minimizer", "symmetric_basis", "upper_triangle"]
+__all__ = ["ConeLimit", "at_least", "at_most", "minimizer", "symmetric_basis", "upper_triangle"]
 
 _SOLVED = ("Solved", "AlmostSolved")
 
 
 @dataclass(frozen=True)
-class Limit:
+class ConeLimit:
     """A x + s = b with s in a cone: numbers from 0 on, or matrices without negative eigenvalues.
 
     Shapes: `A` (k, n), `b` (k,); `cone` makes Clarabel's of its module.
@@ -26,21 +26,21 @@ class Limit:
     cone: Callable[[Any], Any]
 
 
-def at_most(A: np.ndarray, b: np.ndarray) -> Limit:
+def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
     """Return A x <= b, row by row.
 
     Shapes: `A` (k, n), `b` (k,).
     """
-    return Limit(A, b, partial(_nonnegative, len(b)))
+    return ConeLimit(A, b, partial(_nonnegative, len(b)))
 
 
-def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> Limit:
+def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
     """Return sum x_i M_i >= low, of symmetric matrices.
 
     Shapes: `parts` n of (m, m), `low` (m, m).
     """
     A = np.column_stack([-upper_triangle(part) for part in parts])
-    return Limit(A, -upper_triangle(low), partial(_semidefinite, len(low)))
+    return ConeLimit(A, -upper_triangle(low), partial(_semidefinite, len(low)))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def symmetric_basis(m: int) -> list[np.ndarray]:
 
 
 def minimizer(
-    P: np.ndarray, q: np.ndarray, limits: Sequence[Limit]
+    P: np.ndarray, q: np.ndarray, limits: Sequence[ConeLimit]
 ) -> tuple[np.ndarray | None, str]:
     """Return the x of the smallest x^T P x / 2 + q^T x, None where none is found, and the status.
 

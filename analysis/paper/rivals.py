@@ -37,7 +37,7 @@ __all__ = [
     "KNOWLEDGE",
     "RIVAL_GAINS",
     "behind",
-    "loop_of",
+    "example_with",
     "made_with",
     "rival_actuators",
     "rival_controller",
@@ -250,10 +250,10 @@ def rival_loop(
     controller, actuators = rival_controller(example, label), rival_actuators(example)
     if actuator not in actuators:
         raise unknown("actuator", actuator, actuators)
-    return loop_of(example, controller, actuators[actuator], noise)
+    return example_with(example, controller, actuators[actuator], noise)
 
 
-def loop_of(
+def example_with(
     example: str, controller: Any, actuator: Any, noise: float = 0.0
 ) -> ct.InterconnectedSystem:
     """Return an example with a controller and an actuator."""
