@@ -20,6 +20,7 @@ from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
 from .responses.arguments import RunArguments, checked_params, unified, with_aliases
+from .responses.time_response import Response
 from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
@@ -81,7 +82,7 @@ def input_output_response(
     events: Any = None,
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
-) -> ct.TimeResponseData:
+) -> Response:
     """Simulate a block or diagram, as machine code or in python-control.
 
     A diagram that can be compiled is integrated by nlctl's own integrator, any other by
@@ -244,7 +245,7 @@ def _defaults() -> dict[str, Any]:
     return {name: parameter.default for name, parameter in parameters.items()}
 
 
-def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
+def _computed(run: RunArguments, engine: str) -> Response:
     interpretable = is_system(run.system)
     if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
@@ -301,7 +302,7 @@ def _asks_for_scipy(run: RunArguments) -> bool:
     return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 
-def _native(run: RunArguments) -> ct.TimeResponseData:
+def _native(run: RunArguments) -> Response:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
     from .native.diagram.checks import sized

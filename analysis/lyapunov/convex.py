@@ -69,9 +69,10 @@ def minimizer(
 
     Shapes: `P` (n, n), not negative, `q` and x (n,).
     """
-    import clarabel
+    import clarabel as untyped
     from scipy import sparse
 
+    clarabel: Any = untyped
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     A = sparse.csc_matrix(np.vstack([limit.A for limit in limits]))

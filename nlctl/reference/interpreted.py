@@ -46,7 +46,7 @@ _JACOBIAN = ("jac", "jac_sparsity", "lband", "uband")
 
 def python_control_response(
     run: RunArguments, known: Callable[..., Known] | None = None
-) -> ct.TimeResponseData:
+) -> Response:
     """Run a diagram in python-control's equations.
 
     In discrete time, and where functions do not declare their sizes, by

@@ -32,6 +32,17 @@ class Response(ct.TimeResponseData):
     statistics: Any = None
     happened: EventLog = NO_EVENTS
 
+    if TYPE_CHECKING:  # python-control's own are partly unknown
+
+        @property
+        def time(self) -> np.ndarray: ...
+        @property
+        def outputs(self) -> np.ndarray: ...
+        @property
+        def states(self) -> np.ndarray: ...
+        @property
+        def inputs(self) -> np.ndarray: ...
+
     @property
     def events(self) -> pd.DataFrame:
         """What has happened in the run: time (s), block, which, direction; a row each.

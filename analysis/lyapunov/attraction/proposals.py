@@ -55,4 +55,4 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
         x, _ = minimizer(np.zeros((len(basis), len(basis))), size, limits)
         if x is None:
             return
-        yield sum(value * E for value, E in zip(x, basis, strict=True))
+        yield np.tensordot(x, np.array(basis), 1)
