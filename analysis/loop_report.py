@@ -23,6 +23,7 @@ from nlctl.annotations import as_annotated
 from nlctl.diagrams import leaves
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.names import unknown
+from nlctl.upstream.systems import SystemResponse
 from nlctl.wording import counted
 
 from .figures.axes import BLUE, stacked_axes
@@ -154,7 +155,10 @@ def _model(loop: ct.InputOutputSystem) -> list[Section]:
 
 
 def _run(
-    loop: ct.InputOutputSystem, response: Any, signals: Sequence[str], params: Mapping[str, Any]
+    loop: ct.InputOutputSystem,
+    response: SystemResponse,
+    signals: Sequence[str],
+    params: Mapping[str, Any],
 ) -> Section:
     """Return one run: its own parameters, its signals over time, and their ranges."""
     curves = _signals(response)

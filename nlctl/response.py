@@ -24,6 +24,7 @@ from .responses.time_response import Response
 from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.blocks import sliding_blocks
 from .upstream.control_internals import is_system
+from .upstream.systems import System
 
 if TYPE_CHECKING:
     from .native import Compiled, Tableau
@@ -271,7 +272,7 @@ def _computed(run: RunArguments, engine: str) -> Response:
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 
-def _known(system: Any, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
+def _known(system: System, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
     """Return what is known of the conditions of a diagram that python-control is to run."""
     from .native.known import known_conditions  # late: needs numba
 

@@ -14,6 +14,7 @@ from typing import Any
 import control as ct
 
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation
+from nlctl.blocks import Spec
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
@@ -254,7 +255,7 @@ def rival_loop(
 
 
 def example_with(
-    example: str, controller: Any, actuator: Any, noise: float = 0.0
+    example: str, controller: Spec, actuator: Spec, noise: float = 0.0
 ) -> ct.InterconnectedSystem:
     """Return an example with a controller and an actuator."""
     make = {"example_1": loops.example_1, "example_2": loops.example_2}[example]

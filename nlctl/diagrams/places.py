@@ -15,6 +15,7 @@ from ..errors import DiagramError, ParameterError
 from ..names import Parameters, find_name
 from ..params import as_numbers
 from ..upstream.control_internals import StandIn
+from ..upstream.systems import System
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +48,7 @@ class Place:
 
 
 def places(
-    system: Any, parent: Place | None = None, position: int = 0, offset: int = 0
+    system: System, parent: Place | None = None, position: int = 0, offset: int = 0
 ) -> Iterator[Place]:
     """Yield a system's place and then, in the order of the state vector, those of its parts.
 
@@ -153,7 +154,7 @@ def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "AEIOU" else f"a {noun}"
 
 
-def known_system(who: str, system: Any) -> Any:
+def known_system(who: str, system: System) -> Any:
     """Return a block or diagram; of a compiled diagram that which was compiled.
 
     Parameters
@@ -179,7 +180,7 @@ def known_system(who: str, system: Any) -> Any:
     return inner
 
 
-def not_a_system(who: str, thing: Any) -> str:
+def not_a_system(who: str, thing: object) -> str:
     """Return the sentence that refuses what is neither a block nor a diagram.
 
     Parameters

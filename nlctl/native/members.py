@@ -168,7 +168,7 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Mapping[str, 
     return Members(compiled=compiled, params=values, states=initial, size=size)
 
 
-def _finite(name: str, value: Any) -> np.ndarray:
+def _finite(name: str, value: object) -> np.ndarray:
     """Return the initial values of a state."""
     array = as_numbers(value)
     if array is None or array.ndim > 1:

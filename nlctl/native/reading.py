@@ -81,7 +81,7 @@ class Reading:
             return packed(self.schedule.holders, self.program.layout, self.program.fixed)
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     """Return a value in one line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -22,9 +22,11 @@ class System(Protocol):
     input_labels, output_labels, state_labels : list of str
     input_index, output_index, state_index : dict
         Number of each signal by its label.
-    params : mapping
-        Values that the equations get.
     """
+
+    input_labels: Any  # properties that are made by a call, of which type checkers know nothing
+    output_labels: Any
+    state_labels: Any
 
     @property
     def name(self) -> Any: ...
@@ -37,19 +39,11 @@ class System(Protocol):
     @property
     def nstates(self) -> Any: ...
     @property
-    def input_labels(self) -> Any: ...
-    @property
-    def output_labels(self) -> Any: ...
-    @property
-    def state_labels(self) -> Any: ...
-    @property
     def input_index(self) -> Mapping[str, int]: ...
     @property
     def output_index(self) -> Mapping[str, int]: ...
     @property
     def state_index(self) -> Mapping[str, int]: ...
-    @property
-    def params(self) -> Any: ...
 
 
 class SystemResponse(Protocol):
