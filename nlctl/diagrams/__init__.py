@@ -20,6 +20,7 @@ from .places import (
     places,
     state_names,
 )
+from .standing import handed, standing
 from .third_party import Apart, apart
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "as_system",
     "check_read",
     "continuous_blocks",
+    "handed",
     "initial_state",
     "interconnect",
     "known_system",
@@ -42,5 +44,6 @@ __all__ = [
     "places",
     "reconnected",
     "samplings",
+    "standing",
     "state_names",
 ]

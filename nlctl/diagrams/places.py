@@ -265,8 +265,10 @@ def initial_state(
             f"initial_state needs values by name, {{'plant.x1': 0.8}}, got {type(values).__name__}"
         )
     x = np.concatenate([default_state(leaf.system) for leaf in leaves(system)])
+    if not values:
+        return x
     index = {name: i for i, name in enumerate(state_names(system))}
-    for name, value in (values or {}).items():
+    for name, value in values.items():
         full = find_name("state", name, index)
         number = as_numbers(value)
         if number is None or number.ndim or not np.isfinite(number):

@@ -209,7 +209,7 @@ class Apart:
         for old, new in self.pairs.values():
             if any(self.of(part) is not copied for part, copied in _parts(old, new)):
                 return False
-            kept, state = _kept(old), vars(old)
+            kept, state = own_attributes(old), vars(old)
             for name in [k for k in vars(new) if k not in state and k not in kept]:
                 del new.__dict__[name]
             new.__dict__.update({k: v for k, v in state.items() if k not in kept})
@@ -264,7 +264,7 @@ def apart(system: System) -> Apart:
     return found
 
 
-def _kept(old: Any) -> set[str]:
+def own_attributes(old: Any) -> set[str]:
     """Return the attributes that a copy has of its own."""
     kept = {*RESOLVED, "nlctl_overrides"}
     if isinstance(old, Block):

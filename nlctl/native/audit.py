@@ -33,7 +33,7 @@ from .diagram.schedule import Schedule, Signal, signal_name
 from .equations.blocks import equations
 from .equations.relays import relay_places
 from .lower import lower
-from .machine.evaluations import Machine, prepared_parameters
+from .machine.evaluations import Machine, machine, prepared_parameters
 from .machine.routine import lowered_code
 from .rounding.nudged import ROUNDINGS, nudged_values
 
@@ -115,10 +115,11 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
         width = trial.width if ct.isctime(compiled.system) else 1
         (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
-        code, c = prepared_parameters(compiled, trial.p, width, due.patterns)
-        done = compiled.cache.of(_Audited)
+        each = np.repeat(trial.p[:, None], width, axis=1)
+        code, done = machine(compiled, each, width, due.patterns), compiled.cache.of(_Audited)
         if wanted != _EVERY and any(known.code is code for known in done):
             return
+        _, c = prepared_parameters(compiled, trial.p, width, due.patterns)
         done.append(_Audited(code=code))
         evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,8 +32,24 @@ def with_log(task: Any, work: Any) -> Any:
     return with_fields(work, log=grown(work.log, ("t", "row"), room))
 
 
+class _Labelled(NamedTuple):
+    """What rows are called, with the conditions that they are of."""
+
+    conditions: Any
+    rows: list[tuple[str, str]]
+
+
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
     """Return block and name of each row of g that is noted."""
+    known = compiled.cache.of(_Labelled)
+    for each in known:
+        if each.conditions is conditions:
+            return each.rows
+    known.append(_Labelled(conditions, _labelled(compiled, conditions)))
+    return known[-1].rows
+
+
+def _labelled(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
     labels: list[tuple[str, str]] = []
     nodes = compiled.schedule.nodes
     for node in nodes:

@@ -63,10 +63,12 @@ def respond(
     if failed is not None and not ignore_errors:
         raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
         raise raised or failed
-    shown = np.isin(made.time, wanted)
-    shown[-1:] |= ended
+    shown: Any = slice(None)
+    if grid is not wanted:
+        shown = np.isin(made.time, wanted)
+        shown[-1:] |= ended
     message = None if failed is None else str(failed)
-    return _response(compiled, made, np.flatnonzero(shown), (params, form, message))
+    return _response(compiled, made, shown, (params, form, message))
 
 
 def _error(
@@ -160,14 +162,14 @@ def _message(
 def _response(
     compiled: Compiled,
     made: Trajectory,
-    shown: np.ndarray,
+    shown: np.ndarray | slice,
     told: tuple[Mapping[str, Any] | None, Mapping[str, Any], str | None],
 ) -> Response:
     system, run, (params, form, message) = compiled.system, made.statistics, told
     inputs = made.inputs[: system.ninputs or 0]
     signals = (made.time, made.outputs, made.states, inputs)
     response = response_of(
-        system, [x[..., shown] for x in signals], params, form,
+        system, [x[..., shown].copy() for x in signals], params, form,
         success=message is None, message=message,
     )  # fmt: skip
     response.statistics = run

@@ -56,7 +56,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["describe"],
         ["compiled"],
         ["integrate", "linearized", "members"],
-        ["along", "audit", "happened", "histories", "integrators", "settings"],
+        ["along", "audit", "happened", "histories", "integrators", "laid", "settings"],
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],

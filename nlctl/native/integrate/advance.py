@@ -14,7 +14,7 @@ import numpy as np
 from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
-from .events.crossing import NOTHING, crossing, left_to_other_side
+from .events.crossing import NOTHING, crossed_before, crossing, left_to_other_side
 from .events.excursions import look_between
 from .events.functions import begin_next, has_events
 from .events.location import (
@@ -68,7 +68,7 @@ def _judge(task, lanes, w, found):
             if found[j] == AGAIN or found[j] == REFUSED or (lane.across and found[j] != NOTHING):
                 continue
         if rejected(lane, w.error[j], task):
-            found[j] = REFUSED
+            found[j], lane.returns = REFUSED, 0
             continue
         found[j] = CLEAR
         is_behind = task.rows.memory.size > 0 and jumped(task, lane, w, j)
@@ -76,6 +76,8 @@ def _judge(task, lanes, w, found):
             found[j] = locate_jump(lane, task.rtol, is_behind)
         elif has_events(w):
             found[j] = locate(lane, task, w, j)
+            if found[j] == EVENT and task.fixed == 0.0:
+                found[j] = crossed_before(task, lane, w, j)
         if found[j] == AGAIN:
             lane.rejected += 1
             lane.cross = 0.0

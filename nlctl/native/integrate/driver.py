@@ -12,15 +12,15 @@ import numpy as np
 
 from ...delays.variation import Variation
 from ...errors import ParameterError
-from ...responses.watched import Watched
 from ...sampling.clock import Instants
 from ..along import derivatives
 from ..chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from ..compiled import Compiled
-from ..diagram.program import Program, instants_of
+from ..diagram.program import instants_of
 from ..happened import happened, with_log
 from ..histories import lines_of, variations, with_past, with_room
 from ..integrators import integrators
+from ..laid import laid_out
 from ..machine.evaluations import Machine, machine
 from ..run import Run
 from ..settings import METHODS, Settings
@@ -28,14 +28,12 @@ from ..taylor.method import with_taylor
 from ..taylor.turns import turned, with_turns
 from ..timed.ahead import ahead
 from .discrete import simulate_discrete
-from .events.functions import EventRows
 from .log import log_room
 from .memory import with_fields, with_table
 from .methods.lu import WHOLE
-from .methods.stiff import DIFFERENCES, EXACT, UNKNOWN, stiff_method
+from .methods.stiff import DIFFERENCES, EXACT, stiff_method
 from .methods.tableau import Tableau, pair_of
 from .methods.taylor import OTHER_METHOD, SLOPES
-from .resets import Resets
 from .results import Statistics, Trajectory, at_its_end, made
 from .samples import Ticks, Timed
 from .state import DERIVATIVES, EXPLICIT, RUNNING, Status
@@ -108,7 +106,8 @@ def begin(run: Run) -> None:
 
 def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     """Try up to `rounds` steps in every lane that is still running."""
-    run = replace(run, work=with_log(run.task, with_room(run.task, run.work)))
+    work = with_log(run.task, with_room(run.task, run.work))
+    run = run if work is run.work else replace(run, work=work)
     rhs, _ = run.machine.entries
     point, along = (0, 0) if run.along is None else run.along.entries
     integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
@@ -175,7 +174,7 @@ def prepared(
     method, terms = _method(compiled, settings), ()
     due = instants_of(compiled.schedule, program, times, p)
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
-    c = np.zeros((code.rows, count))
+    of_program, c = laid_out(compiled, code), np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
     task = with_table(
         Task,
@@ -187,16 +186,16 @@ def prepared(
         **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         pair=pair_of(settings.pair),
-        stiff=stiff_method(len(x0), UNKNOWN, np.zeros((1, 1)), WHOLE),
+        stiff=of_program.stiff,
         taylor=OTHER_METHOD,
-        rows=_rows(program, code, read.watched),
+        rows=of_program.rows,
         timed=with_table(
             Timed,
             **ahead(code.lowered.timed, p, times, settings.max_step),
             opaque=int(bool(code.lowered.calls)),
         ),
         clocks=_clocks(compiled, code, due),
-        resets=_resets(program, code),
+        resets=of_program.resets,
         lines=lines_of(compiled, p, varied, code.signal_entry),
     )
     if method == "taylor":
@@ -218,23 +217,6 @@ def _bounds(settings: Settings) -> dict[str, Any]:
         "rtol": float(settings.rtol), "atol": float(settings.atol),
         "fixed": float(settings.step), "max_steps": int(settings.max_steps),
     }  # fmt: skip
-
-
-def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
-    """Return how many rows are whose: declared, located, memories."""
-    located = code.lowered.rows["g"]
-    bending = code.lowered.conditions.bending
-    return with_table(
-        EventRows,
-        bending=program.switching,
-        declared=program.switching + bending,
-        guarded=located - len(program.guards),
-        switching=located,
-        watched=located - len(program.guards) - len(watched),
-        ways=np.array([each.direction for each in watched], dtype=np.int64),
-        ending=np.array([each.ends for each in watched], dtype=np.int64),
-        memory=np.array(program.memory, dtype=np.int64),
-    )
 
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
@@ -267,16 +249,3 @@ def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Ticks:
         Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
         states=np.array(sampled, dtype=np.int64),
     )  # fmt: skip
-
-
-def _resets(program: Program, code: Machine) -> Resets:
-    """Return the function of resets, the states that it fills, and whose guards are whose."""
-    rows = [row for _, begin, end in program.jumping for row in range(begin, end)]
-    owners = [block for block, begin, end in program.jumping for _ in range(begin, end)]
-    owned = np.equal.outer(np.array(program.guards, dtype=int), np.array(owners, dtype=int))
-    return with_table(
-        Resets,
-        functions=code.reset_entries,
-        states=np.array(rows, dtype=np.int64),
-        owned=np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
-    )

@@ -7,6 +7,7 @@ time of a run.
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import math
 import struct
@@ -27,6 +28,7 @@ from ...upstream.numba_internals import (
 )
 
 _INT = ir.IntType(64)
+_ANY = ctypes.c_char  # of any data
 _LINE = 8  # floats in a line of the cache
 _FLOAT, _BITS = struct.Struct("=d"), struct.Struct("=q")
 _ENTRY = 5  # numbers in the table for each field: a number, or an address and up to four lengths
@@ -87,23 +89,35 @@ def with_table(record: Any, **values: Any) -> Any:
     """
     numbers: list[int] = []
     for name, (dtype, ndim) in type_of(record).formats.items():
-        value = values[name]
-        if isinstance(value, np.ndarray):
-            if value.dtype != dtype or value.ndim != ndim:
-                _check_format(record, name, value)
-            if not value.flags.c_contiguous:
-                raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
-            numbers += (value.__array_interface__["data"][0], *value.shape, *_REST[ndim])
-        else:
-            numbers += (_number(record, name, value), *_REST[0])
+        numbers.extend(_entry(record, name, values[name], dtype, ndim))
     return record(**values, table=np.array(numbers, dtype=np.int64).reshape(-1, _ENTRY))
+
+
+def _entry(record: Any, name: str, value: Any, dtype: Any, ndim: int) -> tuple[int, ...]:
+    """Return what a table has for a field."""
+    if not isinstance(value, np.ndarray):
+        return (_number(record, name, value), *_REST[0])
+    if value.dtype != dtype or value.ndim != ndim:
+        _check_format(record, name, value)
+    if not value.flags.c_contiguous:
+        raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
+    return (address_of(value), *value.shape, *_REST[ndim])
+
+
+def address_of(array: np.ndarray) -> int:
+    """Return where a contiguous array begins; one without elements begins nowhere."""
+    if not array.size:
+        return 0
+    if not array.flags.writeable:
+        return array.ctypes.data
+    return ctypes.addressof(_ANY.from_buffer(array))  # several times as fast
 
 
 def _number(record: Any, name: str, value: Any) -> int:
     """Return what a table has for a number: a float's bits, an integer; for a record its table."""
     if hasattr(value, "_fields"):
         _check_format(record, name, value)
-        return value.table.ctypes.data
+        return address_of(value.table)
     if type(value) is float and type_of(record).fields[name] is types.float64:
         return _BITS.unpack(_FLOAT.pack(value))[0]
     if type(value) is int and type_of(record).fields[name] is types.int64:
@@ -130,8 +144,11 @@ def _check_format(record: Any, name: str, value: Any) -> None:
 
 def with_fields(record: Any, **changes: Any) -> Any:
     """Return a record with other values of some fields."""
-    given = {name: getattr(record, name) for name in _named(record)}
-    return with_table(type(record), **given | changes)
+    kind, table = type(record), record.table.copy()
+    formats = type_of(kind).formats
+    for name, value in changes.items():
+        table[list(formats).index(name)] = _entry(kind, name, value, *formats[name])
+    return record._replace(**changes, table=table)
 
 
 def grown(record: Any, names: tuple[str, ...], room: int) -> Any:

@@ -66,6 +66,7 @@ _FIELDS = [
     ("turns", "i8"),  # steps that ended where a memory turns or jumps, and nothing else happens
     ("jump", "i8"),  # which of their break points comes next
     ("traces", "i8"),  # whether what is being located is a condition
+    ("returns", "i8"),  # whether that was found in a step that ends behind a break point
     ("rests", "i8"),  # whether no state has moved by more than its tolerance in the last step
     ("segment", "i8"),  # interval of the time grid in which t lies
     ("tick", "i8"),  # what happens next to sampled blocks

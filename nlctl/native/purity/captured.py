@@ -82,7 +82,13 @@ def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
 
 def changed(values: Iterable[Captured]) -> Captured | None:
     """Return the first value that is not what it was."""
-    return next((v for v in values if not same(v.now, v.then)), None)
+    for each in values:
+        holder, then = each.holder, each.then
+        is_plain = type(holder) not in (dict, CellType)
+        now = getattr(holder, each.name, GONE) if is_plain else each.now
+        if now is not then and not same(now, then):
+            return each
+    return None
 
 
 def recorded(value: object) -> Any:
@@ -121,7 +127,8 @@ def same(now: Any, then: Any) -> bool:
         alike = now.dtype == then.dtype and now.shape == then.shape
         masks = [np.ma.getmaskarray(v) for v in (now, then) if isinstance(v, np.ma.MaskedArray)]
         alike = alike and (not masks or np.array_equal(masks[0], masks[1]))
-        return alike and np.array_equal(_bits(np.asarray(now)), _bits(np.asarray(then)))
+        # bit by bit: NaN is itself, 0 is not -0, an object is not its equal
+        return alike and np.asarray(now).tobytes() == np.asarray(then).tobytes()
     if isinstance(now, MethodType):  # made anew each time it is read
         return now.__func__ is then.__func__ and now.__self__ is then.__self__
     if now is then:
@@ -140,11 +147,3 @@ def _same_held(now: Any, held: Any) -> bool:
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))
-
-
-def _bits(array: np.ndarray) -> np.ndarray:
-    """Return an array as integers: NaN is itself, and 0 is not -0."""
-    flat = np.ascontiguousarray(array).reshape(-1)
-    if flat.dtype == object:
-        return np.array([id(value) for value in flat], dtype=np.int64)
-    return flat.view(np.int64 if flat.itemsize == 8 else np.uint8)

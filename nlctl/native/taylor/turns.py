@@ -106,7 +106,7 @@ def _by_pair(run: Run, settings: Settings) -> Run:
         lane["wait"] *= 2
         lane["span"], span = lane["wait"], _SPAN
     lane["h"] = lane["other_pace"]  # as it was when the pair was measured
-    for name in ("tries", "seeks", "traces", "across", "cross"):
+    for name in ("tries", "seeks", "traces", "returns", "across", "cross"):
         lane[name] = 0  # what was being located is found again
     task = with_fields(
         run.task, taylor=with_fields(OTHER_METHOD, span=span), pair=pair_of(settings.pair)

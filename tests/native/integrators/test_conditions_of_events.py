@@ -160,3 +160,58 @@ def test_what_jumps_through_zero_is_an_event(method, engine):
     times, ways = seen(found, "speed")
     np.testing.assert_allclose(times, fall * np.array([1.0, 1.5, 2.0, 2.25]), atol=1e-7)
     assert ways == ["rising", "falling"] * 2
+
+
+# windows around a kink: how the function looks near x = 3, and where it is below 0
+WIDTHS = [1e-2, 1e-4, 1e-6]
+KINKS = {
+    "abs": (lambda x, w: abs(x - 3.0) - w, 1.0, 1.0),
+    "max": (lambda x, w: max(3.0 - x, 2.0 * (x - 3.0)) - w, 1.0, 0.5),
+    "min": (lambda x, w: -min(x - 3.0, 3.0 * (3.0 - x)) - w, 1.0, 1.0 / 3.0),
+    "sum of two": (lambda x, w: abs(x - 3.0) + 0.5 * abs(x - 2.0) - 0.5 - w, 2.0, 2.0 / 3.0),
+}
+
+
+def since_window(function, width):
+    """Time since a function of a state that grows as t has fallen below 0."""
+
+    @nlctl.record
+    class Since:
+        inputs, outputs, states, feedthrough = (), ("since",), ("since", "x"), False
+        update = staticmethod(lambda t, x, u, p: (1.0, 1.0))
+        output = staticmethod(lambda t, x, u, p: (x[0],))
+        guard = staticmethod(lambda t, x, u, p: (function(x[1], width),))
+        reset = staticmethod(lambda t, x, u, p: (0.0, x[1]))
+
+    return nlctl.block(Since(), "w")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kink", KINKS)
+def test_an_event_function_below_zero_around_its_kink(kink, width, method):
+    function, before, behind = KINKS[kink]
+    diagram = nlctl.compile(ramp(lambda x: x))
+
+    def window(t, x, u, p):
+        return function(x[0], width)
+
+    found = nlctl.input_output_response(
+        diagram, [0, 10], method=method, rtol=1e-7, atol=1e-9,
+        events=window,
+    ).events  # fmt: skip
+    own = found[found["which"] == "window"]["time"].to_numpy()
+    expected = np.array([3.0 - before * width, 3.0 + behind * width])
+    np.testing.assert_allclose(own, expected, rtol=0, atol=max(1e-7, 1e-3 * width) + 1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kink", KINKS)
+def test_a_guard_that_falls_around_its_kink(kink, width, method):
+    diagram = since_window(KINKS[kink][0], width)
+    y = nlctl.input_output_response(
+        nlctl.compile(diagram), [0, 2.5, 10.0], method=method, rtol=1e-7, atol=1e-9
+    ).outputs.reshape(-1)
+    fallen = 3.0 - KINKS[kink][1] * width
+    np.testing.assert_allclose(y, [0, 2.5, 10.0 - fallen], rtol=0, atol=1e-3 * width + 1e-8)

@@ -52,6 +52,22 @@ def crossing(task, lane, w, j):
 
 
 @numba.njit(**INNER)
+def crossed_before(task, lane, w, j):
+    """Look for guards and event functions in a step that is to end behind a break point.
+
+    Around a kink of theirs they may be on the other side for less than the step that led to it:
+    what comes first is located first, once a step.
+    """
+    if lane.returns == 0:
+        for i in range(task.rows.watched, task.rows.switching):
+            if _crossed(task, w, i, w.events.g[i, j], j):
+                lane.returns, lane.tries = 1, 0
+                _bracket(task, lane, w, True, j)
+                return _next_try(task, lane, w, True, j)
+    return EVENT
+
+
+@numba.njit(**INNER)
 def _has_seen_a_jump(task, lane, w, j):
     """Whether a step is wrong: one of its stages has looked behind, whatever is said of its end.
 

@@ -215,7 +215,7 @@ def step_accepted(lane, event):
     """Count an accepted step; after several events without progress those of memories rest."""
     lane.accepted += 1
     lane.last = lane.step
-    lane.tries = lane.seeks = 0
+    lane.tries = lane.seeks = lane.returns = 0
     lane.quiet = max(0, lane.quiet - 1)
     if event and lane.across:
         lane.events += 1
