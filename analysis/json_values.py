@@ -14,7 +14,7 @@ __all__ = ["as_json", "from_json"]
 NON_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
-def as_json(value: Any, *, null: bool = False) -> Any:
+def as_json(value: object, *, null: bool = False) -> Any:
     """Return a value as JSON can hold it."""
     if isinstance(value, Mapping):
         return {str(key): as_json(part, null=null) for key, part in value.items()}
@@ -32,7 +32,7 @@ def as_json(value: Any, *, null: bool = False) -> Any:
     return value if value is None else str(value)
 
 
-def from_json(value: Any) -> Any:
+def from_json(value: object) -> Any:
     """Undo `as_json`, up to the type of sequences."""
     if isinstance(value, dict):
         return {key: from_json(part) for key, part in value.items()}

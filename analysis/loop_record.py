@@ -32,6 +32,7 @@ from nlctl.native.machine.fingerprint import content_key, unseen_in
 from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
+from nlctl.upstream.systems import System
 
 __all__ = [
     "array_text",
@@ -87,14 +88,14 @@ def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
     return _steady(system, {path: told for path, told in found.items() if told})
 
 
-def _block(system: Any) -> str:
+def _block(system: System) -> str:
     """Return a key of a block's equations; its parameters' values are told by themselves."""
     if isinstance(system, Sampled):
         return short_key(_block(system.inner), *_parts(system)[1:])
     return short_key(*_parts(system))
 
 
-def _parts(system: Any) -> list[Any]:
+def _parts(system: System) -> list[Any]:
     """Return all that a block's equations are made of, its parameters aside."""
     timebase = repr(system.dt)
     if isinstance(system, Sampled):
@@ -139,7 +140,7 @@ def _parameters(system: Any) -> dict[str, str]:
     return {name: _value_text(value) for name, value in found.items()}
 
 
-def _value_text(value: Any) -> str:
+def _value_text(value: object) -> str:
     if isinstance(value, bool | int | float | str | np.generic):
         return repr(value.item() if isinstance(value, np.generic) else value)
     try:
@@ -184,7 +185,7 @@ def values_differ(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str
     return [name for name in names if not _close(before.get(name), now.get(name))]
 
 
-def _close(one: Any, other: Any) -> bool:
+def _close(one: object, other: object) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         both_nan = math.isnan(one) and math.isnan(other)
         relative, absolute = OTHER_VERSIONS

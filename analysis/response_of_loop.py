@@ -18,6 +18,7 @@ from nlctl.errors import DiagramError, DivergedError
 from nlctl.response import EngineWarning, input_output_response
 from nlctl.sampling.system import clocks_of
 from nlctl.sliding.relay import SLIDING
+from nlctl.upstream.systems import System, SystemResponse
 from nlctl.wording import counted
 
 __all__ = ["check_response", "check_shape", "own_outputs", "own_parameters"]
@@ -37,7 +38,10 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
 
 
 def check_response(
-    loop: Any, response: Any, params: Mapping[str, Any] | None = None, names: Sequence[str] = ()
+    loop: Any,
+    response: Any,
+    params: Mapping[str, Any] | None = None,
+    names: Sequence[str] = (),
 ) -> None:
     """Refuse a response that is not one of a loop.
 
@@ -65,7 +69,7 @@ def check_response(
 
 
 def own_outputs(
-    loop: Any, response: Any, params: Mapping[str, Any]
+    loop: System, response: SystemResponse, params: Mapping[str, Any]
 ) -> Iterator[tuple[int, dict[str, float]]]:
     """Yield a loop's outputs at samples of a response, as python-control evaluates them."""
     x, u, evaluate = _states(response), _inputs(loop, response), rates_and_outputs(loop, params)
@@ -93,7 +97,11 @@ def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
 
 
 def _check_outputs(
-    loop: Any, response: Any, place: int, own: Mapping[str, float], names: Sequence[str]
+    loop: Any,
+    response: Any,
+    place: int,
+    own: Mapping[str, float],
+    names: Sequence[str],
 ) -> None:
     """Refuse outputs at one sample that are not the loop's at the same states."""
     for name in names or loop.output_labels:
@@ -104,7 +112,11 @@ def _check_outputs(
 
 
 def _check_span(
-    loop: Any, response: Any, params: Mapping[str, Any], places: np.ndarray, names: list[str]
+    loop: System,
+    response: SystemResponse,
+    params: Mapping[str, Any],
+    places: np.ndarray,
+    names: list[str],
 ) -> None:
     """Simulate a loop from the first sample to the last; refuse other states, and named outputs."""
     span = slice(int(places[0]), int(places[-1]) + 1)
@@ -136,7 +148,12 @@ def _engines(loop: Any) -> tuple[str, ...]:
 
 
 def _again(
-    loop: Any, response: Any, span: slice, params: Mapping[str, Any], engine: str, names: list[str]
+    loop: Any,
+    response: Any,
+    span: slice,
+    params: Mapping[str, Any],
+    engine: str,
+    names: list[str],
 ) -> np.ndarray:
     """Return states, and named outputs, of a loop over some samples; NaN where it does not come."""
     u, steps = _inputs(loop, response)[:, span], count()
@@ -183,7 +200,7 @@ def _inputs(loop: Any, response: Any) -> np.ndarray:
 
 
 def _another(
-    loop: Any, name: str, told: float, t: float, own: float, since: float | None = None
+    loop: System, name: str, told: float, t: float, own: float, since: float | None = None
 ) -> DiagramError:
     begun = "" if since is None else f" from the states at t = {since:g} s"
     return DiagramError(

@@ -35,7 +35,7 @@ _SHOWN = 60  # characters of a value
 _LARGEST = 2**63  # of integers that libraries take
 
 
-def as_numbers(value: Any) -> np.ndarray | None:
+def as_numbers(value: object) -> np.ndarray | None:
     """Return `value` as a float array, or None if it holds anything but real numbers."""
     try:
         array = np.asarray(value)
@@ -156,7 +156,7 @@ def _imported_for_types(module: str) -> dict[str, Any]:
     return found
 
 
-def _fits(value: Any, rule: Any, strict: bool) -> bool:
+def _fits(value: object, rule: Any, strict: bool) -> bool:
     """Whether a value is what an annotation says; strictly, also what libraries can use."""
     origin, parts = typing.get_origin(rule), typing.get_args(rule)
     if rule is npt.ArrayLike or rule is np.ndarray or origin is np.ndarray:
@@ -206,14 +206,14 @@ def _is_one(value: Any, kind: Any, strict: bool) -> bool:
     return isinstance(value, kind)
 
 
-def _is_number(value: Any, strict: bool) -> bool:
+def _is_number(value: object, strict: bool) -> bool:
     array = as_numbers(value)
     if array is None or array.ndim or isinstance(value, bool | np.bool_ | str):
         return False
     return not strict or (math.isfinite(array) and abs(float(array)) < _LARGEST)
 
 
-def _is_array(value: Any, strict: bool, like: bool) -> bool:
+def _is_array(value: object, strict: bool, like: bool) -> bool:
     """Whether a value is an array of numbers, or like one; strictly, of finite ones."""
     array = as_numbers(value)
     if array is None:
@@ -264,7 +264,7 @@ def _words(rule: Any) -> str:
     return known.get(rule) or f"of type {getattr(origin or rule, '__name__', rule)}"
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """Return a short text of a value, in one line."""
     try:
         text = " ".join(repr(value).split())

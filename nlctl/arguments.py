@@ -35,7 +35,7 @@ _T = TypeVar("_T")
 RTOL, ATOL = 1e-8, 1e-10  # of every run unless it is given others: a member of an ensemble is a run
 
 
-def one_of(who: str, name: str, value: Any, options: Iterable[str]) -> Any:
+def one_of(who: str, name: str, value: object, options: Iterable[str]) -> Any:
     """Return an option that is one of a few words."""
     options = list(options)
     if isinstance(value, str) and value in options:
@@ -56,7 +56,7 @@ def pairs(who: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
 def number(
     who: str,
     name: str,
-    value: Any,
+    value: object,
     *,
     above: float = -np.inf,
     below: float = np.inf,
@@ -94,7 +94,7 @@ def tolerances(who: str, rtol: Any, atol: Any) -> None:
     number(who, "atol", atol, above=0)
 
 
-def vector(who: str, name: str, value: Any) -> np.ndarray:
+def vector(who: str, name: str, value: object) -> np.ndarray:
     """Return finite numbers as a float array of shape (m,)."""
     array = as_numbers(value)
     if array is None or (array.ndim != 1 and array.size):
@@ -106,19 +106,19 @@ def vector(who: str, name: str, value: Any) -> np.ndarray:
     return array.reshape(-1)
 
 
-def fraction(who: str, name: str, value: Any) -> float:
+def fraction(who: str, name: str, value: object) -> float:
     """Return a number between 0 and 1, both excluded."""
     return number(who, name, value, above=0, below=1)
 
 
-def flag(who: str, name: str, value: Any) -> bool:
+def flag(who: str, name: str, value: object) -> bool:
     """Return True or False."""
     if not isinstance(value, bool | np.bool_):
         raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")
     return bool(value)
 
 
-def of_type(who: str, name: str, value: Any, kind: type[_T], how: str = "") -> _T:
+def of_type(who: str, name: str, value: object, kind: type[_T], how: str = "") -> _T:
     """Return a value of the kind that a function works on."""
     if not isinstance(value, kind):
         made = f" ({how})" if how else ""
@@ -139,14 +139,14 @@ def tuple_of(who: str, name: str, values: Any, kind: type[_T]) -> tuple[_T, ...]
     return tuple(values)
 
 
-def text(who: str, name: str, value: Any) -> str:
+def text(who: str, name: str, value: object) -> str:
     """Return a text that is not empty."""
     if not (isinstance(value, str) and value):
         raise ParameterError(f"{who} needs a name for {name}, got {value!r}")
     return value
 
 
-def a_function(who: str, name: str, value: Any) -> Any:
+def a_function(who: str, name: str, value: object) -> Any:
     """Return what can be called."""
     if not callable(value):
         raise ParameterError(f"{who} needs a function for {name}, got {type(value).__name__}")

@@ -28,6 +28,7 @@ from .upstream.control_internals import (
     current_parameters,
     set_parameters,
 )
+from .upstream.systems import System
 from .wording import counted
 
 _Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
@@ -102,10 +103,14 @@ class Spec(Protocol):
     [9.]
     """
 
-    inputs: Sequence[str]
-    outputs: Sequence[str]
-    states: Sequence[str]
-    feedthrough: bool
+    @property
+    def inputs(self) -> Sequence[str]: ...
+    @property
+    def outputs(self) -> Sequence[str]: ...
+    @property
+    def states(self) -> Sequence[str]: ...
+    @property
+    def feedthrough(self) -> bool: ...
 
     @property
     def output(self) -> Any:
@@ -414,17 +419,17 @@ def default_state(system: ct.InputOutputSystem) -> np.ndarray:
     return x
 
 
-def within(system: Any) -> Any:
+def within(system: System) -> Any:
     """Return the block that has a block's equations: the one that it samples, or itself."""
     return system.inner if isinstance(system, Around) else system
 
 
-def supplied_of(system: Any) -> Supplied | None:
+def supplied_of(system: System) -> Supplied | None:
     """Return how a block's outputs are supplied, None if they are its own."""
     return getattr(system.spec, "supplied", None) if isinstance(system, Block) else None
 
 
-def sampling_of(system: Any) -> Any:
+def sampling_of(system: System) -> Any:
     """Return the block with the parameters of a sampled block's sampling; None of any other."""
     return system.sampling if isinstance(system, Around) else None
 

@@ -160,7 +160,7 @@ class Parameters(dict[str, Any]):
         self.update(other)
         return self
 
-    def __setitem__(self, name: str, value: Any) -> None:
+    def __setitem__(self, name: str, value: object) -> None:
         self._override(name, value)
 
     def _absorb(self, other: Mapping[str, Any]) -> None:

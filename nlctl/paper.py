@@ -13,6 +13,7 @@ import control as ct
 
 from .actuators import Backlash, DeadZone
 from .annotations import as_annotated
+from .blocks import Spec
 from .controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -154,7 +155,7 @@ def named_example(name: str) -> Callable[..., ct.InterconnectedSystem]:
     return known[name]
 
 
-def _exclusive(block: str, given: Any, **choices: Any) -> None:
+def _exclusive(block: str, given: object, **choices: Any) -> None:
     """Refuse a choice that a replaced block would silently ignore."""
     ignored = [name for name, value in choices.items() if value is not None]
     if given is not None and ignored:
@@ -165,7 +166,13 @@ def _exclusive(block: str, given: Any, **choices: Any) -> None:
 
 
 def _closed_loop(
-    order: int, plant: Any, actuator: Any, controller: Any, reference: Any, sensor: Any, name: str
+    order: int,
+    plant: Spec,
+    actuator: Spec,
+    controller: Spec,
+    reference: Spec,
+    sensor: Any,
+    name: str,
 ) -> ct.InterconnectedSystem:
     blocks = {
         "reference": as_system(reference, "reference"),

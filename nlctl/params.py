@@ -261,7 +261,7 @@ def check_params(spec: Any) -> None:
         spec.check()
 
 
-def _normalised(who: str, name: str, value: Any, rule: Param, kind: Any) -> Any:
+def _normalised(who: str, name: str, value: object, rule: Param, kind: Any) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
     ndim = rule.ndim
     if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray) and not len(value):
@@ -311,11 +311,11 @@ def checked_times(timepts: Any) -> np.ndarray:
     return times
 
 
-def _nested_tuple(value: Any) -> Any:
+def _nested_tuple(value: object) -> Any:
     return tuple(map(_nested_tuple, value)) if isinstance(value, list) else value
 
 
-def _check_bounds(who: str, name: str, value: Any, rule: Param) -> None:
+def _check_bounds(who: str, name: str, value: object, rule: Param) -> None:
     for index, element in np.ndenumerate(np.asarray(value, dtype=float)):
         where = name + (f"[{', '.join(map(str, index))}]" if index else "")
         if not math.isfinite(element):
@@ -343,7 +343,7 @@ def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
     return changed
 
 
-def _replace_element(spec: Any, key: str, value: Any) -> Any:
+def _replace_element(spec: Any, key: str, value: object) -> Any:
     name = key.partition("[")[0]
     array = np.array(getattr(spec, name), dtype=float)
     inside = re.fullmatch(r"\[(\d+(?:, ?\d+)*)\]", key.removeprefix(name))

@@ -28,9 +28,11 @@ from .responses.arguments import (
     unified,
     with_aliases,
 )
+from .responses.time_response import Response
 from .responses.watched import Watched, check_moves, watched_functions
 from .sliding.relay import SLIDING
 from .upstream.control_internals import StandIn, is_system
+from .upstream.systems import System
 
 if TYPE_CHECKING:
     from .native import Compiled, Tableau
@@ -90,7 +92,7 @@ def input_output_response(
     events: Any = None,
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
-) -> ct.TimeResponseData:
+) -> Response:
     """Simulate a block or diagram, as machine code or in python-control.
 
     A diagram that can be compiled is integrated by nlctl's own integrator, any other by
@@ -269,7 +271,7 @@ def _defaults() -> dict[str, Any]:
     return {name: parameter.default for name, parameter in parameters.items()}
 
 
-def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
+def _computed(run: RunArguments, engine: str) -> Response:
     interpretable = is_system(run.system)
     if not _takes_machine_code(run, engine, interpretable):
         for name in NATIVE_ONLY:
@@ -295,7 +297,7 @@ def _computed(run: RunArguments, engine: str) -> ct.TimeResponseData:
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 
-def _known(system: Any, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
+def _known(system: System, params: Any, times: Any, watched: tuple[Watched, ...]) -> Known:
     """Return what is known of the conditions of a diagram that python-control is to run."""
     from .native.known import known_conditions  # late: needs numba
 
@@ -326,7 +328,7 @@ def _asks_for_scipy(run: RunArguments) -> bool:
     return named or run.evaluation_times is None or bool(set(keywords) - {"rtol", "atol"})
 
 
-def _native(run: RunArguments) -> ct.TimeResponseData:
+def _native(run: RunArguments) -> Response:
     """Run a compiled diagram, or one that is compiled for this run, as machine code."""
     from .native import compile as compile_diagram
     from .native.diagram.checks import sized

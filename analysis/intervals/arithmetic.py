@@ -150,7 +150,7 @@ class Ball(NumPyFunctions):
             return other
         return self._joined(self.value - other.value, 1, other, -1)
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: object) -> Any:
         return -self + other
 
     def __mul__(self, other: Any) -> Any:
@@ -172,7 +172,7 @@ class Ball(NumPyFunctions):
         found = self._joined(value, 1 / other.value, other, -value / other.value)
         return found.known_not_negative(self.not_negative and other.not_negative)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         other = as_ball(other)
         return other if other is NotImplemented else other / self
 
@@ -357,16 +357,16 @@ class Ball(NumPyFunctions):
         key = (self, given if given is other else b)
         return decided(possible, holds, key, f"{what}({a}, {b})")
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: object) -> bool:
         return self._compare(other, frozenset({-1}), "lt")
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: object) -> bool:
         return self._compare(other, frozenset({-1, 0}), "le")
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: object) -> bool:
         return self._compare(other, frozenset({1}), "gt")
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: object) -> bool:
         return self._compare(other, frozenset({0, 1}), "ge")
 
     def __eq__(self, other: object) -> bool:

@@ -171,7 +171,7 @@ class Sum(NumPyFunctions):
         other = as_sum(other)
         return other if other is NotImplemented else self + -other
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: object) -> Any:
         return -self + other
 
     def __mul__(self, other: Any) -> Any:
@@ -196,7 +196,7 @@ class Sum(NumPyFunctions):
             return self * (1 / constant)
         return self * other._function("inverse")
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         return as_sum(other) / self
 
     def __pow__(self, n: Any) -> Sum:
@@ -214,11 +214,11 @@ class Sum(NumPyFunctions):
     def __abs__(self) -> Sum:
         return self._function("absolute")
 
-    def minimum(self, other: Any) -> Sum:
+    def minimum(self, other: object) -> Sum:
         """Smaller one, an atom."""
         return self._function("minimum", as_sum(other))
 
-    def maximum(self, other: Any) -> Sum:
+    def maximum(self, other: object) -> Sum:
         """Larger one, an atom."""
         return self._function("maximum", as_sum(other))
 
@@ -227,7 +227,7 @@ class Sum(NumPyFunctions):
         assert name == "sinc" or FUNCTIONS[name].enclosure is not None
         return self._function(name)
 
-    def pair(self, name: str, other: Any) -> Sum:
+    def pair(self, name: str, other: object) -> Sum:
         """Return a function of two arguments, as an atom."""
         return self._function(name, as_sum(other))
 

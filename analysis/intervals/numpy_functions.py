@@ -36,7 +36,7 @@ def _function(name: str) -> Callable[[Any], Any]:
 
 
 def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
-    def method(self: Any, other: Any) -> Any:
+    def method(self: Any, other: object) -> Any:
         return self.pair(name, other)
 
     method.__doc__ = f"NumPy calls this for np.{name}(x, y)."
@@ -57,7 +57,7 @@ class NumPyFunctions:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
 
-    def pair(self, name: str, other: Any) -> Any:
+    def pair(self, name: str, other: object) -> Any:
         """Return a function of two arguments, of this and another number."""
         raise NotImplementedError
 
@@ -69,24 +69,24 @@ class NumPyFunctions:
         """Return the linear interpolation of a table."""
         raise NotImplementedError
 
-    def __mod__(self, other: Any) -> Any:
+    def __mod__(self, other: object) -> Any:
         return self.pair("remainder", other)
 
-    def __floordiv__(self, other: Any) -> Any:
+    def __floordiv__(self, other: object) -> Any:
         return (self / other).apply("floor")  # type: ignore[operator]
 
     def __rfloordiv__(self, other: Any) -> Any:
         return (other / self).apply("floor")
 
-    def __divmod__(self, other: Any) -> Any:
+    def __divmod__(self, other: object) -> Any:
         return self // other, self % other
 
-    def __rmod__(self, other: Any) -> Any:
+    def __rmod__(self, other: object) -> Any:
         if isinstance(other, str):
             return NotImplemented
         return _lifted(self, other).pair("remainder", self)
 
-    def __rpow__(self, other: Any) -> Any:
+    def __rpow__(self, other: object) -> Any:
         return _lifted(self, other) ** self
 
     def __round__(self, digits: int | None = None) -> Any:

@@ -54,7 +54,7 @@ class Slope(NumPyFunctions):
     def __sub__(self, other: Any) -> Any:
         return self + -other
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: object) -> Any:
         return -self + other
 
     def __mul__(self, other: Any) -> Any:
@@ -82,7 +82,7 @@ class Slope(NumPyFunctions):
         quotient = (self.quotient - base * other.quotient) / other.here
         return Slope(self.here / other.here, base, quotient)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         other = _as_slope(other)
         return other if other is NotImplemented else other / self
 
@@ -99,11 +99,11 @@ class Slope(NumPyFunctions):
     def __abs__(self) -> Slope:
         return self if self >= 0 else -self
 
-    def minimum(self, other: Any) -> Any:
+    def minimum(self, other: object) -> Any:
         """Smaller one, where that is decided."""
         return self if self <= other else other
 
-    def maximum(self, other: Any) -> Any:
+    def maximum(self, other: object) -> Any:
         """Larger one, where that is decided."""
         return self if self >= other else other
 
@@ -158,10 +158,10 @@ class Slope(NumPyFunctions):
         other = _as_slope(other)
         return self._agree(self.here <= other.here, self.base <= other.base)
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: object) -> bool:
         return not self <= other
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: object) -> bool:
         return not self < other
 
     def __eq__(self, other: object) -> bool:

@@ -50,10 +50,10 @@ class Rate(NumPyFunctions):
 
     __radd__ = __add__
 
-    def __sub__(self, other: Any) -> Any:
+    def __sub__(self, other: object) -> Any:
         return self + -as_rate(other)
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: object) -> Any:
         return -self + other
 
     def __mul__(self, other: Any) -> Any:
@@ -73,7 +73,7 @@ class Rate(NumPyFunctions):
         value = self.here / other.here
         return Rate(value, (self.rate - value * other.rate) / other.here)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         return as_rate(other) / self
 
     def __pow__(self, n: Any) -> Any:
@@ -145,16 +145,16 @@ class Rate(NumPyFunctions):
         with undecided():
             return getattr(self.here, compare)(other.here)
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: object) -> bool:
         return self._decided("__lt__", other)
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: object) -> bool:
         return self._decided("__le__", other)
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: object) -> bool:
         return self._decided("__gt__", other)
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: object) -> bool:
         return self._decided("__ge__", other)
 
     def __eq__(self, other: object) -> bool:

@@ -78,7 +78,7 @@ def type_question(function: Any) -> str | None:
     return None
 
 
-def _question_of(thing: Any) -> str | None:
+def _question_of(thing: object) -> str | None:
     if id(thing) in _OF_BUILTINS:
         return f"asks {_OF_BUILTINS[id(thing)]} under another name"
     if isinstance(thing, types.CodeType):
@@ -87,13 +87,13 @@ def _question_of(thing: Any) -> str | None:
     return f"uses {module}, which tells types and objects apart" if module in _MODULES else None
 
 
-def _module_of(thing: Any) -> str:
+def _module_of(thing: object) -> str:
     """Return the module of a function or class, without what is inside of it."""
     named = isinstance(thing, type | types.FunctionType | types.BuiltinFunctionType)
     return str(getattr(thing, "__module__", "")).partition(".")[0] if named else ""
 
 
-def _reached(thing: Any) -> Iterator[Any]:
+def _reached(thing: object) -> Iterator[Any]:
     """Yield the functions, and what else it reads, that a thing is made of."""
     if isinstance(thing, staticmethod | classmethod):
         yield thing.__func__
@@ -136,7 +136,7 @@ def _of_function(function: types.FunctionType) -> Iterator[Any]:
         yield from _of_object(thing, names)
 
 
-def _of_object(thing: Any, names: set[str]) -> Iterator[Any]:
+def _of_object(thing: object, names: set[str]) -> Iterator[Any]:
     """Yield what is called of an object, a class or a module: by name, or by operators."""
     if isinstance(thing, types.ModuleType) and _is_of_library(thing.__name__):
         return

@@ -85,7 +85,7 @@ class Written(NumPyFunctions):
     def __pos__(self) -> Written:
         return self
 
-    def __add__(self, other: Any) -> Any:
+    def __add__(self, other: object) -> Any:
         return self._with("+", other)
 
     __radd__ = __add__
@@ -94,18 +94,18 @@ class Written(NumPyFunctions):
         other = self.lifted(other)
         return other if other is NotImplemented else self + -other
 
-    def __rsub__(self, other: Any) -> Any:
+    def __rsub__(self, other: object) -> Any:
         return -self + other
 
-    def __mul__(self, other: Any) -> Any:
+    def __mul__(self, other: object) -> Any:
         return self._with("*", other)
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Any) -> Any:
+    def __truediv__(self, other: object) -> Any:
         return self._with("/", other)
 
-    def __rtruediv__(self, other: Any) -> Any:
+    def __rtruediv__(self, other: object) -> Any:
         other = self.lifted(other)
         return other if other is NotImplemented else other / self
 
@@ -117,11 +117,11 @@ class Written(NumPyFunctions):
     def __abs__(self) -> Written:
         return self._node("absolute", self.place)
 
-    def minimum(self, other: Any) -> Any:
+    def minimum(self, other: object) -> Any:
         """Smaller one."""
         return self._with("minimum", other)
 
-    def maximum(self, other: Any) -> Any:
+    def maximum(self, other: object) -> Any:
         """Larger one."""
         return self._with("maximum", other)
 

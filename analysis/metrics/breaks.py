@@ -5,14 +5,15 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+
+from nlctl.upstream.systems import SystemResponse
 
 __all__ = ["breaks_of", "with_breaks"]
 
 
-def breaks_of(response: Any) -> np.ndarray | None:
+def breaks_of(response: SystemResponse) -> np.ndarray | None:
     """Return the times of the events of a response, in order and each once.
 
     Parameters

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from nlctl import paper
 from nlctl.annotations import as_annotated
@@ -25,12 +24,7 @@ from nlctl.controllers import (
     sliding_mode,
 )
 from nlctl.names import unknown
-from nlctl.native import compile as compiled_loop
-from nlctl.native import ensemble_response
 from nlctl.references import BandLimitedNoise
-
-from ..metrics import tracking_metrics
-from .tuning import EvolvedGains, evolved_gains
 
 __all__ = [
     "baselines",
@@ -38,7 +32,6 @@ __all__ = [
     "part_of",
     "published_controller",
     "sensor",
-    "tuned",
 ]
 
 
@@ -49,7 +42,7 @@ class _Gains:
     Attributes
     ----------
     pid, sliding : dict
-        Found by `tuned`.
+        Found by ``campaign/baselines.py``.
     reached : float
         -N(zeta) of the paper's loop at 20 s.
     r_0 : float
@@ -146,9 +139,9 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
 def baselines(example: str) -> dict[str, Any]:
     """Return a PID and a boundary-layer sliding-mode controller for an example.
 
-    Tuned by `tuned`: the least IAE over 20 s of the nominal loop with measurement noise, for the
-    paper's max |u| in the same noise.  They know the sign of the input gain and have gains made
-    for this plant; the paper's controller has neither.
+    Tuned by ``campaign/baselines.py``: the least IAE over 20 s of the nominal loop with measurement
+    noise, for the paper's max |u| in the same noise.  They know the sign of the input gain and have
+    gains made for this plant; the paper's controller has neither.
     """
     surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
@@ -163,35 +156,6 @@ def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     return BandLimitedNoise(
         inputs=states, outputs=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
-
-
-def tuned(example: str, *, generations: int = 40, seed: int = 0) -> dict[str, EvolvedGains]:
-    """Tune the baselines of an example: where the numbers of `baselines` come from.
-
-    The least IAE with max |u| at most that of the paper's controller, both with the noise of
-    `sensor`: without noise the gains would grow without end, since nothing in the model bounds
-    them.  Nor may a run take more than 10,000 steps.
-    """
-    build, times = _build(example), np.linspace(0, 20, 2001)
-    by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
-    cost, limited = by_key["iae"], by_key["peak_u"]
-    published = compiled_loop(build(sensor=sensor(example)))
-    own = {"law.beta": np.array([part_of(published_controller(example), "law").spec.beta])}
-    row = ensemble_response(published, times, params=own, metrics=(limited,)).table.iloc[0]
-    limit = float(row[limited.key])
-    bounds = {
-        "PID": {f"controller.{k}": (0.01, 1000.0) for k in ("k_p", "k_i", "k_d")}
-        | {"controller.T_f": (0.005, 0.5)},
-        "sliding mode": {"law.K": (limit / 10, limit), "law.phi": (0.01, 1.0)},
-    }
-    found = {}
-    for label, controller in baselines(example).items():
-        loop = compiled_loop(build(controller=controller, sensor=sensor(example)))
-        found[label] = evolved_gains(
-            loop, bounds[label], times, cost,
-            limited=limited, limit=limit, generations=generations, seed=seed,
-        )  # fmt: skip
-    return found
 
 
 def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,6 @@ from .burst import Burst
 
 __all__ = [
     "SAMPLED_CONTROLLERS",
-    "actuator_errors",
     "actuator_path",
     "adaptation",
     "after_burst",
@@ -173,48 +172,4 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
         ax.set(xscale="log", yscale="log", ylim=(5e-3, 10), ylabel=f"{title}: $|y - y_d|$")
     axes[-1].set(xlabel="sampling time (ms)")
     legend_above(axes[0], shown)
-    return figure
-
-
-_DOTS = (*(colour for colour, _ in STYLES), *(colour for colour, _ in STYLES))
-_MARKERS = "osD^vP<>"  # colours repeat: the marker tells as well
-_BEYOND, _HALF = 2.3, 0.7  # log10: place of the runs that did not reach their end
-
-
-def actuator_errors(
-    record: pd.DataFrame, meets: Callable[[pd.DataFrame], np.ndarray], band: float
-) -> Figure:
-    """Largest late errors behind each actuator, a line for each and a dot for each controller.
-
-    Hollow dots violate the spec; at the right are the runs that did not reach their end.
-    """
-    figure = Figure(figsize=(6.2, 7.2), layout="constrained")
-    ax = figure.subplots()
-    set_style(ax)
-    names, labels = (list(dict.fromkeys(record[c])) for c in ("actuator", "controller"))
-    shown: dict[str, object] = {}
-    for place, label in enumerate(labels):
-        own: Any = record[record["controller"] == label]
-        colour, marker = _DOTS[place], _MARKERS[place]
-        lines = [
-            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2) for name in own["actuator"]
-        ]
-        aside = _BEYOND + 0.16 * (place - (len(labels) - 1) / 2)
-        error = own["error"].fillna(10**aside).to_numpy()
-        fill = [colour if good else "none" for good in meets(own)]
-        ax.scatter(error, lines, 18, fill, marker=marker, edgecolors=colour, linewidths=1.0)
-        shown[label] = ax.scatter([], [], 18, colour, marker=marker)
-    ax.axvline(band, color=GREY, linewidth=0.9)
-    ax.axvspan(
-        10 ** (_BEYOND - _HALF), 10 ** (_BEYOND + _HALF), color=GREY, alpha=0.12, linewidth=0
-    )
-    for line in range(1, len(names)):
-        ax.axhline(line - 0.5, color=GREY, linewidth=0.4)
-    ax.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
-    ax.grid(visible=False, axis="y")
-    ticks = [*(10.0**power for power in range(-3, 2)), 10**_BEYOND]
-    ax.set(xlim=(2e-4, 10 ** (_BEYOND + _HALF)), xlabel="largest $|y - y_d|$ for t ≥ 10 s")
-    ax.set_xticks(ticks, ["0.001", "0.01", "0.1", "1", "10", "ended\nbefore"])
-    ax.minorticks_off()
-    legend_above(figure, shown)
     return figure

@@ -13,6 +13,7 @@ import control as ct
 
 from nlctl import paper
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
+from nlctl.blocks import Spec
 from nlctl.diagrams import interconnect
 from nlctl.names import unknown
 from nlctl.sampling import sampled
@@ -80,7 +81,7 @@ def on_a_computer(
     return interconnect([paper.EXAMPLES[example](controller=program), difference])
 
 
-def _controller(example: str, controller: Any) -> Any:
+def _controller(example: str, controller: Spec) -> Any:
     """Return the controller of a label; others as they are."""
     if not isinstance(controller, str):
         return controller
@@ -91,7 +92,7 @@ def _controller(example: str, controller: Any) -> Any:
 
 
 def _loop(
-    example: str, body: Any, controller: Any, gain: float, limit: float, noise: float | None
+    example: str, body: Any, controller: Spec, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
     stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
     return paper.EXAMPLES[example](

@@ -1,74 +1,23 @@
 """The kept record of Example 2 until its gain loses the sign: minutes of computing, once.
 
-``python -m nlctl.analysis.paper.reference_run`` makes it again, from runs at two tolerances whose
-bursts must agree.
+``python campaign/burst_record.py``, in a checkout, makes it again, from runs at two tolerances
+whose bursts must agree.
 """
 
 from __future__ import annotations
 
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LOOKS, LongRun
+from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LongRun
 
-__all__ = ["AGREE", "RECORD", "agreed", "continued", "read_record", "thinned_run", "write_record"]
+__all__ = ["AGREE", "RECORD", "continued", "read_record"]
 
 RECORD = Path(__file__).with_name("example-2-burst.csv")
-TOLERANCES = (1e-6, 1e-7)  # relative; the record is of the second
 AGREE = 5.0  # s; bursts at two tolerances differ by less
-_WINDOW = 4 * np.pi  # s; period of the paper's reference: one row in each, where |e| is largest
-_ABOUT = ("loop", "horizon", "rtol", "lost", "again", "last")  # what a record says of its run
-LAST, _STEP, PER_DECADE = 100.0, 0.5, 60  # s, s; the last seconds by time left until the end
-
-
-def thinned_run(run: LongRun) -> LongRun:
-    """Return a run with fewer samples, which its figure and its `burst` and `calm` do not miss.
-
-    Kept are the largest \\|e\\| of each period, the two samples around the burst, one in half a
-    second of the last hundred, of the last second as many in each decade of time left, and those
-    at which predictions are made.
-    """
-    time, error = run.time, np.abs(run.signals["e"])
-    number = np.floor(time / _WINDOW).astype(int)
-    starts = np.flatnonzero(np.diff(number, prepend=-1))
-    ends = [*starts[1:], time.size]
-    peaks = [a + int(np.argmax(error[a:b])) for a, b in zip(starts, ends, strict=True)]
-    left = np.concatenate([np.arange(LAST, 1.0, -_STEP), np.geomspace(1.0, 1e-5, 5 * PER_DECADE)])
-    late = np.searchsorted(time, time[-1] - left)
-    cross = np.searchsorted(run.signals["zeta"], run.lobe.high) + np.array([-1, 0])
-    calm = np.searchsorted(time, run.burst - 1.0, "right") - 1
-    looks = np.searchsorted(time, list(LOOKS))
-    keep = np.unique(np.concatenate([peaks, late, cross, looks, [0, calm, time.size - 1]]))
-    keep = keep[keep < time.size]
-    signals = {name: y[keep] for name, y in run.signals.items()}
-    return replace(run, time=time[keep], signals=signals)
-
-
-def agreed(run: LongRun, other: LongRun) -> LongRun:
-    """Return a run with the burst that another one at another tolerance has."""
-    if not abs(run.burst - other.burst) < AGREE:
-        raise ValueError(
-            f"'{run.loop}' bursts at {run.burst:.1f} s at rtol {run.rtol:g} and at "
-            f"{other.burst:.1f} s at rtol {other.rtol:g}: a record needs tolerances at which these "
-            f"agree to {AGREE:g} s"
-        )
-    return replace(run, again=(other.rtol, other.burst))
-
-
-def write_record(run: LongRun, path: Path = RECORD) -> None:
-    """Write a run as CSV; the first line says what it is, in JSON."""
-    about = {
-        name: getattr(run, name) for name in ("loop", "horizon", "rtol", "lost", "again", "last")
-    }
-    rows = np.column_stack([run.time, *(run.signals[name] for name in LONG_RUN_SIGNALS)])
-    names = ",".join(["time", *LONG_RUN_SIGNALS])
-    formats = ["%.6f", *["%.7g"] * len(LONG_RUN_SIGNALS)]
-    header = f"{json.dumps(about)}\n{names}"
-    np.savetxt(path, rows, fmt=formats, delimiter=",", header=header, comments="# ")
 
 
 def read_record(beginning: LongRun, path: Path = RECORD) -> LongRun:
@@ -90,28 +39,10 @@ def continued(beginning: LongRun, record: LongRun) -> LongRun:
         raise ValueError(
             f"the record of '{record.loop}' has zeta = {before:.5f} at {end:g} s, a run of today "
             f"{beginning.signals['zeta'][-1]:.5f}: make it again with "
-            "'python -m nlctl.analysis.paper.reference_run'"
+            "'python campaign/burst_record.py', in a checkout"
         )
     later = record.time > end
     signals = {
         name: np.append(y, record.signals[name][later]) for name, y in beginning.signals.items()
     }
     return replace(record, time=np.append(beginning.time, record.time[later]), signals=signals)
-
-
-def _main() -> None:
-    """Make the record again, the two runs at the same time."""
-    from nlctl import paper
-
-    from ..lyapunov.nussbaum.long_run import long_run
-
-    with ThreadPoolExecutor(len(TOLERANCES)) as pool:
-        waiting = [pool.submit(long_run, paper.example_2(), rtol=rtol) for rtol in TOLERANCES]
-        other, run = (each.result() for each in waiting)
-    made = agreed(run, other)
-    write_record(thinned_run(made))
-    print(f"{made}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")
-
-
-if __name__ == "__main__":
-    _main()

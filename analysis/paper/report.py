@@ -23,17 +23,18 @@ from ..report.document import Report, Section
 from ..report.svg import Drawn, draw_ahead
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
+from ..robustness.runs.parquet import parquet
 from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from . import evidence as proofs
 from .cases import CASES, HORIZON
-from .limits.rivals import checked_rivals
 from .numerics import numerics
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
 from .reproduction import CaseRun, checks, run_all
 from .reproduction import compile_cases_ahead as compile_cases
+from .rival_record import checked_rivals
 from .sampling_limits import checked_record
 
 __all__ = [
@@ -133,6 +134,8 @@ def compose(
     tell: Callable[[str], object] = _untold,
 ) -> Composed:
     """Reproduce the paper, check its proof, run the studies, and compose the report of it all."""
+    if studies:
+        parquet()  # before minutes of runs
     other = _Here() if beside is None else beside
     ahead = [] if beside is None else [beside.submit(_compile_ahead, studies)]
     with _far_away(far, whole) as long_runs:

@@ -1,20 +1,20 @@
 """The paper's controller and its rivals, with gains found by one budget on the same samples.
 
 `rival_loop` is for the studies ``reports/rivals-1.toml`` and ``rivals-2.toml``, which compare the
-controllers on fresh samples behind one actuator after the other; `tuned_rivals` finds the gains.
+controllers on fresh samples behind one actuator after the other; ``campaign/rival_gains.py`` finds
+the gains.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation
+from nlctl.blocks import Spec
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
@@ -30,17 +30,21 @@ from nlctl.controllers import (
     sliding_mode,
 )
 from nlctl.names import unknown
-from nlctl.native import compile as compiled_loop
-from nlctl.native import ensemble_response
 
-from ..metrics import tracking_metrics
-from ..robustness import independent
 from . import loops
 from .controllers import part_of, published_controller
-from .tuning import EvolvedGains, evolved_gains, split_samples
 
-__all__ = ["KNOWLEDGE", "behind", "rival_actuators", "rival_controllers", "rival_loop"]
-__all__ += ["rival_searches", "tuned_rivals"]
+__all__ = [
+    "KNOWLEDGE",
+    "RIVAL_GAINS",
+    "behind",
+    "example_with",
+    "made_with",
+    "rival_actuators",
+    "rival_controller",
+    "rival_controllers",
+    "rival_loop",
+]
 
 KNOWLEDGE = {
     "paper": "states, n derivatives of the reference",
@@ -57,22 +61,6 @@ KNOWLEDGE = {
     "initial errors",
 }
 """What each controller has to know."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Rival:
-    """A controller to be tuned.
-
-    Attributes
-    ----------
-    make : callable
-        Makes it from gains by qualified name.
-    bounds : dict
-        Where each gain is searched.
-    """
-
-    make: Callable[[str, Mapping[str, float]], Any]
-    bounds: dict[str, tuple[float, float]]
 
 
 def _tuple(gains: Mapping[str, float], name: str) -> tuple[float, ...]:
@@ -141,48 +129,15 @@ def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
     return FunnelControl(order=order, rho_0=5.0, **own)
 
 
-_WIDTHS = ((0.05, 0.4), (0.3, 3.0), (1.0, 6.0))  # where the bounds at last are searched
-_DECAY = (0.3, 3.0)
-_OWN = {"example_1": "dead zone", "example_2": "backlash"}  # the actuator of the training
-
-
-def _rivals(example: str) -> dict[str, _Rival]:
-    """Return what is tuned, by label."""
-    order = _order(example)
-    adaptation = ("law.beta", "weights.Gamma", "robust.gamma")
-    return {
-        "paper, tuned": _Rival(make=_paper, bounds=dict.fromkeys(adaptation, (0.1, 50.0))),
-        "PID": _Rival(
-            make=_pid,
-            bounds={f"controller.{k}": (0.01, 1000.0) for k in ("k_p", "k_i", "k_d")}
-            | {"controller.T_f": (0.005, 0.5)},
-        ),
-        "sliding mode": _Rival(
-            make=_sliding, bounds={"law.K": (0.5, 30.0), "law.phi": (0.01, 1.0)}
-        ),
-        "super-twisting": _Rival(
-            make=_twisting,
-            bounds={"law.k_1": (0.1, 30.0), "law.k_2": (0.1, 100.0), "law.phi": (0.01, 1.0)},
-        ),
-        "dynamic surface": _Rival(
-            make=_dynamic_surface,
-            bounds={f"surface.c[{i}]": (0.1, 20.0) for i in range(order)}
-            | {f"surface.tau[{i}]": (0.005, 1.0) for i in range(order - 1)}
-            | {"weights.Gamma": (0.1, 50.0)},
-        ),
-        "prescribed performance": _Rival(
-            make=_prescribed,
-            bounds={f"controller.k[{i}]": (0.2, 20.0) for i in range(order)}
-            | {f"controller.rho_inf[{i}]": _WIDTHS[i] for i in range(order)}
-            | {"controller.decay[0]": _DECAY},
-        ),
-        "funnel": _Rival(
-            make=_funnel,
-            bounds={"controller.k": (0.2, 50.0), "controller.rho_inf": _WIDTHS[0]}
-            | {"controller.decay": _DECAY},
-        ),
-    }
-
+_MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {
+    "paper, tuned": _paper,
+    "PID": _pid,
+    "sliding mode": _sliding,
+    "super-twisting": _twisting,
+    "dynamic surface": _dynamic_surface,
+    "prescribed performance": _prescribed,
+    "funnel": _funnel,
+}
 
 RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
     "example_1": {
@@ -240,7 +195,7 @@ RIVAL_GAINS: dict[str, dict[str, dict[str, float]]] = {
         "funnel": {"controller.k": 15.8, "controller.rho_inf": 0.245, "controller.decay": 2.44},
     },
 }
-"""Gains by example and label, found by `tuned_rivals`."""
+"""Gains by example and label, found by ``campaign/rival_gains.py``."""
 
 
 def rival_controllers(example: str) -> dict[str, Any]:
@@ -256,7 +211,7 @@ def rival_controller(example: str, label: str) -> Any:
         return published_controller(example)
     if label not in gains:
         raise unknown("controller", label, ("paper", *gains))
-    return _rivals(example)[label].make(example, gains[label])
+    return made_with(example, label, gains[label])
 
 
 def _gains(example: str) -> dict[str, dict[str, float]]:
@@ -265,11 +220,9 @@ def _gains(example: str) -> dict[str, dict[str, float]]:
     return RIVAL_GAINS[example]
 
 
-def rival_searches(
-    example: str,
-) -> dict[str, tuple[dict[str, float], dict[str, tuple[float, float]]]]:
-    """Return the gains that were found and the bounds of their search, by label."""
-    return {key: (RIVAL_GAINS[example][key], r.bounds) for key, r in _rivals(example).items()}
+def made_with(example: str, label: str, gains: Mapping[str, float]) -> Any:
+    """Return one of `rival_controllers` with other gains, by qualified name."""
+    return _MAKERS[label](example, gains)
 
 
 def rival_actuators(example: str) -> dict[str, Any]:
@@ -298,41 +251,12 @@ def rival_loop(
     controller, actuators = rival_controller(example, label), rival_actuators(example)
     if actuator not in actuators:
         raise unknown("actuator", actuator, actuators)
-    return _with(example, controller, actuators[actuator], noise)
+    return example_with(example, controller, actuators[actuator], noise)
 
 
-def _with(example: str, controller: Any, actuator: Any, noise: float) -> ct.InterconnectedSystem:
+def example_with(
+    example: str, controller: Spec, actuator: Spec, noise: float = 0.0
+) -> ct.InterconnectedSystem:
+    """Return an example with a controller and an actuator."""
     make = {"example_1": loops.example_1, "example_2": loops.example_2}[example]
     return make(controller=controller, actuator=actuator, noise=noise)
-
-
-def tuned_rivals(
-    example: str, *, size: int = 4, candidates: int = 240, seed: int = 0
-) -> dict[str, EvolvedGains]:
-    """Tune every controller with the same budget on the same samples of the study's own space.
-
-    The least mean IAE over `size` samples with the example's actuator, for max |u| at most that of
-    the paper's controller as printed in the worst of these samples.
-    """
-    from ..studies import read_study, shipped
-
-    space = read_study(shipped(f"rivals-{example[-1]}")).experiment.space
-    drawn = independent(space, size, seed).table
-    samples = {str(key): column.to_numpy() for key, column in drawn.items()}
-    times = np.linspace(0, 20, 2001)
-    by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
-    cost, limited = by_key["iae"], by_key["peak_u"]
-    actuator = rival_actuators(example)[_OWN[example]]
-    start, params = split_samples(samples)
-    printed = compiled_loop(_with(example, published_controller(example), actuator, 0.0))
-    table = ensemble_response(printed, times, 0.0, start, params=params, metrics=(limited,)).table
-    found = {}
-    for label, rival in _rivals(example).items():
-        middle = {key: float(np.sqrt(low * high)) for key, (low, high) in rival.bounds.items()}
-        loop = compiled_loop(_with(example, rival.make(example, middle), actuator, 0.0))
-        found[label] = evolved_gains(
-            loop, rival.bounds, times, cost,
-            limited=limited, limit=float(table[limited.key].to_numpy().max()), samples=samples,
-            generations=max(1, round(candidates / (10 * len(rival.bounds))) - 1), seed=seed,
-        )  # fmt: skip
-    return found

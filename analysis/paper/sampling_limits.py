@@ -1,8 +1,8 @@
-"""Where the examples stop meeting their spec on a computer: a kept record, and how it is made.
+"""Where the examples stop meeting their spec on a computer: a kept record, compared with runs.
 
-``python -m nlctl.analysis.paper.sampling_limits`` makes it again, in two minutes: every controller
-of `controllers.compared_controllers` by Euler's method, over the sampling time, the delay and the
-steps of both converters.
+It has every controller of `controllers.compared_controllers` by Euler's method, over the sampling
+time, the delay and the steps of both converters; ``python campaign/sampling_runs.py``, in a
+checkout, makes it again.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
 BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|
 _STEP = 0.002  # s: sampling time where something else is varied
 _WAITING = 20  # sampling times that the longest delay takes
-_COARSE, _FINE = 13, 8  # values over the whole range, and between the last good and the first bad
+_COARSE = 13  # values over the whole range
 _LOOK = 1e-3  # s: nothing that is held is missed
 _EFFORT = 60_000  # steps of a run; one at 1 ms takes 20,000
 
@@ -97,29 +97,19 @@ def controller_program(controller: Any, *, delays: bool = False) -> Any:
     return sampled(controller, _STEP, method="euler", input_quantum=0.0, output_quantum=0.0)
 
 
-def sampling_runs(
-    example: str, label: str, wanted: Mapping[str, np.ndarray] | None = None
-) -> pd.DataFrame:
-    """Run an example with one controller on a computer."""
+def sampling_runs(example: str, label: str, wanted: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """Run an example with one controller on a computer, at some values of some quantities."""
     controller = compared_controllers(example)[label]
     loops: dict[bool, Compiled] = {}
     tables = []
     for quantity in QUANTITIES:
+        if quantity.key not in wanted:
+            continue
         delays = quantity.key == "delay"
-        if delays not in loops and (wanted is None or quantity.key in wanted):
+        if delays not in loops:
             program = controller_program(controller, delays=delays)
             loops[delays] = compiled_loop(paper.EXAMPLES[example](controller=program))
-        if wanted is None:
-            run = _runner(loops[delays], quantity)
-            table = run(quantity.values)
-            good, bad = where_it_ends(table)
-            if np.isfinite(good) and np.isfinite(bad):
-                between = np.geomspace(good, bad, _FINE + 2)[1:-1]
-                table = pd.concat([table, run(between)]).sort_values("value")
-        elif quantity.key not in wanted:
-            continue
-        else:
-            table = _runner(loops[delays], quantity)(np.asarray(wanted[quantity.key], dtype=float))
+        table = _runner(loops[delays], quantity)(np.asarray(wanted[quantity.key], dtype=float))
         tables.append(table.assign(quantity=quantity.key))
     made = pd.concat(tables, ignore_index=True).assign(example=example, controller=label)
     return made.reindex(columns=["example", "controller", "quantity", "value", "error", "peak"])
@@ -189,20 +179,5 @@ def check_lines(kept: pd.DataFrame, today: pd.DataFrame) -> None:
         raise ValueError(
             f"the record of '{line['example']}' with the controller '{line['controller']}' has "
             f"{a.ravel()} at {line['quantity']} = {line['value']:g}, a run of today {b.ravel()}: "
-            "make it again with 'python -m nlctl.analysis.paper.sampling_limits'"
+            "make it again with 'python campaign/sampling_runs.py'"
         )
-
-
-def _main() -> None:
-    """Make the record again."""
-    made = pd.concat(
-        sampling_runs(example, label)
-        for example in paper.EXAMPLES
-        for label in compared_controllers(example)
-    )
-    made.to_csv(SAMPLING_RECORD, index=False, float_format="%.6g")
-    print(spec_ends(made).to_string())
-
-
-if __name__ == "__main__":
-    _main()

@@ -130,7 +130,7 @@ def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     return found
 
 
-def _leaves(where: str, value: Any) -> dict[str, Any]:
+def _leaves(where: str, value: object) -> dict[str, Any]:
     if isinstance(value, dict):
         return {k: v for n in value for k, v in _leaves(f"{where}.{n}", value[n]).items()}
     if isinstance(value, list):
@@ -138,7 +138,7 @@ def _leaves(where: str, value: Any) -> dict[str, Any]:
     return {where: value}
 
 
-def _placeless(value: Any) -> Any:
+def _placeless(value: object) -> Any:
     """Return a cell without the folder that a command in it names: where a run is kept."""
     return FOLDER.sub(r"\1 RUN", value) if isinstance(value, str) else value
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Any
 
 from nlctl import native
+from nlctl.upstream.systems import System
 
 from .document import Equation, Item, Paragraph
 
 __all__ = ["block_items", "equations_of"]
 
 
-def equations_of(diagram: Any, blocks: Collection[str], number: str = "") -> list[Item]:
+def equations_of(diagram: System, blocks: Collection[str], number: str = "") -> list[Item]:
     """Return the equations of some blocks of a diagram, with values in the places of parameters."""
     return [
         item

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from numbers import Real
-from typing import Any
 
 import numpy as np
 
@@ -162,7 +161,7 @@ def numeric(table: Table) -> list[bool]:
     ]
 
 
-def _cell(value: Any, is_status: bool) -> TableCell:
+def _cell(value: object, is_status: bool) -> TableCell:
     text = _shown(value)
     if is_status:
         return TableCell(text=text, badge=light(text))
@@ -179,13 +178,13 @@ def is_short(text: str) -> bool:
     return len(text) <= _SHORT
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """Return a cell's text: numbers with the digits that a reader can use."""
     text = f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)
     return "" if value is None else _NOT_FINITE.get(text, text)
 
 
-def sort_key(value: Any) -> str:
+def sort_key(value: object) -> str:
     """Return the number that a cell holds, also in %, as a browser reads it; empty without one."""
     if isinstance(value, bool | np.bool_):
         return ""

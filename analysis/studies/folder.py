@@ -28,7 +28,8 @@ from nlctl.host.files import replace_file
 from nlctl.wording import counted
 
 from ..robustness import Design, Space
-from ..robustness.runs.store import opened, read_parquet
+from ..robustness.runs.parquet import read_parquet
+from ..robustness.runs.store import opened
 from ..robustness.runs.sweep import Sweep, load
 from .build import labels, main_design
 from .code.record import study_digest

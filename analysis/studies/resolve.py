@@ -112,7 +112,7 @@ def _from_module(name: str) -> Any:
         raise ParameterError(f"there is no module '{name}' ({error})") from None
 
 
-def option(value: Any, folder: Path) -> Any:
+def option(value: object, folder: Path) -> Any:
     """Make what a table of the file describes; numbers and texts stay what they are."""
     if isinstance(value, list):
         return tuple(option(part, folder) for part in value)

@@ -17,6 +17,7 @@ from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
 from ..robustness import Design, Prepared, evaluate, nominal, prepare
+from ..robustness.runs.parquet import parquet
 from ..robustness.runs.progress import Progress
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
@@ -148,6 +149,7 @@ def run(
     ('The claim is shown.', 'The claim is shown.')
     """
     folder = Path(folder)
+    parquet()  # before hours of runs
     with locked(folder, RunFolderError):
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)

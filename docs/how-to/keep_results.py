@@ -3,6 +3,7 @@ Keep results
 ============
 
 Give ``sweep`` a folder: every finished chunk is kept there, as Parquet, and an interrupted sweep resumes.
+That takes ``pip install "nlctl[studies]"``.
 """
 
 import tempfile

@@ -18,6 +18,7 @@ from ..blocks import Block, within
 from ..errors import AmbiguousNameError, ParameterError
 from ..names import Parameters, base_name, unknown
 from ..params import declared_params
+from ..upstream.systems import System
 from .places import leaves
 from .reads import may_read, texts_of
 from .third_party import Named, declared_keys, is_third_party
@@ -41,7 +42,7 @@ class Divided:
     alone: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
-def divided(system: Any, params: Mapping[str, Any] | None) -> Divided:
+def divided(system: System, params: Mapping[str, Any] | None) -> Divided:
     """Divide a user's overrides."""
     found = Divided()
     if not params:
@@ -103,7 +104,7 @@ class _Law:
             raise unknown("parameter", name, names, f"of block '{path}'")
         return block, key + name[len(base) :]
 
-    def check(self, name: str, value: Any) -> None:
+    def check(self, name: str, value: object) -> None:
         """Refuse text, or nothing, for a number of a third-party block."""
         if not isinstance(value, str | bytes | None):
             return

@@ -45,7 +45,7 @@ def as_system(thing: Any, name: str) -> ct.InputOutputSystem:
     return block(thing, name)
 
 
-def _check_not_compiled(thing: Any, name: str) -> None:
+def _check_not_compiled(thing: object, name: str) -> None:
     if isinstance(thing, StandIn):
         raise DiagramError(
             f"'{name}' is compiled already: connect its diagram, .system, and compile the whole"

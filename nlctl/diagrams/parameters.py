@@ -14,6 +14,7 @@ from ..blocks import Block, parameter_rows, sampling_of, within
 from ..names import Parameters
 from ..params import ParameterRow, declared_params, record_rows
 from ..upstream.control_internals import StandIn, current_parameters, set_parameters
+from ..upstream.systems import System
 from .addresses import divided
 from .places import known_system, leaves
 from .third_party import apart, declared_keys, is_third_party, set_key
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def check_read(system: Any, params: Mapping[str, Any] | None) -> None:
+def check_read(system: System, params: Mapping[str, Any] | None) -> None:
     """Refuse parameters that nothing in a diagram reads.
 
     Parameters
@@ -73,7 +74,7 @@ def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
     return found.given
 
 
-def overridden(system: Any, params: Mapping[str, Any] | None = None) -> Any:
+def overridden(system: System, params: Mapping[str, Any] | None = None) -> Any:
     """Return a copy of a system whose equations have a user's overrides; the system stays as it is.
 
     Parameters
@@ -172,7 +173,7 @@ def samplings(system: Any) -> list[tuple[Any, Any]]:
 
 
 @as_annotated
-def parameters(system: Any) -> pd.DataFrame:
+def parameters(system: System) -> pd.DataFrame:
     """Return all parameters of a diagram, block or record as a table.
 
     Parameters

@@ -16,6 +16,7 @@ from ..names import Parameters, find_name
 from ..params import as_numbers
 from ..supplied import Supplied
 from ..upstream.control_internals import StandIn
+from ..upstream.systems import System
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +49,7 @@ class Place:
 
 
 def places(
-    system: Any, parent: Place | None = None, position: int = 0, offset: int = 0
+    system: System, parent: Place | None = None, position: int = 0, offset: int = 0
 ) -> Iterator[Place]:
     """Yield a system's place and then, in the order of the state vector, those of its parts.
 
@@ -149,7 +150,7 @@ def _a(noun: str) -> str:
     return f"an {noun}" if noun[0] in "AEIOU" else f"a {noun}"
 
 
-def known_system(who: str, system: Any) -> Any:
+def known_system(who: str, system: System) -> Any:
     """Return a block or diagram; of a compiled diagram that which was compiled.
 
     Parameters
@@ -175,7 +176,7 @@ def known_system(who: str, system: Any) -> Any:
     return inner
 
 
-def not_a_system(who: str, thing: Any) -> str:
+def not_a_system(who: str, thing: object) -> str:
     """Return the sentence that refuses what is neither a block nor a diagram.
 
     Parameters

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..upstream.control_internals import rates_and_outputs_now
+from ..upstream.systems import System
 from .parameters import overridden
 
 SAME_FUNCTIONS = 1e-10
@@ -33,7 +34,7 @@ PointValues = tuple[np.ndarray, ...]  # rates, outputs, and more where there are
 PointFunction = Callable[[float, np.ndarray, np.ndarray], PointValues]
 
 
-def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
+def values_now(system: System, point: Point) -> tuple[np.ndarray, np.ndarray]:
     """Return rates and outputs at a point, with the parameters that a system has now."""
     if isinstance(system, ct.StateSpace):  # connected linear systems have one matrix for all
         rates, outputs = system.dynamics(*point), system.output(*point)
@@ -42,7 +43,7 @@ def values_now(system: Any, point: Point) -> tuple[np.ndarray, np.ndarray]:
     return np.reshape(rates, -1).astype(float), np.reshape(outputs, -1).astype(float)
 
 
-def rates_and_outputs(system: Any, params: Mapping[str, Any] | None = None) -> PointFunction:
+def rates_and_outputs(system: System, params: Mapping[str, Any] | None = None) -> PointFunction:
     """Return what computes python-control's rates and outputs, with parameters of its own."""
     own = overridden(system, params)
     return lambda t, x, u: values_now(own, (t, x, u))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..upstream.control_internals import current_parameters
+from ..upstream.systems import System
 from .third_party import declared_keys
 
 _MOST = 2000  # objects that are looked at
@@ -39,7 +40,7 @@ def texts_of(function: Any) -> frozenset[str]:
     return frozenset(found)
 
 
-def _reached(thing: Any) -> Iterator[Any]:
+def _reached(thing: object) -> Iterator[Any]:
     """Yield what one thing leads to."""
     if isinstance(thing, CodeType):
         yield from thing.co_consts
@@ -80,7 +81,7 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(const)
 
 
-def _is_users(thing: Any) -> bool:
+def _is_users(thing: object) -> bool:
     """Whether a thing may be an object of somebody's own class, which has attributes."""
     if isinstance(thing, type) or not hasattr(thing, "__dict__"):
         return False
@@ -95,20 +96,20 @@ class _Watched(dict):  # type: ignore[type-arg]
         self.asked: set[Any] = set()
         self.every = False
 
-    def __getitem__(self, key: Any) -> Any:
+    def __getitem__(self, key: object) -> Any:
         self.asked.add(key)
         return super().__getitem__(key)
 
-    def get(self, key: Any, default: Any = None) -> Any:
+    def get(self, key: object, default: Any = None) -> Any:
         """Return a value, and note the key."""
         self.asked.add(key)
         return super().get(key, default)
 
-    def __contains__(self, key: Any) -> bool:
+    def __contains__(self, key: object) -> bool:
         self.asked.add(key)
         return super().__contains__(key)
 
-    def pop(self, key: Any, *default: Any) -> Any:  # type: ignore[override]
+    def pop(self, key: object, *default: Any) -> Any:  # type: ignore[override]
         """Take a value out, and note the key."""
         self.asked.add(key)
         return super().pop(key, *default)
@@ -146,7 +147,7 @@ class _Watched(dict):  # type: ignore[type-arg]
         return dict(other) | dict(super().items())
 
 
-def _reads(function: Any, block: Any, key: str) -> bool:
+def _reads(function: Any, block: System, key: str) -> bool:
     """Whether a function asks for a name that is not in its code, where it is called."""
     called = False
     for value in _VALUES:

@@ -28,10 +28,11 @@ from ..upstream.control_internals import (
     set_parameters,
     takes_a_dict,
 )
+from ..upstream.systems import System
 from .places import leaves
 
 
-def is_third_party(system: Any) -> bool:
+def is_third_party(system: System) -> bool:
     """Whether a block has functions of others, which read their parameters from a dict."""
     linear = isinstance(system, ct.StateSpace | ct.InterconnectedSystem)
     is_nonlinear = isinstance(system, ct.NonlinearIOSystem) and not linear
@@ -101,7 +102,7 @@ class Overridden(_TakesADict):
         return found
 
 
-def set_key(values: dict[str, Any], name: str, value: Any) -> None:
+def set_key(values: dict[str, Any], name: str, value: object) -> None:
     """Set a parameter, or an element of one, in a dict."""
     base = base_name(name)
     if base == name or name in values or base not in values:
@@ -199,7 +200,7 @@ class Apart:
     system: Any
     pairs: dict[int, tuple[Any, Any]]
 
-    def of(self, thing: Any) -> Any:
+    def of(self, thing: object) -> Any:
         """Return the copy of a block or diagram; anything else as it is."""
         return self.pairs.get(id(thing), (thing, thing))[1]
 
@@ -225,7 +226,7 @@ class Apart:
         new.params.scope = self.of(params.scope)
 
 
-def apart(system: Any) -> Apart:
+def apart(system: System) -> Apart:
     """Return a copy of a diagram, with copies of its blocks.
 
     Parameters

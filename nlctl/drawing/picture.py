@@ -19,6 +19,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 
 from ..annotations import as_annotated
 from ..blocks import Block
+from ..upstream.systems import System
 from ..wording import counted
 from .figure import Drawing
 from .records import (
@@ -115,13 +116,13 @@ def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], 
     return blocks, tuple(edges)
 
 
-def _block(system: Any, name: str) -> _Block:
+def _block(system: System, name: str) -> _Block:
     nested = isinstance(system, ct.InterconnectedSystem)
     signals = tuple(system.input_labels), tuple(system.output_labels)
     return _Block(name, _kind(system), nested, *signals)
 
 
-def _kind(system: Any) -> str:
+def _kind(system: System) -> str:
     """What a block is, in a word; a static sum or gain as its formula."""
     if isinstance(system, ct.InterconnectedSystem):
         return counted(len(system.syslist), "block")

@@ -87,7 +87,7 @@ def _bring_up(np: Any, rows: list[list[Any]], i: int, exchanges: list[Any] | Non
             exchanges.append(larger)
 
 
-def _is_zero(value: Any) -> bool:
+def _is_zero(value: object) -> bool:
     """Whether an entry is known to be 0."""
     known = getattr(value, "only", None)
     return known is not None and known.op == "const" and known.data == 0.0

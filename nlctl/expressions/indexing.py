@@ -35,7 +35,7 @@ def _each(self: Tracer, places: Tracer) -> Tracer:
     return traced(self.graph, found).reshape(places.shape + self.shape[1:])
 
 
-def _settled(key: Any) -> Any:
+def _settled(key: object) -> Any:
     """Return an index with numbers for what is known."""
     if isinstance(key, MaskedPlaces):
         return _settled(key.mask)
@@ -54,11 +54,11 @@ def _settled(key: Any) -> Any:
     return key
 
 
-def _is_mask(key: Any) -> bool:
+def _is_mask(key: object) -> bool:
     return isinstance(key, Tracer) and {e.kind for e in key.values.flat} == {"b"}
 
 
-def _open_place(key: Any) -> int | None:
+def _open_place(key: object) -> int | None:
     """Return which part of an index is an integer that the state decides."""
     keys = key if isinstance(key, tuple) else (key,)
     for i, k in enumerate(keys):
@@ -69,7 +69,7 @@ def _open_place(key: Any) -> int | None:
     return None
 
 
-def _with(key: Any, place: int, index: int) -> Any:
+def _with(key: object, place: int, index: int) -> Any:
     """Return an index with a number in one place."""
     if not isinstance(key, tuple):
         return index
@@ -97,7 +97,7 @@ def guard(graph: Graph, chosen: Tracer, name: str, bound: float, known: float) -
         graph.guards.append(elementwise(graph, name, chosen, bound).only)
 
 
-def _gathered(self: Tracer, key: Any, place: int) -> Any:
+def _gathered(self: Tracer, key: object, place: int) -> Any:
     chosen, places = _candidates(self, key, place)
     found = _item(self, _with(key, place, places[-1]))
     for k in reversed(places[:-1]):
@@ -106,7 +106,7 @@ def _gathered(self: Tracer, key: Any, place: int) -> Any:
     return found
 
 
-def _scattered(self: Tracer, key: Any, place: int, value: Any) -> None:
+def _scattered(self: Tracer, key: object, place: int, value: object) -> None:
     chosen, places = _candidates(self, key, place)
     for k in places:
         here = elementwise(self.graph, "eq", chosen, k)
@@ -185,7 +185,7 @@ def _check_kinds(self: Tracer, value: Tracer) -> None:
         raise Untraceable("assignment to an array of integers or truth values")
 
 
-def _assign_to_part(self: Tracer, key: Any, value: Tracer) -> None:
+def _assign_to_part(self: Tracer, key: object, value: Tracer) -> None:
     assert self.origin is not None
     _ = self.cells  # is it still what the whole has there?
     (along,) = full_index(key, self.ndim) if self.ndim == 1 else (None,)

@@ -40,7 +40,7 @@ class Masked(Special):
             wholes.append(each)
         return Masked(elementwise(graph, name, *wholes), self.mask)
 
-    def filled(self, value: Any) -> Tracer:
+    def filled(self, value: object) -> Tracer:
         """Return the whole array with a value in the places that do not count."""
         return elementwise(self.whole.graph, "select", self.mask, self.whole, value)
 

@@ -158,7 +158,7 @@ def _hash(self: Tracer) -> int:
     return hash(_integer(self))
 
 
-def _floor_division(self: Tracer, other: Any) -> Any:
+def _floor_division(self: Tracer, other: object) -> Any:
     if _is_integer(self) and self.only.value is not None and isinstance(other, int):
         return operator.floordiv(_integer(self), other)
     return floor_quotient(self.graph, self, other)
@@ -182,7 +182,7 @@ def floor_quotient(graph: Graph, a: Any, b: Any) -> Tracer:
     return op("select", op("eq", b, 0.0), op("div", a, b), whole)
 
 
-def _is_integer(value: Any) -> bool:
+def _is_integer(value: object) -> bool:
     return isinstance(value, Tracer) and value.size == 1 and value.only.kind == "i"
 
 
@@ -203,7 +203,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
-    def method(self: Tracer, other: Any) -> Any:
+    def method(self: Tracer, other: object) -> Any:
         if not isinstance(other, Tracer | np.ndarray | float | int | bool | complex | np.generic):
             if name in ("eq", "ne"):
                 raise Untraceable("comparison with what is not a number")  # Python would say False
@@ -214,7 +214,7 @@ def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
 
 
 def _in_place(name: str) -> Callable[[Any, Any], Any]:
-    def method(self: Tracer, other: Any) -> Any:
+    def method(self: Tracer, other: object) -> Any:
         result = elementwise(self.graph, name, self, other)
         if not self.shape:
             return result  # a number is not changed but replaced

@@ -82,7 +82,7 @@ class Stage:
                 cell.cell_contents = self.instead(given.cell_contents)
         return self._copies[id(function)][1]
 
-    def called_object(self, thing: Any) -> Any:
+    def called_object(self, thing: object) -> Any:
         """Return what calls a method, a `functools.partial`, or an object."""
         if isinstance(thing, MethodType):
             if is_of_a_library(thing.__func__):
@@ -133,7 +133,7 @@ class Stage:
             return self._library("", value)
         return self._instead_of_object(value)
 
-    def _is_known(self, value: Any) -> bool:
+    def _is_known(self, value: object) -> bool:
         module = getattr(value, "__module__", None) or ""
         foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
         if foreign or module.startswith(("scipy.special", "scipy.linalg", "scipy.integrate")):
@@ -157,7 +157,7 @@ class Stage:
             return value  # they use operators, as what they are given has them
         return self.for_numbers(value)
 
-    def _instead_of_object(self, value: Any) -> Any:
+    def _instead_of_object(self, value: object) -> Any:
         if isinstance(value, functools.partial | MethodType):
             return self.called_object(value)
         if isinstance(value, CPUDispatcher | FunctionType):
@@ -301,7 +301,7 @@ class Stage:
                     type.__setattr__(made, name, self._member(value))
         return self.classes[cls]
 
-    def _member(self, value: Any) -> Any:
+    def _member(self, value: object) -> Any:
         if isinstance(value, FunctionType):
             return self.copied(value)
         if isinstance(value, staticmethod | classmethod):
@@ -323,7 +323,7 @@ def _in_python(real: Any) -> FunctionType | None:
     return function if unwrapped else None
 
 
-def _has_code(value: Any) -> bool:
+def _has_code(value: object) -> bool:
     return isinstance(value, FunctionType | staticmethod | classmethod | property)
 
 

@@ -36,10 +36,10 @@ class OnStage(Protocol):
     def copied(self, function: Any) -> Any:
         """Return a copy of a function whose global names and closure lead to the stage."""
 
-    def called_object(self, thing: Any) -> Any:
+    def called_object(self, thing: object) -> Any:
         """Return what calls a method, a `functools.partial`, or an object."""
 
-    def instead(self, value: Any) -> Any:
+    def instead(self, value: object) -> Any:
         """Return what stands for a value that was there before."""
 
     def for_numbers(self, real: Callable[..., Any]) -> Callable[..., Any]:
@@ -47,7 +47,7 @@ class OnStage(Protocol):
         ...
 
 
-def holds_tracers(value: Any) -> bool:
+def holds_tracers(value: object) -> bool:
     """Whether there are tracers in a value, or in a list, tuple or dict."""
     if isinstance(value, dict):
         return any(map(holds_tracers, value.values()))
@@ -67,7 +67,7 @@ def settled(value: Any) -> Any:
     )
 
 
-def is_of_a_library(thing: Any) -> bool:
+def is_of_a_library(thing: object) -> bool:
     """Whether a function, or an object's class, is one of a well-known library."""
     module = getattr(thing, "__module__", None) or type(thing).__module__
     return module.partition(".")[0] in LIBRARIES
@@ -133,7 +133,7 @@ class StagedObject:
             return stage.for_numbers(getattr(real, name))
         return stage.instead(getattr(real, name))
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    def __setattr__(self, name: str, value: object) -> None:
         raise Untraceable("a function that changes an object")
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
@@ -186,7 +186,7 @@ class StagedParent:
                 return self._bound(vars(cls)[name])
         raise AttributeError(name)
 
-    def _bound(self, found: Any) -> Any:
+    def _bound(self, found: object) -> Any:
         thing, stage = self.__dict__["_thing"], self.__dict__["_stage"]
         if isinstance(found, FunctionType):
             return functools.partial(stage.copied(found), thing)
@@ -220,7 +220,7 @@ class Ufunc:
             return _base(self.graph, arguments[0]) ** arguments[1]
         return elementwise(self.graph, name, *arguments)
 
-    def reduce(self, values: Any, axis: Any = 0, **options: Any) -> Any:
+    def reduce(self, values: Any, axis: object = 0, **options: Any) -> Any:
         """Return what is left of an array when two elements become one."""
         if not holds_tracers(values):
             return self.plain_method("reduce", values, axis, **options)
@@ -234,7 +234,7 @@ class Ufunc:
         """Return what a method of NumPy's makes of constants."""
         return getattr(self.real, name)(*map(settled, values), **options)
 
-    def accumulate(self, values: Any, axis: Any = 0) -> Any:
+    def accumulate(self, values: Any, axis: object = 0) -> Any:
         """Return all that is left on the way."""
         if not holds_tracers(values):
             return self.plain_method("accumulate", values, axis)
@@ -254,6 +254,6 @@ class Ufunc:
         return getattr(self.real, name)
 
 
-def _base(graph: Graph, value: Any) -> Any:
+def _base(graph: Graph, value: object) -> Any:
 
     return value if isinstance(value, Special) else traced(graph, value)

@@ -121,7 +121,7 @@ def _guarded(graph: Graph, result: Tracer) -> Tracer:
     return result
 
 
-def _flat(graph: Graph, value: Any) -> Tracer:
+def _flat(graph: Graph, value: object) -> Tracer:
     """Return a function's result, an array, tuple, list or number, in one dimension."""
     if isinstance(value, tuple | list):
         return concatenated(graph, [traced(graph, v).reshape(-1) for v in value])

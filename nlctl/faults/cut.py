@@ -16,6 +16,7 @@ from ..blocks import block, memory_states
 from ..diagrams import known_system, places, reconnected
 from ..errors import DiagramError, ParameterError, UnknownNameError
 from ..names import find_name, unknown
+from ..upstream.systems import System
 from .fault import Fault
 
 __all__ = ["signal_names", "with_faults"]
@@ -53,7 +54,7 @@ class _Cut:
 
 
 @as_annotated
-def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
+def with_faults(diagram: System, *faults: Fault) -> ct.InterconnectedSystem:
     """Return a diagram with faults on its signals; the one that was given stays as it is.
 
     Each signal is cut and goes through a block, whose parameters are addressed like all others:
@@ -113,7 +114,7 @@ def with_faults(diagram: Any, *faults: Fault) -> ct.InterconnectedSystem:
     return _rebuilt(system, "", cuts)
 
 
-def signal_names(diagram: Any) -> list[str]:
+def signal_names(diagram: System) -> list[str]:
     """Return the names of all signals that a fault can be on.
 
     External inputs first, then outputs and inputs of all blocks and nested diagrams.
@@ -159,7 +160,7 @@ def _identifier(text: str) -> str:
     return "".join(c if c.isalnum() else "_" for c in text)
 
 
-def _placed(system: Any, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
+def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
     """Find the signal of a fault, and that of its condition."""
     spot = _found(spots, fault.signal)
     if fault.condition is None:
@@ -190,7 +191,7 @@ def _found(spots: Mapping[str, Spot], name: str) -> Spot:
     raise unknown("signal", name, spots)
 
 
-def _rebuilt(system: Any, path: str, cuts: Sequence[_Cut]) -> Any:
+def _rebuilt(system: System, path: str, cuts: Sequence[_Cut]) -> Any:
     """Return a copy of a diagram with the faults that lie in it, blocks copied as well."""
     if not isinstance(system, ct.InterconnectedSystem):
         return copy.copy(system)

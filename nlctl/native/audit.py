@@ -94,7 +94,7 @@ class Trial:
     relays: Mapping[int, float] = field(default_factory=dict)
     apart: Apart | None = None
 
-    def of(self, thing: Any) -> Any:
+    def of(self, thing: object) -> Any:
         """Return what stands for a block in the diagram that is evaluated."""
         return thing if self.apart is None else self.apart.of(thing)
 

@@ -20,6 +20,7 @@ from ..names import unknown
 from ..responses.arguments import checked_params
 from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system
+from ..upstream.systems import System
 from ..wording import counted
 from .describe import called, described
 from .diagram.checks import check_sizes
@@ -296,7 +297,7 @@ class Compiled(Reading, StandIn):
 
 @as_annotated
 def compile(  # noqa: A001 (what it does)
-    system: Any,
+    system: System,
     *,
     params: Mapping[str, Any] | None = None,
     algebraic_loops: Literal["error", "solve"] = "error",

@@ -14,6 +14,7 @@ import numpy as np
 from ..blocks import equation_now, supplied_of
 from ..sliding.relay import SLIDING
 from ..upstream.control_internals import parts_now
+from ..upstream.systems import System
 from ..wording import numbered
 from .diagram.nodes import Node
 from .diagram.program import Program, count_guards, count_switching_functions, memory
@@ -57,7 +58,7 @@ def declared_labels(schedule: Schedule) -> tuple[list[str], list[str]]:
 
 
 def declared_now(
-    schedule: Schedule, system: Any, point: tuple[Any, Any, Any]
+    schedule: Schedule, system: System, point: tuple[Any, Any, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return switching functions, watched ones, guards and commits, and what resets return."""
     t, x, u = point

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import control as ct
 import numpy as np
 
 from ..blocks import Block
+from ..upstream.systems import System
 from ..wording import counted
 from .diagram.nodes import Node
 from .diagram.parameters import Slot
@@ -82,7 +82,7 @@ def _conditions(reading: Reading) -> Iterator[str]:
         yield "none known of functions that are called as they stand: steps may pass over theirs"
 
 
-def _timebase(system: Any) -> str:
+def _timebase(system: System) -> str:
     if ct.isctime(system):
         return "continuous time"
     return "discrete time" if system.dt is True else f"discrete time, dt = {system.dt:g} s"

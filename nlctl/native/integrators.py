@@ -65,7 +65,7 @@ def _integrators() -> dict[str, Callable[..., None]]:
     }
 
 
-def _callable(address: int, arguments: Any, owner: Any) -> Callable[..., None]:
+def _callable(address: int, arguments: Any, owner: object) -> Callable[..., None]:
     """Return a function of addresses, records and integers."""
     kinds = [ctypes.c_void_p if isinstance(a, type(TASK)) else ctypes.c_ssize_t for a in arguments]
     call = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 2, *kinds)(address)

@@ -31,6 +31,7 @@ from ..params import as_numbers, declared_params, equation_arguments, with_overr
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
+from ..upstream.systems import System
 from ..wording import counted
 from .codegen.solver import searched
 from .diagram.nodes import Node
@@ -174,7 +175,7 @@ def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
     return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
 
 
-def _inputs(system: Any, u0: Any) -> np.ndarray:
+def _inputs(system: System, u0: Any) -> np.ndarray:
     count = system.ninputs or 0
     u = as_numbers(0.0 if u0 is None else u0)
     if u is not None:

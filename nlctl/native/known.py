@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import CompileError, UsageError
 from ..reference.known import Known
 from ..responses.watched import Watched
+from ..upstream.systems import System
 from . import compiled as engine
 from .compiled import Compiled, with_watched
 from .diagram.schedule import AlgebraicLoopError
@@ -22,7 +23,7 @@ from .timed.ahead import ahead
 
 
 def known_conditions(
-    system: Any, params: Any, times: np.ndarray, watched: tuple[Watched, ...] = ()
+    system: System, params: Any, times: np.ndarray, watched: tuple[Watched, ...] = ()
 ) -> Known:
     """Return what is known of the conditions of a diagram; nothing where it cannot be read."""
     if not ct.isctime(system):

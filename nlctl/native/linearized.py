@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 
 from ..annotations import as_annotated
+from ..upstream.systems import System
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
 
 __all__ = ["linearize"]
@@ -15,7 +16,7 @@ __all__ = ["linearize"]
 
 @as_annotated
 def linearize(
-    system: Any,
+    system: System,
     x0: Any,
     u0: Any = None,
     t: float = 0.0,

@@ -192,7 +192,7 @@ def _member_state(system: Any, number: int, row: np.ndarray) -> np.ndarray:
         raise ParameterError(f"{error} (member {number})") from None
 
 
-def _finite(name: str, value: Any) -> np.ndarray:
+def _finite(name: str, value: object) -> np.ndarray:
     """Return the initial values of a state."""
     array = as_numbers(value)
     if array is None or array.ndim > 1:

@@ -110,7 +110,7 @@ def _are_same(then: list[Any], now: list[Any]) -> bool:
     return len(then) == len(now) and all(map(operator.is_, then, now))
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     """Return a value in one line."""
     text = " ".join(repr(value).split())
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -25,6 +25,7 @@ from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
 from ..sliding.relay import SLIDING
+from ..upstream.systems import System
 from .diagram.feedthrough import feedthrough
 from .diagram.nodes import Node
 from .diagram.parameters import Slot, slots_of
@@ -74,7 +75,7 @@ class BlockEquations:
 
 @as_annotated
 def typeset(
-    system: Any, *, values: bool = False, params: Mapping[str, Any] | None = None
+    system: System, *, values: bool = False, params: Mapping[str, Any] | None = None
 ) -> tuple[BlockEquations, ...]:
     """Return the equations of a block or diagram as LaTeX, block by block.
 
@@ -147,7 +148,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     )
 
 
-def _outputs(reader: Reader, system: Any) -> Tracer:
+def _outputs(reader: Reader, system: System) -> Tracer:
     """Return the outputs; of an ideal relay with letters for a and b of its input's rate."""
     if supplied_of(system) is SLIDING:
         return reader.relay_output(0, leaf_vector(reader.graph, "u", 0, (1 + len(_RATE),)))
@@ -221,7 +222,7 @@ def _vector(names: list[str], at: int) -> tuple[Callable[[str], str], int]:
     return (lambda index: f"{found[1]}_{{{found[2]}{index}}}"), int(found[3])
 
 
-def _symbols(system: Any, slots: Mapping[str, Slot]) -> Callable[[str, Index], str]:
+def _symbols(system: System, slots: Mapping[str, Slot]) -> Callable[[str, Index], str]:
     """Return what names a place in one of the arrays that a block reads."""
     inputs = [*system.input_labels, *(_RATE if supplied_of(system) is SLIDING else ())]
     labels = {"x": _names(system.state_labels), "u": _names(inputs)}

@@ -14,6 +14,7 @@ from ..errors import DivergedError
 from ..sampling.system import happening
 from ..supplied import supplying
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
+from ..upstream.systems import System
 from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
 from .jumps import Jumps
 from .past import Past
@@ -75,7 +76,7 @@ class Driver:
     """
 
     def __init__(
-        self, system: Any, inputs: Any, wanted: Any, *, stops: Stops, jumps: Jumps, known: Past,
+        self, system: System, inputs: Any, wanted: Any, *, stops: Stops, jumps: Jumps, known: Past,
         method: Any, settings: Any, progress: Any = None,
     ) -> None:  # fmt: skip
         self.system, self.inputs, self.wanted = system, inputs, wanted

@@ -26,6 +26,7 @@ from ..responses.time_response import Response, as_response, response_of
 from ..sampling.system import happening
 from ..sliding.relay import SLIDING
 from ..upstream.control_internals import rates_now
+from ..upstream.systems import System
 from .driver import Driver
 from .jumps import Jumps
 from .known import Known
@@ -46,7 +47,7 @@ _JACOBIAN = ("jac", "jac_sparsity", "lband", "uband")
 
 def python_control_response(
     run: RunArguments, known: Callable[..., Known] | None = None
-) -> ct.TimeResponseData:
+) -> Response:
     """Run a diagram in python-control's equations.
 
     In discrete time, and where functions do not declare their sizes, by
@@ -176,7 +177,7 @@ def _by_python_control(run: RunArguments, inputs: Any, x0: Any, wanted: Any, how
     return as_response(found, run.system)
 
 
-def _overflows(system: Any, t: float, x: Any, u: np.ndarray) -> bool:
+def _overflows(system: System, t: float, x: Any, u: np.ndarray) -> bool:
     """Whether the right-hand side leaves the finite numbers at the start already."""
     try:
         with np.errstate(over="raise", invalid="raise"), happening():
@@ -188,7 +189,7 @@ def _overflows(system: Any, t: float, x: Any, u: np.ndarray) -> bool:
     return False
 
 
-def _diverged(system: Any, time: float) -> DivergedError:
+def _diverged(system: System, time: float) -> DivergedError:
     return DivergedError(
         f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
         "simulate up to then to see how",

@@ -211,6 +211,6 @@ def interpolated(inputs: np.ndarray, times: np.ndarray, wanted: np.ndarray) -> n
     return np.array(rows).reshape(len(inputs), wanted.size)
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     text = repr(value)
     return text if len(text) < 60 else f"{text[:56]} ..."

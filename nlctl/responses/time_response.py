@@ -68,6 +68,17 @@ class Response(ct.TimeResponseData):
             found.signal_labels = StateLabels(found.signal_labels, self.state_names)
         return found
 
+    if TYPE_CHECKING:  # python-control's own are partly unknown
+
+        @property
+        def time(self) -> np.ndarray: ...
+        @property
+        def outputs(self) -> np.ndarray: ...
+        @property
+        def states(self) -> np.ndarray: ...
+        @property
+        def inputs(self) -> np.ndarray: ...
+
     @property
     def events(self) -> pd.DataFrame:
         """What has happened in the run: time (s), block, which, direction; a row each.

@@ -12,13 +12,14 @@ from ..blocks import Block, memory_states, sampling_of
 from ..diagrams import leaves, not_a_system
 from ..errors import ParameterError
 from ..upstream.control_internals import is_system
+from ..upstream.systems import System
 from .rebuilt import rebuilt
 
 _METHODS = ("euler", "tustin", "zoh")
 
 
 @as_annotated
-def discretise(system: Any, dt: float, method: str = "euler") -> Any:
+def discretise(system: System, dt: float, method: str = "euler") -> Any:
     """Make a block or diagram in discrete time of one in continuous time.
 
     Parameters

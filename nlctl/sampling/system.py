@@ -25,6 +25,7 @@ from ..upstream.control_internals import (
     rates_now,
     set_parameters,
 )
+from ..upstream.systems import System
 from .clock import Clock, Moment
 from .discretised import discretise, with_equations
 from .parameters import Sampling
@@ -388,7 +389,7 @@ def _refuse_guards(system: Any) -> None:
             )
 
 
-def _sampled(system: Any, spec: Sampling, euler: bool) -> Any:
+def _sampled(system: System, spec: Sampling, euler: bool) -> Any:
     """Return a system whose blocks are sampled."""
     before = "input_quantum" if spec.converts_inputs else ""
     behind = "output_quantum" if spec.converts_outputs else ""
@@ -424,7 +425,7 @@ def _through(
     return Sampled(inner, sampling, delays=delays, converters=("", quantum))
 
 
-def _own_time(system: Any, dt: float | None, euler: bool) -> float:
+def _own_time(system: System, dt: float | None, euler: bool) -> float:
     """Return the sampling time that a system has of its own, 0 if it has none."""
     own = system.dt if isinstance(system.dt, int | float) and system.dt is not True else None
     untold = system.dt is None and not isinstance(system, Block)  # of a record nlctl knows

@@ -17,6 +17,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .systems import System
+
 RESOLVED = ("_current_params",)
 """Attributes that a run writes into a system."""
 
@@ -62,7 +64,7 @@ def rates_and_outputs_now(
 
 
 def parts_now(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray
+    system: System, t: float, x: np.ndarray, u: np.ndarray
 ) -> Iterator[tuple[Any, np.ndarray, np.ndarray]]:
     """Yield the blocks of a diagram, nested ones flattened, with their states and inputs."""
     if not isinstance(system, ct.InterconnectedSystem):
@@ -168,7 +170,7 @@ class StandIn(ct.InputOutputSystem):
         return outputs_now(self.system, t, x, u)
 
 
-def is_system(thing: Any) -> bool:
+def is_system(thing: object) -> bool:
     """Whether a thing is a system itself, and does not stand for one."""
     return isinstance(thing, ct.InputOutputSystem) and not isinstance(thing, StandIn)
 

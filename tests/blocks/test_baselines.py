@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tuning import evolved_gains
 
 import nlctl
 from nlctl.analysis.lyapunov import certify
@@ -12,7 +13,6 @@ from nlctl.analysis.lyapunov.nussbaum.forecast import BurstForecast
 from nlctl.analysis.metrics import Metric, absolute_integral, final, peak
 from nlctl.analysis.paper import loops
 from nlctl.analysis.paper.controllers import baselines, compared_controllers, sensor
-from nlctl.analysis.paper.tuning import evolved_gains
 from nlctl.params import equation_arguments
 
 numbers = st.floats(-50, 50)

@@ -100,6 +100,11 @@ def other_values(spec, name):
             yield new
 
 
+def test_every_block_is_a_name_of_nlctl():
+    """`nlctl/__init__.pyi` lists it, for editors, the reference of the site and its examples."""
+    assert [name for name in block_records() if name not in nlctl.__all__] == []
+
+
 def test_the_contract_covers_the_blocks_that_exist():
     """The walk through the modules finds blocks of every kind."""
     assert {"Genesio", "DeadZone", "SumOfSines", "NussbaumLaw", *NEEDED} <= set(PRESENT)

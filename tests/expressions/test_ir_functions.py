@@ -1,6 +1,7 @@
 """Functions written as LLVM IR against decimal arithmetic, and others against NumPy."""
 
 import ctypes
+import dataclasses
 import functools
 import math
 from decimal import Decimal, getcontext, localcontext
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nlctl.errors import CompileError
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.expressions.graph import numpy_function
 from nlctl.native.codegen.ir import functions as ir
@@ -291,3 +293,13 @@ def test_constants_are_sums_of_floats():
         (ir.HALF_PI, pi() / 2, 48), (ir.PI, pi(), 48), (ir.LN2, Decimal(2).ln(), 32),
     ):  # fmt: skip
         assert abs(sum(map(Decimal, parts)) - exact) < Decimal(10) ** -digits
+
+
+def test_every_row_of_the_table_has_machine_code(monkeypatch):
+    """One that has none says where it belongs, when it is first compiled."""
+    own = [name for name, row in FUNCTIONS.items() if row.code == "own"]
+    assert [name for name in own if name not in ir.INLINE | ir.CALLED] == []
+    row = dataclasses.replace(FUNCTIONS["exp"], name="exp10")
+    monkeypatch.setitem(FUNCTIONS, "exp10", row)
+    with pytest.raises(CompileError, match=r"row of 'exp10'.*INLINE or CALLED"):
+        ir.applied(Body(Module(inlined=True)), "exp10")

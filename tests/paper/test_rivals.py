@@ -7,28 +7,28 @@ import numpy as np
 import pandas as pd
 import pytest
 from places import ROOT
+from rival_gains import search_bounds
+from rival_runs import rival_rows, rivals_text
+from tuning import evolved_gains
 
 import nlctl
 from nlctl.analysis.metrics import Metric, absolute_integral, peak
-from nlctl.analysis.paper.limits.rivals import (
+from nlctl.analysis.paper.page.rivals import rivals_section
+from nlctl.analysis.paper.rival_record import (
     RIVAL_ACTUATORS,
     RIVALS_RECORD,
     beaten_by,
     checked_rivals,
-    rival_rows,
     rivals_study,
-    rivals_text,
 )
-from nlctl.analysis.paper.page.rivals import rivals_section
 from nlctl.analysis.paper.rivals import (
     KNOWLEDGE,
+    RIVAL_GAINS,
     behind,
     rival_actuators,
     rival_controllers,
     rival_loop,
-    rival_searches,
 )
-from nlctl.analysis.paper.tuning import evolved_gains
 from nlctl.analysis.report.document import Table
 from nlctl.analysis.studies import read_study, run, shipped
 
@@ -40,7 +40,9 @@ def test_every_controller_has_gains_from_its_search_and_says_what_it_knows(examp
     """None is compared with gains from elsewhere."""
     labels = list(rival_controllers(example))
     assert labels == list(KNOWLEDGE)
-    for gains, bounds in rival_searches(example).values():
+    assert set(search_bounds(example)) == set(RIVAL_GAINS[example])
+    for label, bounds in search_bounds(example).items():
+        gains = RIVAL_GAINS[example][label]
         assert set(gains) == set(bounds)
         assert all(low <= gains[key] <= high for key, (low, high) in bounds.items())
     for label, row in _knowledge_of_the_page().items():
@@ -60,7 +62,7 @@ def _knowledge_of_the_page():
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_gains_reach_the_loop(example):
     """The override that was searched is the parameter of the controller that is compared."""
-    for label, (gains, _) in rival_searches(example).items():
+    for label, gains in RIVAL_GAINS[example].items():
         known = nlctl.parameters(rival_loop(example, f"{label} / ideal"))["value"]
         for key, value in gains.items():
             base, _, index = key.partition("[")
@@ -167,7 +169,7 @@ def test_a_record_of_another_study_or_loop_is_refused(tmp_path, column):
     record.to_csv(tmp_path / "record.csv", index=False)
     with pytest.raises(
         ValueError,
-        match=rf"example_2' is of another {kind}.*python -m nlctl\.analysis\.paper\.limits\.r",
+        match=rf"example_2' is of another {kind}.*python campaign/rival_runs\.py",
     ):
         checked_rivals(tmp_path / "record.csv")
 

@@ -53,9 +53,7 @@ def test_a_record_of_other_equations_is_refused(tmp_path):
     record = pd.read_csv(SAMPLING_RECORD)
     record["error"] *= 1.01
     record.to_csv(tmp_path / "record.csv", index=False)
-    with pytest.raises(
-        ValueError, match=r"example_1.*python -m nlctl\.analysis\.paper\.sampling_limits"
-    ):
+    with pytest.raises(ValueError, match=r"example_1.*python campaign/sampling_runs\.py"):
         checked_record(tmp_path / "record.csv")
 
 

@@ -39,7 +39,9 @@ def told(path):
 def texts():
     """All that is read by others than the interpreter."""
     places = [
-        p for package in ("nlctl", "analysis", "benchmarks") for p in (ROOT / package).rglob("*.py")
+        p
+        for package in ("nlctl", "analysis", "benchmarks", "campaign")
+        for p in (ROOT / package).rglob("*.py")
     ]
     places += [*(ROOT / "analysis").rglob("*.html"), *(ROOT / "docs").rglob("*.md")]
     places += [ROOT / "README.md", ROOT / "ARCHITECTURE.md"]  # CONTRIBUTING.md lists bad words
@@ -80,7 +82,8 @@ def test_there_is_text_to_look_at(everything):
 def test_no_file_has_both_sides_of_a_merge():
     """`git` leaves marks where two changes meet, and pages are read by nobody but readers."""
     marks = tuple(mark * 7 + " " for mark in "<>")
-    homes = [ROOT, *(ROOT / name for name in ("nlctl", "analysis", "tests", "docs", "benchmarks"))]
+    names = ("nlctl", "analysis", "tests", "docs", "benchmarks", "campaign")
+    homes = [ROOT, *(ROOT / name for name in names)]
     kinds = (".md", ".py", ".toml", ".rst", ".js", ".css", ".jinja", ".html", ".csv")
     paths = [p for home in homes for p in (home.glob if home == ROOT else home.rglob)("*")]
     texts = [p for p in paths if p.suffix in kinds and p.is_file()]

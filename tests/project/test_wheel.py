@@ -1,10 +1,11 @@
-"""What a user installs: the wheel, in a fresh environment, from an empty folder."""
+"""What a user installs: the wheel, in a fresh environment, from an empty folder; and the sdist."""
 
 import os
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -25,13 +26,13 @@ def run(*command, cwd):
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """The wheel built from a copy of the sources, which stay as they are."""
+    """The wheel, by way of the sdist, built from a copy of the sources, which stay as they are."""
     needed("build", "dev")
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     ignored = shutil.ignore_patterns(".git", ".venv*", "__pycache__", ".*_cache", "*.egg-info")
     shutil.copytree(ROOT, source, ignore=ignored)
-    run(sys.executable, "-m", "build", "--wheel", "--outdir", str(folder), str(source), cwd=folder)
+    run(sys.executable, "-m", "build", "--outdir", str(folder), str(source), cwd=folder)
     (made,) = folder.glob("*.whl")
     return made
 
@@ -71,6 +72,25 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
     assert {name for name in names if name.startswith("nlctl/analysis/")} >= {
         f"nlctl/{name}" for name in sources
     }
+
+
+def test_the_sdist_runs_its_own_tests(wheel, tmp_path):
+    """All of them are collected there, and those of a release pass; the README's links lead on."""
+    (sdist,) = wheel.parent.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (folder,) = tmp_path.iterdir()
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "COV_"))}
+    environment["PYTHONPATH"] = str(folder)
+    for what in (
+        ["--collect-only"],
+        ["tests/project/test_release.py", "tests/project/test_docs.py"],
+    ):
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *what]
+        told = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600
+        )
+        assert told.returncode == 0, told.stdout[-2000:]
 
 
 def fresh_environment(folder, *what):

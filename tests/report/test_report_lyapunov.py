@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from burst_record import agreed, thinned_run, write_record
 from drawn import hidden
 from rows import each_row
 from test_report import made_up_runs, outline
@@ -28,11 +29,8 @@ from nlctl.analysis.paper.page.proof import LONG_RUN, evidence, lyapunov_section
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.paper.reference_run import (
     AGREE,
-    agreed,
     continued,
     read_record,
-    thinned_run,
-    write_record,
 )
 from nlctl.analysis.report import (
     Figure,

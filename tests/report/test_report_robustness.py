@@ -21,7 +21,6 @@ from studies_example import LOOP
 from nlctl.analysis import figures as figures
 from nlctl.analysis.cli.study_report import report_study
 from nlctl.analysis.figures.labels import plain
-from nlctl.analysis.figures.runs import upper_envelope
 from nlctl.analysis.pages.study.claims import claims, refusal, verdict
 from nlctl.analysis.pages.study.histories import histories
 from nlctl.analysis.pages.study.report import study_part, study_report, study_sections

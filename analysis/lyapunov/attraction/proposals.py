@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov
 
+from ..convex import at_least, at_most, minimizer, symmetric_basis
 from .motion import StateRates
 
 __all__ = ["fitted", "from_linear_part"]
@@ -33,9 +34,7 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
 
     Shapes: `at` (n,), `P` (n, n).
     """
-    import cvxpy as cp
-
-    n, rng = len(P), np.random.default_rng(0)
+    n, rng, basis = len(P), np.random.default_rng(0), symmetric_basis(len(P))
     root = np.linalg.inv(np.linalg.cholesky(P / level)).T  # maps the unit ball onto the set
     directions = rng.standard_normal((_SAMPLES, n))
     unit = directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -45,16 +44,15 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
         z = factor * unit @ root.T
         rates = motion.at(at + z)
         known = np.all(np.isfinite(rates), axis=1)
-        X = cp.Variable((n, n), symmetric=True)
-        weights = np.einsum("ki,kj->kij", z[known], rates[known]).reshape(-1, n * n)
         square = np.sum(z[known] ** 2, axis=1)
-        falls = 2 * weights @ cp.reshape(X, (n * n,), order="C") <= -_RATE * square
-        limits = [X >> np.eye(n), A.T @ X + X @ A << -_RATE * np.eye(n), falls]
-        problem = cp.Problem(cp.Minimize(cp.trace(root.T @ X @ root)), limits)
-        try:
-            problem.solve(solver=cp.CLARABEL)
-        except cp.SolverError:
+        falls = [2 * np.einsum("ki,ij,kj->k", z[known], E, rates[known]) for E in basis]
+        limits = [
+            at_least(basis, np.eye(n)),
+            at_least([-(A.T @ E + E @ A) for E in basis], _RATE * np.eye(n)),
+            at_most(np.column_stack(falls), -_RATE * square),
+        ]
+        size = np.array([np.trace(root.T @ E @ root) for E in basis])
+        x, _ = minimizer(np.zeros((len(basis), len(basis))), size, limits)
+        if x is None:
             return
-        if X.value is None or problem.status not in ("optimal", "optimal_inaccurate"):
-            return
-        yield 0.5 * (X.value + X.value.T)
+        yield np.tensordot(x, np.array(basis), 1)

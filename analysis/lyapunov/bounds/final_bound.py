@@ -1,6 +1,6 @@
 """The final bound of the proof: V(0), (31), (34)-(36), as formulas of the controller's gains.
 
-Each formula is written once and serves floats, balls and cvxpy expressions alike.
+Each formula is written once and serves floats, balls and polynomials alike.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from nlctl.annotations import as_annotated
 from nlctl.controllers import AdaptiveWeights
@@ -20,6 +21,7 @@ from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
 
 from ...intervals.branch_and_bound import Box, Range, enclose
+from ..convex import at_most, minimizer
 from .final_bound import Gains, alpha_0, alpha_1, initial_V
 from .sector import plant_terms
 
@@ -139,7 +141,7 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     """Return the weights that make the final bound C_0 of (36) smallest, for Q = 0.
 
     The convex programme  min alpha_0/alpha_1 + V(0)  over W and eps* with
-    delta* = delta_rest + eps* and |g - W^T psi| <= eps* on the grid (cvxpy, Clarabel).
+    delta* = delta_rest + eps* and |g - W^T psi| <= eps* on the grid (Clarabel).
 
     Parameters
     ----------
@@ -158,12 +160,13 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     Raises
     ------
     ParameterError
-        If the solver finds no solution.
+        If the solver finds no solution, or the network has not as many nodes as W_hat(0).
 
     Examples
     --------
     A larger sigma_1 makes weights dear: they become smaller than those that approximate best.
 
+    >>> import dataclasses
     >>> import numpy as np
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import read_parts, tightest_weights
@@ -171,24 +174,44 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
     >>> x = np.linspace(0, 1, 11)[:, None]
     >>> network = Network(psi=np.ones((11, 1)), g=x[:, 0] ** 2, points=x)
     >>> gains = read_parts(nlctl.paper.example_1()).gains
+    >>> gains = dataclasses.replace(gains, W_hat_0=(0.0,))
     >>> W = tightest_weights(network, gains, delta_rest=0.0)
     >>> bool(0.0 < W[0] <= 0.5)
     True
     """
-    import cvxpy as cp
-
-    W, eps = cp.Variable(network.psi.shape[1]), cp.Variable(nonneg=True)
-    delta, rate = delta_rest + eps, alpha_1(gains)
-    cost = alpha_0(gains, delta, cp.sum_squares(W))
-    if rate > 0:  # otherwise C_0 is infinite for every W, and alpha_0 is what W can make small
-        cost = cost / rate + initial_V(gains, delta, cp.sum_squares(W - np.array(gains.W_hat_0)))
-    programme = cp.Problem(cp.Minimize(cost), [cp.abs(network.g - network.psi @ W) <= eps])
-    programme.solve(solver=cp.CLARABEL)
-    if W.value is None:
+    nodes = network.psi.shape[1]
+    if len(gains.W_hat_0) != nodes:
         raise ParameterError(
-            f"tightest_weights found no weights: the solver says {programme.status}"
+            f"tightest_weights needs as many nodes in the network as in W_hat(0), got {nodes} and "
+            f"{len(gains.W_hat_0)}: take the basis of the controller"
         )
-    return np.array(W.value)
+    P, q = _cost_of_weights(gains, delta_rest)
+    error = -np.ones((len(network.g), 1))
+    limits = [
+        at_most(np.hstack([network.psi, error]), network.g),
+        at_most(np.hstack([-network.psi, error]), -network.g),
+    ]
+    x, status = minimizer(P, q, limits)
+    if x is None:
+        raise ParameterError(f"tightest_weights found no weights: the solver says {status}")
+    return x[:-1]
+
+
+def _cost_of_weights(gains: Gains, delta_rest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*).
+
+    The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
+    """
+    one = Polynomial([0.0, 1.0])
+    by_eps, by_W = alpha_0(gains, delta_rest + one, 0.0), alpha_0(gains, 0.0, one)
+    by_W_error, rate = Polynomial([0.0]), alpha_1(gains)
+    if rate > 0:  # otherwise C_0 is infinite for every W, and alpha_0 is what W can make small
+        by_eps = by_eps / rate + initial_V(gains, delta_rest + one, 0.0)
+        by_W, by_W_error = by_W / rate, initial_V(gains, 0.0, one)
+    of_W, of_W_error = by_W.deriv()(0.0), by_W_error.deriv()(0.0)
+    start = np.array(gains.W_hat_0)
+    P = np.diag(np.append(np.full(start.size, 2 * (of_W + of_W_error)), by_eps.deriv(2)(0.0)))
+    return P, np.append(-2 * of_W_error * start, by_eps.deriv()(0.0))
 
 
 @as_annotated

@@ -60,7 +60,7 @@ def paper_report(
             *closing_sections(runs, numerics),
         ],
         command="nlctl report",
-        provenance=versions("python-flint", "cvxpy", "cma"),
+        provenance=versions("python-flint", "clarabel", "cma"),
         numbers={key: dict(run.metrics) for key, run in runs.items()},
         methods=text.METHODS_TEXT,
         references=text.REFERENCES,

@@ -8,7 +8,7 @@ import pandas as pd
 
 from ...report.document import Paragraph, Section, Table
 from .. import TAIL
-from ..limits.rivals import RIVAL_ACTUATORS, beaten_by, failed_text
+from ..rival_record import RIVAL_ACTUATORS, beaten_by, failed_text
 from ..rivals import KNOWLEDGE
 
 __all__ = ["rivals_section"]
@@ -41,8 +41,8 @@ def rivals_section(record: pd.DataFrame) -> Section:
             Paragraph(
                 text="These are medians of a kept record. The studies behind it, with all pairs, "
                 "differences and intervals, are run by nlctl run reports/rivals-1.toml and "
-                "reports/rivals-2.toml; the command that makes the record again:",
-                code="python -m nlctl.analysis.paper.limits.rivals",
+                "reports/rivals-2.toml; the command that makes the record again, in a checkout:",
+                code="python campaign/rival_runs.py",
             ),
         ],
     )

@@ -38,7 +38,7 @@ def sampling_section(record: pd.DataFrame) -> Section:
             Paragraph(
                 text="These are runs of a kept record, 13 to 21 for each entry of the table; two "
                 "of them are run again for this page and agree to 1e-3. The command that makes all "
-                "of them again: python -m nlctl.analysis.paper.sampling_limits"
+                "of them again, in a checkout: python campaign/sampling_runs.py"
             ),
         ],
     )

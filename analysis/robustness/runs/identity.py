@@ -167,7 +167,7 @@ def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[st
     ]
 
 
-def _same(one: Any, other: Any) -> bool:
+def _same(one: object, other: object) -> bool:
     """Whether two values of JSON are equal; NaN equals NaN, here and inside of lists."""
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))

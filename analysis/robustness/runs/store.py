@@ -17,12 +17,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from nlctl.arguments import integer
@@ -32,6 +30,10 @@ from nlctl.wording import some_of
 
 from .experiment import Columns, typed
 from .identity import differences_of
+from .parquet import parquet
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
@@ -43,7 +45,6 @@ __all__ = [
     "locked",
     "opened",
     "put",
-    "read_parquet",
     "stored",
     "table_of",
     "taken_up",
@@ -127,6 +128,7 @@ def _text(path: Path) -> str:
 @contextmanager
 def claimed(store: ChunkStore, *, resume: bool = False) -> Iterator[None]:
     """Hold a folder for this process alone, with the study's identity in it."""
+    parquet()
     with locked(store.folder):
         _identify(store, resume)
         yield
@@ -156,6 +158,7 @@ def _identify(store: ChunkStore, resume: bool) -> None:
 
 def opened(folder: str | os.PathLike[str]) -> ChunkStore:
     """Return the store that a folder holds."""
+    parquet()
     path = Path(folder) / "study.json"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -181,16 +184,6 @@ def _key(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def read_parquet(path: Path) -> pd.DataFrame:
-    """Read a table that `DataFrame.to_parquet` has written, without threads.
-
-    Those of pyarrow's datasets, which `read_table` begins, wait for ever where memory is too short
-    to begin others.
-    """
-    with pq.ParquetFile(path) as file:
-        return file.read(use_threads=False).to_pandas(use_threads=False)
-
-
 def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
     """Write a file of a store in one step, and return when it is on the disk."""
 
@@ -212,13 +205,16 @@ def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:
 
 def put(store: ChunkStore, frame: pd.DataFrame) -> None:
     """Write consecutive rows as one chunk; floats keep their bits."""
+    import pyarrow as pa
+
     columns = {"row": frame.index.to_numpy()} | {name: frame[name].array for name in frame}
     arrays = {name: pa.array(v, from_pandas=False) for name, v in columns.items()}  # NaN, not null
     labels: Any = [name for name, kind in store.columns.items() if not isinstance(kind, str)]
     seals = {name: _seal(frame[name]) for name in store.columns}
     table = pa.table(arrays).replace_schema_metadata({SEALS: json.dumps(seals)})
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", use_dictionary=labels, write_page_checksum=True)
+    kept = {"compression": "zstd", "use_dictionary": labels, "write_page_checksum": True}
+    parquet().write_table(table, sink, **kept)
     numbers = range(frame.index[0], frame.index[-1] + 1)
     _write(store, _path(store, numbers), memoryview(sink.getvalue()))
 
@@ -232,7 +228,7 @@ def _seal(column: Any) -> str:
 
 def _check_seals(path: Path, frame: pd.DataFrame) -> None:
     """Refuse rows that are not what was written into a file."""
-    seals = json.loads((pq.read_schema(path).metadata or {}).get(SEALS, b"{}"))
+    seals = json.loads((parquet().read_schema(path).metadata or {}).get(SEALS, b"{}"))
     changed = [name for name in frame if seals.get(name) != _seal(frame[name])]
     if changed:
         raise ValueError(f"'{path.name}' is not as it was written: '{changed[0]}' was edited")
@@ -305,6 +301,8 @@ def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.Data
 def _read(
     store: ChunkStore, paths: Sequence[Path], columns: Sequence[str] | None = None
 ) -> pd.DataFrame:
+    import pyarrow as pa
+
     chosen = {name: store.columns[name] for name in columns or store.columns}
     if not paths:
         return typed(
@@ -315,14 +313,14 @@ def _read(
     frame = pa.concat_tables(tables).to_pandas(use_threads=False).set_index("row")
     frame, end = typed(frame, chosen), 0
     for path in paths:
-        first, end = end, end + pq.read_metadata(path).num_rows
+        first, end = end, end + parquet().read_metadata(path).num_rows
         _check_seals(path, frame.iloc[first:end])
     return frame
 
 
 def _columns_in(path: Path, names: Sequence[str]) -> pa.Table:
     """Read some columns of a chunk's file, without threads."""
-    with pq.ParquetFile(path, page_checksum_verification=True) as file:
+    with parquet().ParquetFile(path, page_checksum_verification=True) as file:
         lacking = [name for name in names if name not in file.schema_arrow.names]
         if lacking:
             raise ValueError(f"'{path.name}' has no column '{lacking[0]}'")

@@ -224,7 +224,7 @@ def named_in(study: Study) -> Iterator[tuple[KeyPath, str]]:
         yield from _inside(asked.model_dump(), ("analysis", i))
 
 
-def _inside(value: Any, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
+def _inside(value: object, place: KeyPath) -> Iterator[tuple[KeyPath, str]]:
     if isinstance(value, Mapping):
         if isinstance(value.get("function"), str):
             yield place, value["function"]
@@ -386,7 +386,7 @@ def _outermost(annotation: str) -> str:
     return annotation.strip().partition("[")[0].rpartition(".")[2]
 
 
-def _uses_makers(thing: Any, seen: set[int]) -> bool:
+def _uses_makers(thing: object, seen: set[int]) -> bool:
     """Whether a function, or what it reaches, reads something of control or nlctl."""
     thing = _plain(thing)
     if isinstance(thing, ModuleType):

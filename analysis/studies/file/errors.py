@@ -199,7 +199,7 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
     return found
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Return a value as it stands in the file; not an integer of thousands of digits."""
     if isinstance(value, int) and abs(value) > _LARGEST:
         return f"an integer of {value.bit_length()} bits"

@@ -71,7 +71,7 @@ class Rule(Strict):
     until: Number | None = Field(None, description="Where windows end (s); the end of the run.")
 
 
-def _rule(value: Any) -> Any:
+def _rule(value: object) -> Any:
     return {"formula": value} if isinstance(value, str) else value
 
 

@@ -57,7 +57,7 @@ def read_toml(text: str) -> dict[str, Any]:
     return data
 
 
-def _check_printable(value: Any, place: str) -> None:
+def _check_printable(value: object, place: str) -> None:
     """Refuse control characters, which a terminal would obey."""
     if isinstance(value, dict):
         for key, part in value.items():

@@ -47,7 +47,7 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
         )
 
 
-def _marked(value: Any, middle: Any) -> str:
+def _marked(value: object, middle: Any) -> str:
     shown = value if isinstance(value, str) else f"{value:.6g}"
     return shown if value == middle else f"{shown} *"
 

@@ -31,7 +31,7 @@ def result_table(table: pd.DataFrame, caption: str, columns: Mapping[str, str]) 
     )
 
 
-def _cell(value: Any) -> Any:
+def _cell(value: object) -> Any:
     return f"{value:.4g}" if isinstance(value, float) else value
 
 

@@ -12,10 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 from nlctl.wording import counted
 
+from ...robustness.runs.parquet import parquet
 from ..file.schema import keyed
 from ..result import Result
 from ..sealed import RunFolderError, file_digest, write_json
@@ -77,7 +76,7 @@ def _rows(folder: Path, files: Iterable[Path]) -> dict[str, int]:
     for path in files:
         if path.parent.name == "chunks" and path.suffix == ".parquet":
             part = path.relative_to(folder).parts[0]
-            found[part] = found.get(part, 0) + pq.read_metadata(path).num_rows
+            found[part] = found.get(part, 0) + parquet().read_metadata(path).num_rows
     return found
 
 
@@ -86,7 +85,7 @@ def _tables(folder: Path, files: Iterable[Path]) -> dict[str, Any]:
     found = {}
     for path in files:
         if path.suffix == ".parquet":
-            kept = pq.read_metadata(path)
+            kept = parquet().read_metadata(path)
             columns = kept.schema.to_arrow_schema().names
             found[path.relative_to(folder).as_posix()] = {
                 "rows": kept.num_rows,
@@ -118,6 +117,7 @@ def sealed_record(folder: Path) -> dict[str, Any]:
 
 def problems_in(folder: Path, content: dict[str, Any]) -> Iterator[str]:
     """Yield what is not as the record says, one sentence each."""
+    parquet()
     files = content["files"]
     yield from (f"'{folder / n}' is missing in its record" for n in _AT_TOP if n not in files)
     sound = []

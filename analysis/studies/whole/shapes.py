@@ -24,7 +24,7 @@ __all__ = ["ContentsFile", "FindingFile", "ResultsFile", "RunFile", "shaped"]
 _Shape = TypeVar("_Shape", bound=BaseModel)
 
 
-def _as_text(value: Any) -> Any:
+def _as_text(value: object) -> Any:
     return str(value) if isinstance(value, float) else value  # "nan" is read as a number
 
 

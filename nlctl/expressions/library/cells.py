@@ -67,7 +67,7 @@ for _name in ("sqrt", "exp", "log", "sin", "cos", "tan", "arctan", "floor", "cei
 _Cell.__hash__ = None  # type: ignore[assignment]
 
 
-def unrolled(value: Any) -> Any:
+def unrolled(value: object) -> Any:
     """Return a value with arrays of objects for arrays of expressions."""
     if isinstance(value, Special):
         raise Untraceable(f"{type(value).__name__} in the place of an array")
@@ -80,7 +80,7 @@ def unrolled(value: Any) -> Any:
     return value
 
 
-def rolled(graph: Graph, value: Any) -> Any:
+def rolled(graph: Graph, value: object) -> Any:
     """Return what a function of NumPy has made of `unrolled` values as arrays of expressions."""
     if isinstance(value, _Cell):
         return scalar(graph, value.expr)
@@ -94,7 +94,7 @@ def rolled(graph: Graph, value: Any) -> Any:
     return Tracer(graph, as_array(_of_one_kind(graph, as_array(cells))))
 
 
-def _expression(graph: Graph, value: Any) -> Expr:
+def _expression(graph: Graph, value: object) -> Expr:
     if isinstance(value, _Cell):
         return value.expr
     if not isinstance(value, bool | int | float | np.bool_ | np.integer | np.floating):

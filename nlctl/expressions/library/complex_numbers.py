@@ -57,7 +57,7 @@ class ComplexPair(Special):
 
     conj = conjugate
 
-    def sum(self, axis: Any = None) -> ComplexPair:
+    def sum(self, axis: object = None) -> ComplexPair:
         """Return the sum."""
         return self.linear(lambda part: total(part, axis))
 
@@ -69,10 +69,10 @@ class ComplexPair(Special):
     def __len__(self) -> int:
         return len(self.real)
 
-    def __getitem__(self, key: Any) -> ComplexPair:
+    def __getitem__(self, key: object) -> ComplexPair:
         return self.linear(lambda part: part[key])
 
-    def __setitem__(self, key: Any, value: Any) -> None:
+    def __setitem__(self, key: object, value: object) -> None:
         value = paired(self.graph, value)
         self.real[key], self.imag[key] = value.real, value.imag
 
@@ -98,14 +98,14 @@ def np_broadcast(graph: Graph, real: Any, imag: Any) -> tuple[Tracer, Tracer]:
     return a, b
 
 
-def holds_complex(value: Any) -> bool:
+def holds_complex(value: object) -> bool:
     """Whether there are complex numbers in a value, or in a list or tuple."""
     if isinstance(value, list | tuple):
         return any(map(holds_complex, value))
     return isinstance(value, ComplexPair) or arrays.is_complex(value)
 
 
-def paired(graph: Graph, value: Any) -> ComplexPair:
+def paired(graph: Graph, value: object) -> ComplexPair:
     """Return numbers, arrays and lists as complex numbers."""
     if isinstance(value, ComplexPair):
         return value

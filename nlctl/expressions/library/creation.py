@@ -16,13 +16,13 @@ from .table import ARRAY_METHODS, is_traced, of
 __all__: list[str] = []
 
 
-def only_floats(dtype: Any) -> None:
+def only_floats(dtype: object) -> None:
     """Refuse arrays of anything but floats."""
     if dtype not in (None, float, np.float64, "float", "float64", "f8", "d"):
         raise Untraceable(f"arrays of {dtype}")
 
 
-def holds_traced(value: Any) -> bool:
+def holds_traced(value: object) -> bool:
     """Whether there are expressions in a value, or in a list or tuple."""
     if isinstance(value, list | tuple):
         return any(map(holds_traced, value))
@@ -30,7 +30,7 @@ def holds_traced(value: Any) -> bool:
 
 
 @of(np.zeros, np.empty, makes=True)
-def _zeros(graph: Graph, shape: Any, dtype: Any = float) -> Any:
+def _zeros(graph: Graph, shape: Any, dtype: object = float) -> Any:
     """Return an array of zeros."""
     if dtype in (complex, np.complex128):
         return ComplexPair(graph, full(graph, shape, 0.0), full(graph, shape, 0.0))
@@ -41,7 +41,7 @@ def _zeros(graph: Graph, shape: Any, dtype: Any = float) -> Any:
 
 
 @of(np.ones, makes=True)
-def ones(graph: Graph, shape: Any, dtype: Any = float) -> Any:
+def ones(graph: Graph, shape: Any, dtype: object = float) -> Any:
     """Return an array of ones."""
     if dtype in (int, bool):
         return np.ones(shape, dtype)
@@ -73,13 +73,13 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
 
 
 @of(np.ones_like, makes=True)
-def ones_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
+def ones_like(graph: Graph, array: Any, dtype: object = None) -> Any:
     """Return ones in an array's shape."""
     return elementwise(graph, "add", zeros_like(graph, array, dtype), 1.0)
 
 
 @of(np.full_like, makes=True)
-def full_like(graph: Graph, array: Any, value: Any, dtype: Any = None) -> Any:
+def full_like(graph: Graph, array: Any, value: object, dtype: object = None) -> Any:
     """Return equal elements in an array's shape."""
     return elementwise(graph, "add", zeros_like(graph, array, dtype), value)
 
@@ -113,7 +113,7 @@ def _of_floats(graph: Graph, array: Tracer) -> Tracer:
 
 
 @of(np.asarray, np.asanyarray, np.ascontiguousarray, np.asarray_chkfinite, makes=True)
-def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
+def asarray(graph: Graph, values: Any, dtype: object = None) -> Any:
     """Return an array as it is, anything else as an array."""
     if isinstance(values, ComplexPair):
         return values
@@ -127,7 +127,7 @@ def asarray(graph: Graph, values: Any, dtype: Any = None) -> Any:
 
 
 @of(np.fromiter, makes=True)
-def fromiter(graph: Graph, values: Any, dtype: Any, count: int = -1) -> Any:
+def fromiter(graph: Graph, values: Any, dtype: object, count: int = -1) -> Any:
     """Return what an iterator yields as an array."""
     return array(graph, list(values), dtype)
 
@@ -146,7 +146,7 @@ def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> 
 
 
 @of(np.identity, makes=True)
-def _identity(graph: Graph, n: int, dtype: Any = float) -> Any:
+def _identity(graph: Graph, n: int, dtype: object = float) -> Any:
     """Return the unit matrix."""
     return eye(graph, n, dtype=dtype)
 
@@ -165,7 +165,7 @@ def linspace(graph: Graph, start: Any, stop: Any, num: int = 50, endpoint: bool 
     return found
 
 
-def as_type(graph: Graph, values: Tracer, dtype: Any, copy: bool = True) -> Tracer:
+def as_type(graph: Graph, values: Tracer, dtype: object, copy: bool = True) -> Tracer:
     """Return an array's elements in another type."""
     if dtype in (bool, np.bool_):
         return elementwise(graph, "ne", values, 0.0)
@@ -198,7 +198,7 @@ class Joined:
     def __init__(self, graph: Graph, real: Any) -> None:
         self.graph, self.real = graph, real
 
-    def __getitem__(self, key: Any) -> Any:
+    def __getitem__(self, key: object) -> Any:
         parts = key if isinstance(key, tuple) else (key,)
         parts = [self.real[p] if isinstance(p, slice) else p for p in parts]
         if not any(map(holds_traced, parts)):

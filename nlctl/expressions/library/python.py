@@ -113,7 +113,7 @@ class Builtins:
             raise Untraceable("Python's round to decimals, of one of its own floats")
         return written_out(self.graph, np.round, value, digits)
 
-    def _isinstance(self, thing: Any, kind: Any) -> bool:
+    def _isinstance(self, thing: object, kind: Any) -> bool:
         originals = {made: real for real, made in self.stage.classes.items()}
         kinds = kind if isinstance(kind, tuple) else (kind,)
         kinds = tuple(
@@ -134,10 +134,10 @@ class Builtins:
             raise Untraceable("a question for the type of a number")
         return answers.pop()
 
-    def _getattr(self, thing: Any, *rest: Any) -> Any:
+    def _getattr(self, thing: object, *rest: Any) -> Any:
         return getattr(thing, *rest)
 
-    def _hasattr(self, thing: Any, name: str) -> bool:
+    def _hasattr(self, thing: object, name: str) -> bool:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
         kinds = (np.empty(thing.shape),) if thing.shape else (0.0, np.float64(0.0), 0)
@@ -146,7 +146,7 @@ class Builtins:
             raise Untraceable(f"a question for {name} of a number")
         return answers.pop()
 
-    def _type(self, thing: Any, *rest: Any) -> Any:
+    def _type(self, thing: object, *rest: Any) -> Any:
         if is_traced(thing):
             raise Untraceable("the type of what is only known when it runs")
         if hasattr(type(thing), "_forwards"):

@@ -93,7 +93,7 @@ def ptp(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
 
 @of(np.sum)
 def sum_along(
-    graph: Graph, values: Any, axis: Axis = None, dtype: Any = None, *, keepdims: bool = False,
+    graph: Graph, values: Any, axis: Axis = None, dtype: object = None, *, keepdims: bool = False,
     where: Any = True, initial: Any = None,
 ) -> Any:  # fmt: skip
     """Return a sum."""
@@ -278,13 +278,13 @@ def _along(graph: Graph, values: Any, axis: Any, function: Callable[..., list[Ex
 
 
 @of(np.sort)
-def sort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
+def sort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
     """Return an array in order."""
     return _along(graph, values, axis, lambda row: in_order(graph, row)[0])
 
 
 @of(np.argsort)
-def argsort(graph: Graph, values: Any, axis: Any = -1) -> Tracer:
+def argsort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
     """Return where the elements of an ordered array were.
 
     Equal ones stay in their order; NumPy's own depends on the machine there.
@@ -381,7 +381,7 @@ def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
 
 
 @formula(np.linalg.norm)
-def norm(np: Facade, x: Any, ord: Any = None, axis: Any = None, keepdims: bool = False) -> Any:  # noqa: A002
+def norm(np: Facade, x: Any, ord: Any = None, axis: object = None, keepdims: bool = False) -> Any:  # noqa: A002
     """Return a norm of a vector or matrix."""
     x = traced(np.graph, x)
     size = np.abs(x)

@@ -35,7 +35,7 @@ class Turn(Special):
         x, y, z, w = self.quat
         return Turn(self.graph, [-x, -y, -z, w])
 
-    def __mul__(self, other: Any) -> Turn:
+    def __mul__(self, other: object) -> Turn:
         if not isinstance(other, Turn):
             raise Untraceable("a product of a rotation and something else")
         return Turn(self.graph, _composed(self.quat, other.quat))

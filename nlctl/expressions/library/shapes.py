@@ -50,7 +50,7 @@ def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
     return own
 
 
-def _opened(value: Any, owners: list[Tracer]) -> Any:
+def _opened(value: object, owners: list[Tracer]) -> Any:
     if isinstance(value, list | tuple):
         parts = [_opened(v, owners) for v in value]
         return parts if isinstance(value, list) else tuple(parts)
@@ -89,7 +89,7 @@ for _function in _COMPUTING:
 
 
 @of(np.concatenate)
-def concatenate(graph: Graph, parts: Any, axis: Any = 0) -> Tracer:
+def concatenate(graph: Graph, parts: Any, axis: object = 0) -> Tracer:
     """Return arrays one after the other."""
     arrays = [traced(graph, p) for p in parts]
     if axis is None:
@@ -119,7 +119,7 @@ def hstack(graph: Graph, parts: Any) -> Tracer:
 
 
 @of(np.append)
-def append(graph: Graph, array: Any, values: Any, axis: Any = None) -> Tracer:
+def append(graph: Graph, array: Any, values: Any, axis: object = None) -> Tracer:
     """Return an array with values behind it."""
     arrays = [traced(graph, v) for v in (array, values)]
     if axis is not None:
@@ -163,7 +163,7 @@ def gradient(graph: Graph, f: Any, *spacing: Any) -> Tracer:
 
 
 @of(np.roll)
-def roll(graph: Graph, a: Any, shift: Any, axis: Any = None) -> Tracer:
+def roll(graph: Graph, a: Any, shift: Any, axis: object = None) -> Tracer:
     """Return an array whose elements have moved on."""
     array = traced(graph, a)
     if array.axis is None or array.ndim > 1 or isinstance(shift, tuple):
@@ -281,7 +281,7 @@ def shape(graph: Graph, values: Any) -> tuple[int, ...]:
 
 
 @of(np.isscalar)
-def isscalar(graph: Graph, value: Any) -> bool:
+def isscalar(graph: Graph, value: object) -> bool:
     """Return whether a value is a number and no array."""
     return not traced(graph, value).shape
 
@@ -292,7 +292,7 @@ def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
     return by_moving(np.transpose)(graph, values, order or None)
 
 
-def _filled(graph: Graph, values: Tracer, value: Any) -> None:
+def _filled(graph: Graph, values: Tracer, value: object) -> None:
     """Assign one value to all elements."""
     values[...] = value
 

@@ -106,13 +106,13 @@ def xlog1py(np: Facade, x: Any, y: Any) -> Any:
     return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y))
 
 
-def softmax(np: Facade, x: Any, axis: Any = None) -> Any:
+def softmax(np: Facade, x: Any, axis: object = None) -> Any:
     """e^x, divided by the sum of all."""
     e = np.exp(x - np.max(x, axis=axis, keepdims=True))
     return e / np.sum(e, axis=axis, keepdims=True)
 
 
-def logsumexp(np: Facade, a: Any, axis: Any = None) -> Any:
+def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     """ln of the sum of e^a."""
     top = np.max(a, axis=axis, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)

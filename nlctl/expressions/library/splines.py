@@ -16,7 +16,7 @@ from .tables import MOST_PIECES, interval_choice, polynomial
 __all__ = ["called_object", "enter_splines"]
 
 
-def called_object(graph: Graph, thing: Any, *arguments: Any, **options: Any) -> Any:
+def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
     """Return what an object of a library, that can be called, makes of arrays of expressions."""
     for kinds, own in _kinds():
         if isinstance(thing, kinds):

@@ -74,7 +74,7 @@ class NumberType:
         return hash(self.real)
 
 
-def unwrapped(value: Any) -> Any:
+def unwrapped(value: object) -> Any:
     """Return the type that stands behind a value, any other value as it is."""
     return value.real if isinstance(value, NumberType) else value
 
@@ -148,7 +148,7 @@ def _where(graph: Graph, own: Any, arguments: Any, out: Any, where: Any) -> Any:
     return out
 
 
-def is_traced(value: Any) -> bool:
+def is_traced(value: object) -> bool:
     """Whether a value is one of expressions."""
     return isinstance(value, Tracer | Special)
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
 from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
+from ...upstream.systems import System
 from ..audit import block_outputs
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
@@ -125,7 +126,7 @@ def _sharpest(compiled: Compiled, p: np.ndarray, jump: Jump, before: list, after
 
 
 def _blocks(
-    compiled: Compiled, system: Any, p: np.ndarray, point: Any
+    compiled: Compiled, system: System, p: np.ndarray, point: Any
 ) -> Iterator[tuple[np.ndarray, list[str], np.ndarray]]:
     """Yield for each block what it is given, and its outputs and rates with their names."""
     t, x, u = point

@@ -8,9 +8,11 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ...upstream.systems import System
+
 
 def block_inputs(
-    system: Any, u: np.ndarray, outputs: Mapping[int, np.ndarray]
+    system: System, u: np.ndarray, outputs: Mapping[int, np.ndarray]
 ) -> Iterator[tuple[Any, np.ndarray]]:
     """Yield every block of a diagram with its inputs, in the order of the state vector.
 
@@ -20,7 +22,7 @@ def block_inputs(
     yield from ((block, given) for block, given, _ in _walked(system, u, outputs, places))
 
 
-def _walked(system: Any, u: np.ndarray, outputs: Any, places: Any) -> list[Any]:
+def _walked(system: System, u: np.ndarray, outputs: Any, places: Any) -> list[Any]:
     """Return (block, inputs, place) of every block."""
     if not isinstance(system, ct.InterconnectedSystem):
         return [(system, u, next(places))]
@@ -34,7 +36,7 @@ def _walked(system: Any, u: np.ndarray, outputs: Any, places: Any) -> list[Any]:
     return found
 
 
-def _count(system: Any) -> int:
+def _count(system: System) -> int:
     if isinstance(system, ct.InterconnectedSystem):
         return sum(map(_count, system.syslist))
     return 1
@@ -53,7 +55,7 @@ def _inside(system: Any, u: np.ndarray, outputs: Any, own: list[list[int]]) -> n
     return system.connect_map @ y + system.input_map @ u
 
 
-def _delivered(system: Any, u: np.ndarray, outputs: Any, numbers: list[int]) -> np.ndarray:
+def _delivered(system: System, u: np.ndarray, outputs: Any, numbers: list[int]) -> np.ndarray:
     """Return the outputs of a part, given those of all blocks."""
     if not isinstance(system, ct.InterconnectedSystem):
         return np.asarray(outputs[numbers[0]], dtype=float)

@@ -13,13 +13,14 @@ from ...delays.transport import PAST
 from ...errors import CompileError
 from ...params import as_numbers
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
+from ...upstream.systems import System
 from ...wording import counted
 from ..purity.check import FunctionReading, check_pure
 from ..purity.values import FRESH, VECTOR, Impure, captured
 from .parameters import current_values
 
 
-def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
+def check_sizes(system: System, blocks: Iterable[Any]) -> None:
     """Hold a diagram to the number of states that its blocks have."""
     had = sum(block.nstates or 0 for block in blocks)
     if had != (system.nstates or 0):
@@ -29,7 +30,7 @@ def check_sizes(system: Any, blocks: Iterable[Any]) -> None:
         )
 
 
-def check_functions(path: str, system: Any) -> FunctionReading:
+def check_functions(path: str, system: System) -> FunctionReading:
     """Check that a block's functions depend on their arguments alone, and return enough values.
 
     The functions are read, not called, until they are known to remember nothing.
@@ -53,7 +54,7 @@ def check_functions(path: str, system: Any) -> FunctionReading:
     )
 
 
-def _functions(system: Any) -> Iterator[tuple[str, Any]]:
+def _functions(system: System) -> Iterator[tuple[str, Any]]:
     """Yield what is called of a block, with its name."""
     if isinstance(system, ct.StateSpace) or not isinstance(system, ct.NonlinearIOSystem):
         return
@@ -93,7 +94,7 @@ def _check_counts(path: str, system: Any) -> None:
 # -- blocks that do not say how many signals they have ---------------------------------------------
 
 
-def sized(system: Any, inputs: Any, initial_state: Any) -> Any:
+def sized(system: System, inputs: Any, initial_state: Any) -> Any:
     """Return a block with the numbers of states, inputs and outputs that a run gives it.
 
     python-control takes them from the run's arguments where a block does not declare them.
@@ -122,7 +123,7 @@ def _with(system: Any, states: int, inputs: int, outputs: int | None) -> Any:
     return made
 
 
-def _output_size(system: Any, states: int, inputs: int) -> int:
+def _output_size(system: System, states: int, inputs: int) -> int:
     """Return how many outputs there are, of a function that is known to remember nothing."""
     asked = _with(system, states, inputs, None)
     check_functions(system.name, asked)

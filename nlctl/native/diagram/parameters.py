@@ -13,6 +13,7 @@ import numpy as np
 from ...blocks import Block
 from ...errors import UsageError
 from ...upstream.control_internals import current_parameters
+from ...upstream.systems import System
 from ..purity.captured import same
 from .nodes import Node
 
@@ -71,7 +72,7 @@ def current_values(system: Any) -> Mapping[str, Any]:
     return {k: params[k] for k in params if k in system.params or "." not in str(k)}
 
 
-def is_numeric(value: Any) -> bool:
+def is_numeric(value: object) -> bool:
     """Whether a parameter can vary between runs: a finite-shaped number or array of numbers."""
     return not isinstance(value, str) and np.asarray(value).dtype.kind in "fib"
 
@@ -86,7 +87,7 @@ def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     return found
 
 
-def slots_of(system: Any, path: str = "", offset: int = 0) -> dict[str, Slot]:
+def slots_of(system: System, path: str = "", offset: int = 0) -> dict[str, Slot]:
     """Lay out the numeric parameters of one block from `offset` on, as `slots` does."""
     found: dict[str, Slot] = {}
     path = path or system.name
@@ -135,7 +136,7 @@ def packed(
     return p
 
 
-def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
+def filled(p: np.ndarray, slot: Slot, value: object) -> None:
     """Put a parameter into its place in the vector."""
     array = np.asarray(value) if is_numeric(value) else None
     if array is None or array.shape != slot.shape:
@@ -154,7 +155,7 @@ def filled(p: np.ndarray, slot: Slot, value: Any) -> None:
     p[slot.offset : slot.offset + slot.size] = array.ravel()
 
 
-def _equal(one: Any, other: Any) -> bool:
+def _equal(one: object, other: object) -> bool:
     """Whether two values that are no numbers are equal."""
     try:
         return type(one) is type(other) and bool(np.all(one == other))

@@ -22,6 +22,7 @@ from ...diagrams import places, samplings, supplied_blocks
 from ...responses.watched import Watched
 from ...sampling.system import Happening
 from ...sliding.relay import SLIDING
+from ...upstream.systems import System
 from ..purity.captured import Captured, noted
 from .checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
@@ -165,7 +166,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
     )  # fmt: skip
 
 
-def _samplings(system: Any) -> Iterator[Node]:
+def _samplings(system: System) -> Iterator[Node]:
     for path, made in samplings(system):
         none = np.zeros((0, 0), dtype=bool)
         yield Node(path=path, system=made, state_offset=0, inputs=(), direct=none)
@@ -203,7 +204,7 @@ def during(read: Schedule, what: Happening) -> Schedule:
         ) from None
 
 
-def _equations_of(system: Any) -> Iterator[Captured]:
+def _equations_of(system: System) -> Iterator[Captured]:
     """Yield notes of what a block or diagram consists of: it may be changed later."""
     for name in ("connect_map", "input_map", "output_map", "updfcn", "outfcn", *"ABCD"):
         if hasattr(system, name):

@@ -14,6 +14,7 @@ from ...expressions.graph import Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
 from ...upstream.control_internals import current_parameters
+from ...upstream.systems import System
 from .parameters import Slot, current_values
 
 
@@ -23,7 +24,7 @@ def time(graph: Graph) -> Tracer:
 
 
 def traced_parameters(
-    graph: Graph, system: Any, slots: Mapping[str, Slot], p: np.ndarray | None = None
+    graph: Graph, system: System, slots: Mapping[str, Slot], p: np.ndarray | None = None
 ) -> Any:
     """Return the record or dict that a block's functions take, with arrays for the numbers.
 
@@ -36,7 +37,7 @@ def traced_parameters(
     return type(current_parameters(system))(**values) if isinstance(system, Block) else values
 
 
-def traced_arguments(graph: Graph, system: Any, slots: Mapping[str, Slot]) -> tuple[Any, ...]:
+def traced_arguments(graph: Graph, system: System, slots: Mapping[str, Slot]) -> tuple[Any, ...]:
     """Return what a block's functions take: its time, states, inputs and parameters."""
     x = leaf_vector(graph, "x", 0, (system.nstates or 0,))
     u = leaf_vector(graph, "u", 0, (system.ninputs or 0,))
@@ -55,7 +56,9 @@ def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> An
     return type(value)(*whole) if named else whole
 
 
-def dependence(system: Any, function: Callable[..., Any], slots: Mapping[str, Slot]) -> np.ndarray:
+def dependence(
+    system: System, function: Callable[..., Any], slots: Mapping[str, Slot]
+) -> np.ndarray:
     """Return which results of a block's function depend on which of its inputs.
 
     What cannot be traced, or holds for some values of a parameter only, depends on all of them.

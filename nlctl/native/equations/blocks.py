@@ -13,6 +13,7 @@ from ...expressions.arrays import Tracer, as_array, leaf_vector, scalar
 from ...expressions.graph import Expr, Graph
 from ...responses.watched import watches_nan
 from ...sampling.system import Happening
+from ...upstream.systems import System
 from ..codegen.solver import Solver
 from ..diagram.parameters import length
 from ..diagram.program import count_guards, count_switching_functions, memory
@@ -117,7 +118,7 @@ def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
 
 
 def _conditions(
-    system: Any, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: Any
+    system: System, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: Any
 ) -> Conditions:
     """Return what a diagram in continuous time switches at without saying so.
 

@@ -64,7 +64,7 @@ class _Seen(dict[int, Any]):
         self.deep = deep
         self.kept: list[Any] = []
 
-    def add(self, thing: Any) -> bool:
+    def add(self, thing: object) -> bool:
         """Note a thing; return whether it is new."""
         if id(thing) in self:
             return False
@@ -135,7 +135,7 @@ def _digest_of(texts: Iterable[str]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _fingerprint(thing: Any, seen: _Seen, names: Iterable[str] = ()) -> Iterator[str]:
+def _fingerprint(thing: object, seen: _Seen, names: Iterable[str] = ()) -> Iterator[str]:
     """Yield text for a thing and all that it refers to; `names` are what is read of a module."""
     if isinstance(thing, str | tuple | list | dict):
         is_text = isinstance(thing, str)
@@ -168,7 +168,7 @@ def _of_text(text: str, seen: _Seen) -> str:
     return repr(re.sub(r"sys\[\d+\]", "sys[]", text) if seen.deep else text)
 
 
-def _plain(thing: Any, seen: _Seen | None = None) -> Any:
+def _plain(thing: object, seen: _Seen | None = None) -> Any:
     """Return the function that numba has compiled or will compile; any other thing as it is."""
     if isinstance(thing, types.FunctionType):
         return thing
@@ -287,7 +287,7 @@ def _is_note(name: str) -> bool:
     return name.startswith("__") or name in ("_abc_impl", "_is_protocol")
 
 
-def _is_controls(thing: Any) -> bool:
+def _is_controls(thing: object) -> bool:
     """Whether a function or a class is python-control's, whose version stands beside every key."""
     return str(thing.__module__).partition(".")[0] == "control"
 
@@ -301,7 +301,7 @@ def _is_users(kind: type) -> bool:
     return kind.__flags__ & HEAP_TYPE != 0 and (in_text or not _is_library(module))
 
 
-def _of_object(thing: Any, seen: _Seen) -> Iterator[str]:
+def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
     """Yield text for an object: its class, and what its attributes are."""
     if not seen.add(thing):
         return
@@ -331,7 +331,7 @@ def _slots(kind: type) -> Iterator[str]:
             yield f"_{base.__name__.lstrip('_')}{name}" if is_private else name
 
 
-def _of_library_object(thing: Any, seen: _Seen) -> Iterator[str]:
+def _of_library_object(thing: object, seen: _Seen) -> Iterator[str]:
     """Yield text for an object of a library, and for all that it holds."""
     if not seen.deep:
         yield _constant(thing)
@@ -341,7 +341,7 @@ def _of_library_object(thing: Any, seen: _Seen) -> Iterator[str]:
         yield from _of_held(thing, held_by(thing, _is_library), seen)
 
 
-def _of_held(thing: Any, held: Any, seen: _Seen) -> Iterator[str]:
+def _of_held(thing: object, held: Any, seen: _Seen) -> Iterator[str]:
     if held is None:
         yield _constant(thing)
     elif isinstance(held, str):
@@ -434,7 +434,7 @@ def _all_names(code: types.CodeType) -> list[str]:
     return sorted(names)
 
 
-def _constant(value: Any) -> str:
+def _constant(value: object) -> str:
     """Return text for a value that machine code may contain; types by their names."""
     if isinstance(value, type):
         return f"type {value.__qualname__} {getattr(value, '_fields', '')}"

@@ -21,6 +21,7 @@ from ...blocks import Block
 from ...errors import BlockError, CompileError
 from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
+from ...upstream.systems import System
 from ...wording import counted
 from ..diagram.parameters import Slot, current_values
 from ..purity import dicts, vectors
@@ -124,7 +125,7 @@ def _like(template: Any, values: np.ndarray) -> Any:
 # -- numba -----------------------------------------------------------------------------------------
 
 
-def _source(name: str, stands: _AsItStands, system: Any) -> Source:
+def _source(name: str, stands: _AsItStands, system: System) -> Source:
     """Return the source of ``name(given, y)`` for numba."""
     _, x, u, p, count = stands.lengths
     first, second, third = 1, 1 + x, 1 + x + u
@@ -166,7 +167,7 @@ def _counts(stands: _AsItStands, count: int) -> list[int]:
     return [int(np.size(f(0.0, x, u, params))) for f in stands.functions]
 
 
-def _as_tuples(system: Any, function: Any) -> set[int]:
+def _as_tuples(system: System, function: Any) -> set[int]:
     """Return which arguments a function wants as tuples: x (1) and u (2)."""
     if isinstance(system, Block):
         return set() if getattr(system.spec, "vector", False) else {1, 2}

@@ -63,7 +63,7 @@ class Captured:
         return f"{name}.{self.name}" if name else self.name
 
 
-def noted(holder: Any, name: str, value: Any) -> Captured:
+def noted(holder: object, name: str, value: object) -> Captured:
     """Return the note of a value that has just been read."""
     return Captured(holder, name, recorded(value))
 
@@ -91,7 +91,7 @@ def changed(values: Iterable[Captured]) -> Captured | None:
     return None
 
 
-def recorded(value: Any) -> Any:
+def recorded(value: object) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()

@@ -93,7 +93,7 @@ def make_callable(function: FunctionType) -> None:
             make_callable(other)
 
 
-def callable_constant(value: Any) -> Any:
+def callable_constant(value: object) -> Any:
     """Return a function as one that machine code can hand on; any other value as it is."""
     if isinstance(value, np.ufunc):
         return numba.njit(error_model="numpy")(lambda v: value(v))
@@ -115,7 +115,7 @@ class Params(types.Type):
         """What tells it from other types: names may be alike."""
         return self.values
 
-    def field(self, key: Any) -> int | None:
+    def field(self, key: object) -> int | None:
         """Return the position of a field, None if there is none; the key must be written out."""
         if not isinstance(key, types.StringLiteral) or key.literal_value not in self.values.fields:
             return None

@@ -418,7 +418,7 @@ def _are_containers(known: OneOf) -> bool:
     return all(isinstance(choice.known, list | tuple) for choice in known.choices)
 
 
-def _is_plain_attribute(thing: Any, name: str) -> bool:
+def _is_plain_attribute(thing: object, name: str) -> bool:
     """Whether reading an attribute of an object runs no code that could do anything."""
     if library(type(thing)) is not None or isinstance(thing, type | super):
         return True

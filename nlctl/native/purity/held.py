@@ -37,7 +37,7 @@ _LIKE_LISTS = (type({}.keys()), type({}.values()), type({}.items()))
 _BOUND = (types.BuiltinFunctionType, types.MethodWrapperType)
 
 
-def held_by(thing: Any, is_library: Callable[[str], bool]) -> Any:
+def held_by(thing: object, is_library: Callable[[str], bool]) -> Any:
     """Return what an object of a library holds, as data and other objects."""
     kind = type(thing)
     top = (getattr(kind, "__module__", None) or "").partition(".")[0]  # arrays of ctypes have none
@@ -100,14 +100,14 @@ def _of_scipy(thing: Any) -> Any:
     return None
 
 
-def inherited(thing: Any) -> Any:
+def inherited(thing: object) -> Any:
     """Return what an object of a class of one's own has of what the class inherits from."""
     if any(base.__module__.startswith("pandas.") for base in type(thing).__mro__):
         return _of_pandas(thing)
     return reduced(thing)
 
 
-def reduced(thing: Any) -> Any:
+def reduced(thing: object) -> Any:
     """Return what a pickle of an object would hold, or a text that says that there is none."""
     name = f"{getattr(type(thing), '__module__', None) or 'ctypes'}.{type(thing).__qualname__}"
     try:
@@ -156,7 +156,7 @@ def _of_bound(thing: Any, is_library: Callable[[str], bool]) -> Any:
     return f"{OPAQUE}a compiled function of '{top}' ('{thing.__name__}')"
 
 
-def _of_pandas(thing: Any) -> Any:
+def _of_pandas(thing: object) -> Any:
     """Return what a table, a column or an index holds, however it is laid out in memory."""
     import pandas as pd
 

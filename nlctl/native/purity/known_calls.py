@@ -99,7 +99,7 @@ _PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "
 
 
 def call(
-    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+    walk: Walk, thing: object, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
@@ -124,7 +124,7 @@ def call(
 
 
 def _of_python(
-    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
+    walk: Walk, thing: object, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue | None:
     """Return what is known of the result of functions of Python's own that make others."""
     if thing is functools.partial:
@@ -265,7 +265,7 @@ def check_object(value: KnownValue, what: str) -> None:
         raise Impure(f"{what} an object of type {type(thing).__name__}", "use arrays")
 
 
-def _is_builtin(thing: Any) -> bool:
+def _is_builtin(thing: object) -> bool:
     name = getattr(thing, "__name__", "")
     return getattr(builtins, name, None) is thing if isinstance(name, str) else False
 
@@ -322,7 +322,7 @@ def _functions_in(given: list[KnownValue]) -> Any:
 
 
 def _library(
-    walk: Walk, thing: Any, module: str, given: list[KnownValue], named: dict[str, KnownValue]
+    walk: Walk, thing: object, module: str, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     name = getattr(thing, "__name__", "")
     if module.startswith(VARYING):
@@ -346,7 +346,7 @@ def _library(
     return FRESH
 
 
-def _makes_objects(thing: Any, module: str) -> bool:
+def _makes_objects(thing: object, module: str) -> bool:
     """Whether a function of a library makes objects, such as splines and rotations."""
     cls = thing if isinstance(thing, type) else getattr(thing, "__self__", None)
     if isinstance(cls, type) and not issubclass(cls, np.generic | np.ndarray | CONTAINERS):

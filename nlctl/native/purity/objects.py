@@ -82,7 +82,7 @@ def _cell(name: str, cell: CellType, node: Definition) -> CellType:
     return cell if record is None else CellType(record)
 
 
-def _method(function: Any, owner: Any) -> Any:
+def _method(function: Any, owner: object) -> Any:
     """Return a method as a function of ``(t, x, u, params)``; None where it stays a method."""
     if not isinstance(function, FunctionType):
         return None
@@ -110,12 +110,12 @@ def _bound(function: Any, first: tuple[Any, ...], named: dict[str, Any]) -> Call
     return names["bound"]
 
 
-def _record(thing: Any, name: str, node: Definition) -> Any:
+def _record(thing: object, name: str, node: Definition) -> Any:
     """Return the attributes of an object that a function reads; None where that is not all."""
     return None if isinstance(thing, UNDERSTOOD) else _held(thing, list(_uses(name, node)))
 
 
-def _held(thing: Any, chains: list[tuple[str, ...]]) -> Any:
+def _held(thing: object, chains: list[tuple[str, ...]]) -> Any:
     """Return a record of what is read, ``a.b`` as ("a", "b"); None if it is not all constant."""
     if not chains or () in chains:
         return None
@@ -146,7 +146,7 @@ def _uses(name: str, node: Definition) -> Iterator[tuple[str, ...]]:
             yield tuple(chain) if around is None and isinstance(here.ctx, ast.Load) else ()
 
 
-def _is_constant(value: Any) -> bool:
+def _is_constant(value: object) -> bool:
     return isinstance(value, bool | int | float | str | np.number | np.ndarray)
 
 

@@ -177,7 +177,7 @@ OUTSIDE = KnownValue(False, False, True)
 SLICE = KnownValue(True, True, known=slice(None))
 
 
-def captured(thing: Any) -> KnownValue:
+def captured(thing: object) -> KnownValue:
     """Return what is known of an object that was there before the call."""
     if isinstance(thing, PLAIN):
         return KnownValue(True, True, known=thing)
@@ -261,7 +261,7 @@ def forgotten(value: KnownValue) -> KnownValue:
     return replace(value, known=UNKNOWN_VALUE)
 
 
-def library(thing: Any) -> str | None:
+def library(thing: object) -> str | None:
     """Return the name of the well-known library that a function or class is from."""
     owner = getattr(thing, "__self__", None)
     module = getattr(thing, "__module__", None) or ""
@@ -274,7 +274,7 @@ def library(thing: Any) -> str | None:
     return module if module.partition(".")[0] in _LIBRARIES else None
 
 
-def python_function(thing: Any) -> FunctionType | None:
+def python_function(thing: object) -> FunctionType | None:
     """Return the plain Python function that is called, without what it is bound to."""
     if isinstance(thing, CPUDispatcher):
         return thing.py_func

@@ -11,7 +11,7 @@ from numba.extending import overload, register_jitable
 MESSAGE = "a function returns another number of values than its block has states or outputs"
 
 
-def as_vector(value: Any, count: int) -> Any:
+def as_vector(value: object, count: int) -> Any:
     """Return a function's result, an array, tuple, list or number, as `count` values."""
     return _counted(value if isinstance(value, tuple) else np.asarray(value).reshape(-1), count)
 

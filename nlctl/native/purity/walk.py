@@ -23,7 +23,7 @@ class Walk(ABC):
         self.unbound: list[str] = []
         self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 
-    def captured(self, holder: Any, name: str, value: Any) -> KnownValue:
+    def captured(self, holder: object, name: str, value: object) -> KnownValue:
         """Return what is known of a value that is read from around a function, and note it."""
         if (id(holder), name) not in self.read:
             self.read[id(holder), name] = noted(holder, name, value)

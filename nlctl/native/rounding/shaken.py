@@ -32,7 +32,7 @@ class Shaken(np.ndarray):
         made.drawn = drawn
         return made
 
-    def __array_finalize__(self, other: Any) -> None:
+    def __array_finalize__(self, other: object) -> None:
         self.drawn = getattr(other, "drawn", None)
 
     def __getitem__(self, key: Any) -> Any:
@@ -54,7 +54,7 @@ class Shaken(np.ndarray):
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
         return self._rounded(function(*_plain(args), **_plain(kwargs)))
 
-    def _rounded(self, found: Any) -> Any:
+    def _rounded(self, found: object) -> Any:
         """Return a result with other last digits; anything else as it is."""
         if isinstance(found, tuple | list):
             return type(found)(map(self._rounded, found)) if type(found) in (tuple, list) else found

@@ -161,3 +161,10 @@ def test_weights_without_digits_are_refused():
     assert np.linalg.norm(W) > 1e5
     with pytest.raises(ParameterError, match=r"needs \|W\| <= 100000, got .*tightest_weights"):
         approximation_error(DUFFING, basis, W, BOXES[DUFFING])
+
+
+def test_a_network_of_another_size_than_the_controllers_is_refused():
+    """W_hat(0) is of the controller's nodes."""
+    case = polynomial(np.exp, 3)
+    with pytest.raises(ParameterError, match=r"W_hat\(0\), got 4 and 27"):
+        tightest_weights(case, GAINS, 0.0)

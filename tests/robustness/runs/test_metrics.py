@@ -1,5 +1,8 @@
 """Metrics against closed forms."""
 
+import re
+from pathlib import Path
+
 import numba
 import numpy as np
 import pytest
@@ -8,7 +11,32 @@ from hypothesis import strategies as st
 from scipy.integrate import simpson
 
 from nlctl.analysis import metrics
-from nlctl.analysis.metrics import tracking_metrics
+from nlctl.analysis.metrics import extremes, integrals, tracking_metrics, travel
+
+
+def test_every_metric_has_a_test_here():
+    """A new one asks for its closed form in this folder."""
+    text = "".join(path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("*.py"))
+    names = [*extremes.__all__, *integrals.__all__, *travel.__all__]
+    assert [name for name in names if not re.search(rf"\b{name}\(", text)] == []
+    assert set(names) <= set(metrics.__all__)
+
+
+@given(st.floats(-2, 2), st.floats(0.1, 3), st.floats(0.1, 3), st.floats(-5, 5))
+def test_the_vertex_of_a_parabola_is_found_from_any_three_samples(top, h_before, h_after, t):
+    offset, value = metrics.vertex(
+        h_before, h_after, 3 - (t - h_before - top) ** 2, 3 - (t - top) ** 2,
+        3 - (t + h_after - top) ** 2,
+    )  # fmt: skip
+    assert (t + offset, value) == pytest.approx((top, 3.0), abs=1e-10)
+
+
+@given(st.lists(st.integers(-1000, 1000), min_size=1, max_size=20))
+def test_consecutive_differences_add_up_to_the_way_between_the_ends(y):
+    """Their sum telescopes."""
+    steps = metrics.consecutive_differences(np.array(y))
+    assert steps.size == len(y) - 1
+    assert steps.sum() == y[-1] - y[0]
 
 
 @given(st.floats(0.5, 3), st.floats(-3, 3), st.floats(0.3, 5))

@@ -5,6 +5,7 @@ import os
 import random
 import resource
 import signal
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -27,6 +28,7 @@ from nlctl.analysis.robustness import (
 )
 from nlctl.analysis.robustness.runs.store import ChunkStore, StoreError, claimed, put, table_of
 from nlctl.analysis.robustness.runs.sweep import load, sweep
+from nlctl.errors import UsageError
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 
@@ -46,6 +48,18 @@ def design(made):
 @pytest.fixture(scope="module")
 def whole(made, design):
     return sweep(made, design).table
+
+
+def test_without_pyarrow_a_folder_is_refused_before_the_first_run(made, design, tmp_path):
+    """With what to install; a sweep in memory needs none."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "pyarrow", None)
+        patch.setitem(sys.modules, "pyarrow.parquet", None)
+        with pytest.raises(UsageError, match=r'pip install "nlctl\[studies\]"'):
+            sweep(made, design, tmp_path / "runs")
+        with pytest.raises(UsageError, match="need pyarrow"):
+            load(tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from ....errors import CompileError
 from ....expressions.functions import FUNCTIONS
 from .text import RARELY, Body, Value, llvm_type
 
@@ -60,6 +61,12 @@ def applied(b: Body, name: str, *args: Value) -> Value:
     if name in CALLED:
         return _call(b, name, CALLED[name], *args)[0]
     if code == "own":
+        if name not in INLINE:
+            raise CompileError(
+                f"the row of '{name}' in nlctl/expressions/functions.py has the code 'own', and no "
+                "machine code is written: enter it in INLINE or CALLED of "
+                "nlctl/native/codegen/ir/functions.py"
+            )
         return INLINE[name](b, *args)
     if code.startswith("llvm."):
         return b.intrinsic(code.removeprefix("llvm."), *args)

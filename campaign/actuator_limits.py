@@ -1,41 +1,34 @@
 """The paper's controller, unchanged, and its rivals through every actuator of nlctl: a kept record.
 
-``python -m nlctl.analysis.paper.limits.actuators FOLDER`` makes it again, in five minutes, prints
-the tables of ``docs/explanation/actuators.md`` and draws its figures into FOLDER.  Friction is left
-out: it takes a velocity and makes a force, and is not an actuator of the form
-v = k(u, t) u + eps_u (2) between the controller and the plant.
+    python campaign/actuator_limits.py docs/explanation
+
+makes it again, in five minutes, prints the tables of ``docs/explanation/actuators.md`` and draws
+its figures into that folder.  Friction is left out: it takes a velocity and makes a force, and is
+not an actuator of the form v = k(u, t) u + eps_u (2) between the controller and the plant.
 """
 
 from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
+from page_tables import markdown_table
 
 from nlctl import actuators, native, paper
+from nlctl.analysis.figures.axes import GREY, STYLES, legend_above, set_style
+from nlctl.analysis.lyapunov.bounds.decomposition import DecompositionError, decompose
+from nlctl.analysis.paper.cases import HORIZON, TAIL
+from nlctl.analysis.paper.rivals import rival_controller, rival_controllers
+from nlctl.analysis.paper.sampling_limits import BAND, meets_the_spec
+from nlctl.analysis.report.svg import svg_files
 from nlctl.native import Status
 from nlctl.response import input_output_response
-
-from ...lyapunov.bounds.decomposition import DecompositionError, decompose
-from ...report.svg import svg_files
-from ..cases import HORIZON, TAIL
-from ..figures import actuator_errors
-from ..rivals import rival_controller, rival_controllers
-from ..sampling_limits import BAND, meets_the_spec
-from .markdown import markdown_table
-
-__all__ = [
-    "ACTUATOR_RECORD",
-    "actuator_run",
-    "actuators_of_the_table",
-    "assumption",
-    "assumption_text",
-    "controllers_text",
-]
 
 ACTUATOR_RECORD = Path(__file__).with_name("actuator-limits.csv")
 _COLUMNS = ["example", "controller", "actuator", "status", "time", "error", "peak"]
@@ -136,6 +129,50 @@ def _cell(row: dict[str, Any], meets: bool) -> str:
         return f"{row['error']:.3g}"
     error = f"{row['error']:.3g}"
     return f"**{error}**" if row["error"] > BAND else f"{error}, **u {row['peak']:.3g}**"
+
+
+_DOTS = (*(colour for colour, _ in STYLES), *(colour for colour, _ in STYLES))
+_MARKERS = "osD^vP<>"  # colours repeat: the marker tells as well
+_BEYOND, _HALF = 2.3, 0.7  # log10: place of the runs that did not reach their end
+
+
+def actuator_errors(
+    record: pd.DataFrame, meets: Callable[[pd.DataFrame], np.ndarray], band: float
+) -> Figure:
+    """Largest late errors behind each actuator, a line for each and a dot for each controller.
+
+    Hollow dots violate the spec; at the right are the runs that did not reach their end.
+    """
+    figure = Figure(figsize=(6.2, 7.2), layout="constrained")
+    ax = figure.subplots()
+    set_style(ax)
+    names, labels = (list(dict.fromkeys(record[c])) for c in ("actuator", "controller"))
+    shown: dict[str, object] = {}
+    for place, label in enumerate(labels):
+        own: Any = record[record["controller"] == label]
+        colour, marker = _DOTS[place], _MARKERS[place]
+        lines = [
+            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2) for name in own["actuator"]
+        ]
+        aside = _BEYOND + 0.16 * (place - (len(labels) - 1) / 2)
+        error = own["error"].fillna(10**aside).to_numpy()
+        fill = [colour if good else "none" for good in meets(own)]
+        ax.scatter(error, lines, 18, fill, marker=marker, edgecolors=colour, linewidths=1.0)
+        shown[label] = ax.scatter([], [], 18, colour, marker=marker)
+    ax.axvline(band, color=GREY, linewidth=0.9)
+    ax.axvspan(
+        10 ** (_BEYOND - _HALF), 10 ** (_BEYOND + _HALF), color=GREY, alpha=0.12, linewidth=0
+    )
+    for line in range(1, len(names)):
+        ax.axhline(line - 0.5, color=GREY, linewidth=0.4)
+    ax.set(xscale="log", ylim=(len(names) - 0.5, -0.5), yticks=range(len(names)), yticklabels=names)
+    ax.grid(visible=False, axis="y")
+    ticks = [*(10.0**power for power in range(-3, 2)), 10**_BEYOND]
+    ax.set(xlim=(2e-4, 10 ** (_BEYOND + _HALF)), xlabel="largest $|y - y_d|$ for t ≥ 10 s")
+    ax.set_xticks(ticks, ["0.001", "0.01", "0.1", "1", "10", "ended\nbefore"])
+    ax.minorticks_off()
+    legend_above(figure, shown)
+    return figure
 
 
 def _main() -> None:

@@ -11,12 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import differential_evolution
 
+from nlctl.analysis.metrics import Metric
 from nlctl.errors import ParameterError
 from nlctl.native import Compiled, ensemble_response
-
-from ..metrics import Metric
-
-__all__ = ["EvolvedGains", "evolved_gains", "split_samples"]
 
 _REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
 LOST = 1e3  # what counts as the excess of a run that did not reach its end

@@ -1,14 +1,12 @@
 """What the studies ``reports/rivals-1.toml`` and ``rivals-2.toml`` found: a kept record.
 
-``python -m nlctl.analysis.paper.limits.rivals`` runs both again, in six minutes, and prints the
-tables of ``docs/explanation/rivals.md``.
+``python campaign/rival_runs.py``, in a checkout, runs both again.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import tempfile
 import tomllib
 from hashlib import sha256
 from pathlib import Path
@@ -18,21 +16,19 @@ import pandas as pd
 
 from nlctl import paper
 
-from ...loop_record import loop_facts, loop_values
-from ...studies import Result, read_study, run, shipped
-from ..rivals import rival_loop
-from .markdown import markdown_table
+from ..loop_record import loop_facts, loop_values
+from ..studies import shipped
+from .rivals import rival_loop
 
 __all__ = [
+    "KEY",
     "RIVALS_RECORD",
     "RIVAL_ACTUATORS",
     "beaten_by",
     "checked_rivals",
     "failed_text",
     "loop_key",
-    "rival_rows",
     "rivals_study",
-    "rivals_text",
     "study_key",
 ]
 
@@ -65,32 +61,10 @@ def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
     return sha256(held.encode()).hexdigest()[:12], size
 
 
-def rival_rows(result: Result, example: str) -> pd.DataFrame:
-    """Return what a run of the study found, a line for each controller behind each actuator."""
-    rows, key = [], study_key(example)
-    for finding in result.findings:
-        pairs = finding.tables["differences"].loc["late_rms"]
-        actuator = result.asked[finding.key].options["actuator"]
-        ranking = finding.tables["ranking"]
-        for label in ("paper", *pairs.loc["paper"].index):
-            own: Any = ranking.loc[label]
-            less = (0.0,) * 3 if label == "paper" else pairs.loc[("paper", label)]
-            rows.append(
-                {"example": example, "study": key, "actuator": actuator}
-                | {"controller": label}
-                | dict(zip(KEY, loop_key(example, label, actuator), strict=True))
-                | {"samples": finding.numbers["samples"]}
-                | {key: int(own[key]) for key in ("violations", "failed")}
-                | {key: own[f"median {key}"] for key in ("late_rms", "iae", "peak_u", "energy")}
-                | dict(zip(("less", "less_low", "less_high"), tuple(less)[:3], strict=True))
-            )
-    return pd.DataFrame(rows)
-
-
 def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
     """Return the record, if it is of the study files and of the loops of today."""
     record = pd.read_csv(path)
-    again = "make it again with 'python -m nlctl.analysis.paper.limits.rivals'"
+    again = "make it again with 'python campaign/rival_runs.py'"
     for example in paper.EXAMPLES:
         made = set(record.loc[record["example"] == example, "study"])
         if made != {study_key(example)}:
@@ -132,38 +106,6 @@ def beaten_by(record: pd.DataFrame, example: str) -> dict[str, dict[str, tuple[s
     return found
 
 
-def rivals_text(record: pd.DataFrame, example: str) -> str:
-    """Return the record of an example as a table in Markdown, controllers x actuators.
-
-    A cell has violations (of which did not end), median RMS of e and median largest abs(u).
-    """
-    own: Any = record[record["example"] == example]
-    cells = [
-        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}" for r in own.to_dict("records")
-    ]
-    table = own.assign(cell=cells).pivot(index="controller", columns="actuator", values="cell")
-    labels = list(dict.fromkeys(own["controller"]))
-    rows = ((label, *table.loc[label, list(RIVAL_ACTUATORS)]) for label in labels)
-    return markdown_table(("controller", *RIVAL_ACTUATORS.values()), rows)
-
-
 def failed_text(row: dict[str, Any]) -> str:
     """Return how many runs violate the spec, and in brackets how many of them did not end."""
     return f"{row['violations']}" + (f" ({row['failed']})" if row["failed"] else "")
-
-
-def _main() -> None:
-    """Make the record again."""
-    made = []
-    with tempfile.TemporaryDirectory() as folder:
-        for example in paper.EXAMPLES:
-            result = run(read_study(rivals_study(example)), Path(folder) / example)
-            made.append(rival_rows(result, example))
-    record = pd.concat(made)
-    record.to_csv(RIVALS_RECORD, index=False, float_format="%.6g")
-    for example in paper.EXAMPLES:
-        print(rivals_text(record, example) + "\n")
-
-
-if __name__ == "__main__":
-    _main()

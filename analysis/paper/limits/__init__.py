@@ -1,1 +1,0 @@
-"""Where the paper's claims end: the same controller through every actuator."""

@@ -1,0 +1,77 @@
+"""What nlctl asks of python-control's systems and responses, as types: no class is named."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+__all__ = ["System", "SystemResponse"]
+
+
+class System(Protocol):
+    """A block or a diagram: a `control.NonlinearIOSystem`, and whatever answers as it does.
+
+    Attributes
+    ----------
+    name : str
+    dt : float, bool or None
+        Timebase.
+    ninputs, noutputs, nstates : int
+    input_labels, output_labels, state_labels : list of str
+    input_index, output_index, state_index : dict
+        Number of each signal by its label.
+    """
+
+    input_labels: Any  # properties that are made by a call, of which type checkers know nothing
+    output_labels: Any
+    state_labels: Any
+
+    @property
+    def name(self) -> Any: ...
+    @property
+    def dt(self) -> Any: ...
+    @property
+    def ninputs(self) -> Any: ...
+    @property
+    def noutputs(self) -> Any: ...
+    @property
+    def nstates(self) -> Any: ...
+    @property
+    def input_index(self) -> Mapping[str, int]: ...
+    @property
+    def output_index(self) -> Mapping[str, int]: ...
+    @property
+    def state_index(self) -> Mapping[str, int]: ...
+
+
+class SystemResponse(Protocol):
+    """A response of one: `control.TimeResponseData`, and what nlctl makes of it.
+
+    Attributes
+    ----------
+    time : ndarray of shape (m,)
+        In s.
+    outputs, states, inputs : ndarray
+    output_labels, state_labels, input_labels : list of str
+    sysname : str
+        Name of the system.
+    """
+
+    @property
+    def time(self) -> np.ndarray: ...
+    @property
+    def outputs(self) -> Any: ...
+    @property
+    def states(self) -> Any: ...
+    @property
+    def inputs(self) -> Any: ...
+    @property
+    def output_labels(self) -> Any: ...
+    @property
+    def state_labels(self) -> Any: ...
+    @property
+    def input_labels(self) -> Any: ...
+    @property
+    def sysname(self) -> Any: ...
