@@ -16,7 +16,6 @@ from nlctl.errors import DiagramError, ParameterError
 from nlctl.params import integer
 
 from ...intervals.box import Box
-from ...loop_record import loop_facts
 from ..bounds.decomposition import check_gain
 from ..loop.roles import declared, record_of
 from ..model_reference.closing import certify_model_reference
@@ -148,7 +147,7 @@ def certify(
         "max_iterations": max_iterations,
     }  # fmt: skip
     found = _certified(loop, W, u_max, how)
-    return replace(found, params=dict(params or {}), loop_facts=loop_facts(loop))
+    return replace(found, params=dict(params or {}), loop_facts=dict(found.examined.content.facts))
 
 
 def _certified(loop: Any, W: Any, u_max: float, how: Mapping[str, Any]) -> AnyCertificate:

@@ -21,8 +21,9 @@ from nlctl.references import SumOfSines
 
 from ..bounds.starts import Sides, Starts
 from ..loop.checked import read_checked
+from ..loop.content import LoopContent
 from ..loop.plant_form import Acceleration, acceleration
-from ..loop.roles import PIECES, Parts, Roles, read_parts
+from ..loop.roles import PIECES, Parts, Roles, parts_of
 
 __all__ = ["KnownSignLoop", "filtered_error", "initial_errors", "read_loop"]
 
@@ -54,6 +55,8 @@ class KnownSignLoop:
         Initial estimates, of all starts.
     acceleration : callable
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
+    content : LoopContent
+        What the loop consists of.
     disturbance : float
         Bound of what external inputs add to the plant's v.
     """
@@ -65,6 +68,7 @@ class KnownSignLoop:
     delta_hat_0: arb
     W_hat_0: tuple[arb, ...]
     acceleration: Acceleration
+    content: LoopContent
     disturbance: float = 0.0
 
     @property
@@ -99,8 +103,8 @@ def read_loop(
     starts: Any = None,
 ) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
-    parts = read_parts(loop, params=params, inputs=True)
     checked = read_checked(loop, PIECES, PROVED_FOR, params, inputs, starts)
+    parts = parts_of(checked.given, checked.roles)
     return KnownSignLoop(
         parts=parts,
         reference=parts.roles.spec("reference"),
@@ -109,6 +113,7 @@ def read_loop(
         delta_hat_0=between(*checked.start("robust")[0]),
         W_hat_0=tuple(between(*ends) for ends in checked.start("weights")) if parts.weights else (),
         acceleration=acceleration(checked.roles.places["plant"]),
+        content=checked.content,
         disturbance=checked.disturbance,
     )
 

@@ -33,6 +33,7 @@ from ..bounds.error_bounds import error_bounds
 from ..bounds.provenance import FROM_STARTS, Constant, Shown, per_second
 from ..bounds.starts import Starts
 from ..loop.checked import read_checked
+from ..loop.content import LoopContent
 from ..loop.external_inputs import ADDED, disturbed
 from ..loop.plant_form import Acceleration, acceleration
 from ..loop.roles import Pieces, Roles, record_of
@@ -75,6 +76,8 @@ class SlidingModeLoop:
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
     disturbance : float
         Bound of what external inputs add to the plant's v.
+    content : LoopContent
+        What the loop consists of.
     """
 
     roles: Roles = field(repr=False)
@@ -85,6 +88,7 @@ class SlidingModeLoop:
     e0: tuple[arb, ...]
     acceleration: Acceleration
     disturbance: float
+    content: LoopContent = field(repr=False)
 
     @property
     def r_0(self) -> arb:
@@ -229,6 +233,7 @@ def read_sliding_mode(
         e0=initial_errors(roles, read.start("plant")),
         acceleration=acceleration(roles.places["plant"]),
         disturbance=read.disturbance,
+        content=read.content,
     )
 
 
