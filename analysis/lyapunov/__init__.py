@@ -4,6 +4,7 @@ from ..intervals.box import Box, visited_box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove
 from ..intervals.level_set import prove_decrease
 from .attraction.barrier import Barrier, barrier
+from .attraction.reachable import ReachableSet, reachable_set
 from .attraction.region import AttractionRegion, region_of_attraction
 from .bounds.clipped import clipped_split
 from .bounds.constants import constants, disturbance, kappa
@@ -57,6 +58,7 @@ __all__ = [
     "Premises",
     "Proof",
     "Range",
+    "ReachableSet",
     "Sector",
     "Signals",
     "SlidingModeCertificate",
@@ -89,6 +91,7 @@ __all__ = [
     "premises",
     "prove",
     "prove_decrease",
+    "reachable_set",
     "read_parts",
     "region_of_attraction",
     "safe_horizon",
