@@ -28,7 +28,9 @@ def up(v):
 def product(a, b, c, d):
     """Return the ends of [a, b] [c, d]."""
     p, q, r, s = a * c, a * d, b * c, b * d
-    low, high = min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
+    below, under = p if p < q else q, r if r < s else s  # as processors have it: no calls
+    above, over = p if p > q else q, r if r > s else s
+    low, high = below if below < under else under, above if above > over else over
     known = 0.0 * (abs(p) + abs(q) + abs(r) + abs(s))
     return down(low) + known, up(high) + known
 

@@ -21,16 +21,19 @@ class Monomials:
         Whether it is never negative.
     products : ndarray of shape (pairs, 3)
         Numbers of two monomials and of their product, as far as that is one.
+    has : ndarray of shape (monomials, variables)
+        Whether a variable is in it.
     """
 
     degrees: np.ndarray
     even: np.ndarray
     products: np.ndarray
+    has: np.ndarray
 
     @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def arrays(self) -> tuple[np.ndarray, ...]:
         """All of it."""
-        return self.degrees, self.even, self.products
+        return self.degrees, self.even, self.products, self.has
 
 
 @functools.lru_cache(maxsize=16)
@@ -51,4 +54,5 @@ def monomials(variables: int, degree: int) -> Monomials:
         degrees=np.array([sum(p) for p in powers], dtype=np.int64),
         even=np.array([all(a % 2 == 0 for a in p) for p in powers]),
         products=np.array([*sums], dtype=np.int64).reshape(-1, 3),
+        has=np.array(powers) > 0,
     )

@@ -52,7 +52,7 @@ def next_polynomials(J, H, P, table, error):
 
     Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
     """
-    degrees, _, products = table
+    degrees, _, products, _ = table
     n, degree = P.shape[0], degrees.max()
     by_degree, whole = np.zeros((n, degree + 1)), np.zeros(n)
     sizes(P, degrees, by_degree, whole)
@@ -156,7 +156,8 @@ def add_left_out(B, transposed, x, c):
 def renewed(c, P, even, B, r, most):
     """Begin with new numbers s where errors have become larger than a part of the polynomials.
 
-    What was there lies in a box along orthogonal directions, with a number for each of them.
+    Return whether.  What was there lies in a box along orthogonal directions, with a number for
+    each of them.
     """
     n = r.shape[0]
     errors, numbers = 0.0, 0.0
@@ -165,7 +166,7 @@ def renewed(c, P, even, B, r, most):
             errors += abs(B[k, j, 0]) * (r[j, 1] - r[j, 0]) * 0.5
         numbers += np.abs(P[k]).sum()
     if not errors > most * numbers or errors == 0.0:
-        return
+        return False
     columns, Q, turned = np.empty((n, 2 * n)), np.empty_like(B), np.empty_like(B)
     for j in range(n):
         columns[:, j] = P[:, j]
@@ -196,6 +197,7 @@ def renewed(c, P, even, B, r, most):
             c[k, 0], c[k, 1] = down(c[k, 0] - around), up(c[k, 1] + around)
     B[:] = Q
     r[:] = 0.0
+    return True
 
 
 @kept(**INNER)

@@ -50,13 +50,14 @@ def _sum_products(folds, order, k, read):
     """Add up what an order needs of those before."""
     for f in range(folds.shape[0]):
         left, right, at = folds[f]
-        read[at] = 0.0
+        least, most = read[at, 0], read[at, 1]
+        least[:], most[:] = 0.0, 0.0
         for j in range(1, order):
-            a, b = k[j, left], k[order - j, right]
-            for lane in range(read.shape[2]):
-                low, high = product(a[0, lane], a[1, lane], b[0, lane], b[1, lane])
-                read[at, 0, lane] = down(read[at, 0, lane] + low)
-                read[at, 1, lane] = up(read[at, 1, lane] + high)
+            a, b = k[j, left, 0], k[j, left, 1]
+            c, d = k[order - j, right, 0], k[order - j, right, 1]
+            for lane in range(least.size):
+                low, high = product(a[lane], b[lane], c[lane], d[lane])
+                least[lane], most[lane] = down(least[lane] + low), up(most[lane] + high)
 
 
 @kept(**INNER)
@@ -85,7 +86,10 @@ def fill_lanes(box, middle, lanes):
 
 @kept(**INNER)
 def derivatives(lanes, at, J, H):
-    """Read where the middle comes to, and both derivatives: shapes (n, 2), (n, n, 2), (n, n, n, 2)."""
+    """Read where the middle comes to, and both derivatives.
+
+    Shapes: `at` (n, 2), `J` (n, n, 2), `H` (n, n, n, 2).
+    """
     n, width, lane = at.shape[0], lanes.shape[3], 0
     for i in range(n):
         for j in range(i + 1):

@@ -16,7 +16,7 @@ from .sets import hull, next_errors, next_polynomials, renewed, slopes_within
 from .steps import add_up, coefficients, derivatives, fill_lanes, rest_of_step
 
 REACHED, LEFT, OUTSIDE, STUCK = range(4)
-ORDER, DEGREE, TOLERANCE = 6, 4, 1e-9
+ORDER, DEGREE, TOLERANCE = 8, 4, 1e-9
 _BEYOND = 1.0 + 1e-9  # a last step leads so far, relative to it
 _HALVINGS = 12  # of a step in which no solution is found
 _NEW = 0.5  # of the polynomials, beyond which errors become numbers of their own
@@ -39,7 +39,7 @@ class Tube:
     end : ndarray of shape (n, 2)
         At the end.
     weight : ndarray of shape (n,)
-        How much each side of the box matters to where it ended.
+        How much each side of the box has to do with what is not linear in it.
     steps : int
     """
 
@@ -67,7 +67,7 @@ def tube_from(
     n, box = code.order, np.array(box, dtype=float)
     table = monomials(n, degree)
     low, high = np.full((cells, n), np.inf), np.full((cells, n), -np.inf)
-    end, weight = np.empty((n, 2)), np.empty(n)
+    end, weight = np.empty((n, 2)), np.zeros(n)
     status, time, steps = integrated(
         code.addresses, code.places, code.folds, table.arrays, box, float(duration),
         np.array(limits, dtype=float), order, tolerance, LANES, low, high, end, weight,
@@ -89,7 +89,7 @@ def integrated(
     c, P, B, r = first_set(box, table[0].size)
     middle, over, begin = np.empty(n), np.empty((n, 2)), np.empty((n, 2))
     early, late, h, steps, status = 0.0, 0.0, duration, 0, REACHED
-    flow = np.eye(n)
+    first_numbers = True
     hull(c, P, table[1], B, r, end)
     while early < duration:
         for i in range(n):
@@ -114,8 +114,10 @@ def integrated(
         here = np.array([h, h])
         for g in range(groups):
             add_up(k[g], order, here, rest[g], at_end[g])
-        carry_on(at_end, table, end, middle, c, P, B, r, flow)
-        renewed(c, P, table[1], B, r, _NEW)
+        carry_on(at_end, table, end, middle, c, P, B, r)
+        if first_numbers:
+            matter(P, table, box, weight)
+        first_numbers = not renewed(c, P, table[1], B, r, _NEW) and first_numbers
         begin[:] = end
         hull(c, P, table[1], B, r, end)
         between(ky[0], h, begin, end, over)
@@ -126,7 +128,6 @@ def integrated(
             break
     if status == REACHED:
         back_to(end, ky[0, 1], up(late - duration))
-    matter(flow, box, limits, end, weight, status)
     return status, early, steps
 
 
@@ -145,7 +146,7 @@ def first_set(box, count):
 
 
 @kept(**INNER)
-def carry_on(lanes, table, box, middle, c, P, B, r, flow):
+def carry_on(lanes, table, box, middle, c, P, B, r):
     """Carry a set on by a step, in place."""
     n = middle.size
     at, J, H = np.empty((n, 2)), np.empty((n, n, 2)), np.empty((n, n, n, 2))
@@ -159,7 +160,6 @@ def carry_on(lanes, table, box, middle, c, P, B, r, flow):
     add_image(K, c, error)
     next_polynomials(J, H, P, table, error)
     next_errors(K, error, point, c, B, r)
-    flow[:] = (0.5 * J[:, :, 0] + 0.5 * J[:, :, 1]) @ flow
 
 
 @kept(**INNER)
@@ -236,13 +236,11 @@ def back_to(end, rates, beyond):
 
 
 @kept(**INNER)
-def matter(flow, box, limits, end, weight, status):
-    """Write how much each side of the first box has to do with where the set has come to.
-
-    Of what leaves the limits if anything does.
-    """
+def matter(P, table, box, weight):
+    """Write how much each side of the first box has to do with what is not linear in it."""
     for j in range(weight.size):
         weight[j] = 0.0
-        for i in range(weight.size):
-            if status == STUCK or not (limits[i, 0] <= end[i, 0] and end[i, 1] <= limits[i, 1]):
-                weight[j] += abs(flow[i, j]) * (box[j, 1] - box[j, 0])
+        for a in range(P.shape[1]):
+            if table[3][a, j] and box[j, 0] < box[j, 1]:
+                part = 1.0 if table[0][a] > 1 else 1e-6  # of a linear motion that alone
+                weight[j] += part * np.abs(P[:, a]).sum()
