@@ -16,7 +16,7 @@ from .sets import hull, next_errors, next_polynomials, renewed, slopes_within
 from .steps import add_up, coefficients, derivatives, fill_lanes, rest_of_step
 
 REACHED, LEFT, OUTSIDE, STUCK = range(4)
-ORDER, DEGREE, TOLERANCE = 8, 4, 1e-9
+ORDER, DEGREE, TOLERANCE = 6, 4, 1e-8
 _BEYOND = 1.0 + 1e-9  # a last step leads so far, relative to it
 _HALVINGS = 12  # of a step in which no solution is found
 _NEW = 0.5  # of the polynomials, beyond which errors become numbers of their own
