@@ -1,10 +1,10 @@
 """Sets of solutions: closed forms, random trajectories, and what must not be called proved."""
 
+import control as ct
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-import nlctl
 from nlctl.analysis.lyapunov import Box, reachable_set
 from nlctl.errors import ParameterError
 
@@ -29,7 +29,7 @@ def pendulum(x):
 
 def quotients(x):
     """Rates with a quotient, an exponential and a root."""
-    return np.exp(-x[0]) - x[1] / (1 + x[0] ** 2), np.sqrt(1 + x[1] ** 2) - x[1] * x[0]
+    return 1 / (1 + x[1] ** 2) - x[0], np.exp(-x[0]) - np.sqrt(1 + x[1] ** 2) * x[1]
 
 
 def stiff_pair(x):
@@ -142,7 +142,9 @@ def test_a_solution_that_escapes_is_undecided():
 
 
 def test_what_has_no_value_is_undecided():
-    found = reachable_set(lambda x: (-np.sqrt(x[0]) - 0.1,), Box.of(x1=(0.5, 0.6)), 3.0, max_pieces=9)
+    found = reachable_set(
+        lambda x: (-np.sqrt(x[0]) - 0.1,), Box.of(x1=(0.5, 0.6)), 3.0, max_pieces=9
+    )
     assert found.status == "undecided"
 
 
@@ -168,9 +170,17 @@ def test_wrong_arguments_are_named(change, message):
 
 
 def test_a_diagram_has_the_set_of_its_equations():
-    plant = nlctl.PureFeedback(order=2, f=lambda x, v: -np.sin(x[0]) - 0.5 * x[1] + v)
-    loop = nlctl.interconnect({"plant": plant, "law": nlctl.StateFeedback(K=(1.0, 0.5))})
-    start = Box.of(**{"plant.x1": (0.4, 0.6), "plant.x2": (-0.1, 0.1)})
+    plant = ct.nlsys(
+        lambda t, x, u, p: np.array([x[1], -np.sin(x[0]) - 0.5 * x[1] + u[0]]),
+        lambda t, x, u, p: x,
+        states=["angle", "rate"], inputs=["torque"], outputs=["angle", "rate"], name="plant",
+    )  # fmt: skip
+    law = ct.nlsys(
+        None, lambda t, x, u, p: np.array([-u[0] - 0.5 * u[1]]), inputs=["angle", "rate"],
+        outputs=["torque"], name="law",
+    )  # fmt: skip
+    loop = ct.interconnect([plant, law], inputs=[], outputs=["angle"], name="loop")
+    start = Box.of(plant_angle=(0.4, 0.6), plant_rate=(-0.1, 0.1))
     found = reachable_set(loop, start, 3.0)
     plain = reachable_set(
         lambda x: (x[1], -np.sin(x[0]) - 0.5 * x[1] - x[0] - 0.5 * x[1]),
