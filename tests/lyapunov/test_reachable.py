@@ -1,5 +1,7 @@
 """Sets of solutions: closed forms, random trajectories, and what must not be called proved."""
 
+import itertools
+
 import control as ct
 import numpy as np
 import pytest
@@ -51,7 +53,7 @@ LINEAR = {
 def integrated(function, x, t, substeps):
     """Yield states at times by the classical method of order four."""
     yield x
-    for begin, end in zip(t, t[1:], strict=False):
+    for begin, end in itertools.pairwise(t):
         h = (end - begin) / substeps
         for _ in range(substeps):
             k1 = np.stack(function(x))

@@ -88,26 +88,17 @@ def integrated(
     read, first = np.zeros((read_rows, 2, lanes)), np.zeros((rows + kept_rows, 2, lanes))
     c, P, B, r = first_set(box, table[0].size)
     middle, over, begin = np.empty(n), np.empty((n, 2)), np.empty((n, 2))
-    early, late, h, steps, status = 0.0, 0.0, duration, 0, REACHED
-    first_numbers = True
+    early, late, h, steps, status, first_numbers = 0.0, 0.0, duration, 0, REACHED, True
     hull(c, P, table[1], B, r, end)
     while early < duration:
         for i in range(n):
             middle[i] = 0.5 * c[i, 0] + 0.5 * c[i, 1]
         fill_lanes(end, middle, boxes)
-        for g in range(groups):
-            coefficients(code, places, folds, boxes[g], order, k[g], read, first)
-        h = min(2.0 * h, step_size(k[pairs // lanes], order, pairs % lanes, n, tol))
-        h = min(h, (duration - early) * _BEYOND)
-        is_held = False
-        for _ in range(_HALVINGS):
-            is_held = h > 0.0 and rest_of_step(
-                code, places, folds, order, h, k, ky, boxes, rest, pad, read, first
-            )
-            if is_held:
-                break
-            h *= 0.6
-        if not is_held or steps == _MOST:
+        h = step_found(
+            code, places, folds, order, tol, 2.0 * h, duration - early, k, ky, boxes, rest, pad,
+            read, first,
+        )  # fmt: skip
+        if h == 0.0 or steps == _MOST:
             status = STUCK
             break
         span(k[0], ky[0], order, h, boxes[0], over)
@@ -123,12 +114,29 @@ def integrated(
         between(ky[0], h, begin, end, over)
         enter(over, early / duration, up(late + h) / duration, low, high)
         steps, early, late = steps + 1, down(early + h), up(late + h)
+        if early >= duration:
+            back_to(end, ky[0, 1], up(late - duration))
         status = judged(over, end, limits)
         if status != REACHED:
             break
-    if status == REACHED:
-        back_to(end, ky[0, 1], up(late - duration))
     return status, early, steps
+
+
+@kept(**INNER)
+def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, pad, read, first):
+    """Return the size of a step for which there is a rest, at most `most`; 0 for none."""
+    groups, n, lanes = boxes.shape[0], boxes.shape[1] // 4, boxes.shape[3]
+    for g in range(groups):
+        coefficients(code, places, folds, boxes[g], order, k[g], read, first)
+    point = n * (n + 1) // 2
+    h = min(most, step_size(k[point // lanes], order, point % lanes, n, tol), left * _BEYOND)
+    for _ in range(_HALVINGS):
+        if h > 0.0 and rest_of_step(
+            code, places, folds, order, h, k, ky, boxes, rest, pad, read, first
+        ):
+            return h
+        h *= 0.6
+    return 0.0
 
 
 @kept(**INNER)
