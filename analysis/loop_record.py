@@ -28,7 +28,7 @@ from nlctl.diagrams import (
     state_names,
 )
 from nlctl.diagrams.points import OTHER_VERSIONS, agree, values_now
-from nlctl.native.machine.fingerprint import content_key, unseen_in
+from nlctl.native.machine.fingerprint import content_key, content_of, unseen_in
 from nlctl.params import declared_params
 from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
@@ -38,10 +38,13 @@ __all__ = [
     "array_text",
     "difference_text",
     "fact_differences",
+    "facts_and_unseen",
     "loop_facts",
     "loop_values",
     "short_key",
+    "text_key",
     "unseen_parts",
+    "value_text",
     "values_differ",
 ]
 
@@ -56,15 +59,25 @@ _MOST = 4  # differences that a sentence names
 
 def loop_facts(system: ct.InputOutputSystem) -> dict[str, dict[str, str]]:
     """Return what a diagram consists of."""
+    return facts_and_unseen(system)[0]
+
+
+def facts_and_unseen(
+    system: ct.InputOutputSystem,
+) -> tuple[dict[str, dict[str, str]], dict[str, list[str]]]:
+    """Return what a diagram consists of, and what the keys of its blocks cannot see of it."""
+    read = {p.path or p.system.name: _read(p.system) for p in leaves(system)}
     start = zip(state_names(system), initial_state(system).tolist(), strict=True)
     wired = [p for p in places(system) if isinstance(p.system, ct.InterconnectedSystem)]
     found = {
-        "blocks": {p.path or p.system.name: _block(p.system) for p in leaves(system)},
+        "blocks": {path: key for path, (key, _) in read.items()},
         "wiring": {p.path or "diagram": _wiring(p.system) for p in wired},
         "parameters": _parameters(system),
         "initial_state": {name: repr(value) for name, value in start if value},
     }
-    return {part: _steady(system, content) for part, content in found.items()}
+    unseen = {path: told for path, (_, told) in read.items() if told}
+    facts = {part: _steady(system, content) for part, content in found.items()}
+    return facts, _steady(system, unseen)
 
 
 def _steady(system: ct.InputOutputSystem, content: Mapping[str, _T]) -> dict[str, _T]:
@@ -84,15 +97,16 @@ def short_key(*things: Any) -> str:
 
 def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
     """Return what the keys of a diagram's blocks cannot see: they may differ in it unnoticed."""
-    found = {p.path or p.system.name: unseen_in(*_parts(p.system)) for p in leaves(system)}
-    return _steady(system, {path: told for path, told in found.items() if told})
+    return facts_and_unseen(system)[1]
 
 
-def _block(system: System) -> str:
-    """Return a key of a block's equations; its parameters' values are told by themselves."""
+def _read(system: System) -> tuple[str, list[str]]:
+    """Return a key of a block's equations, and what it cannot see; values are told elsewhere."""
     if isinstance(system, Sampled):
-        return short_key(_block(system.inner), *_parts(system)[1:])
-    return short_key(*_parts(system))
+        own = short_key(_read(system.inner)[0], *_parts(system)[1:])
+        return own, unseen_in(*_parts(system))
+    key, unseen = content_of(*_parts(system))
+    return key[:16], unseen
 
 
 def _parts(system: System) -> list[Any]:
@@ -137,10 +151,11 @@ def _parameters(system: Any) -> dict[str, str]:
     }
     found |= dict(system.params or {})
     found |= {row.name: row.value for row in all_parameter_rows(system)}
-    return {name: _value_text(value) for name, value in found.items()}
+    return {name: value_text(value) for name, value in found.items()}
 
 
-def _value_text(value: object) -> str:
+def value_text(value: object) -> str:
+    """Return what tells a parameter's value from another one."""
     if isinstance(value, bool | int | float | str | np.generic):
         return repr(value.item() if isinstance(value, np.generic) else value)
     try:
@@ -153,6 +168,11 @@ def array_text(values: Any) -> str:
     """Return what tells an array of numbers from another one."""
     array = np.asarray(values, dtype="<f8")
     return f"{hashlib.sha256(array.tobytes()).hexdigest()[:16]} of shape {array.shape}"
+
+
+def text_key(text: str) -> str:
+    """Return a key of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def loop_values(system: Any, end: float) -> dict[str, float | str]:

@@ -2,11 +2,15 @@
 
 Boxes a second for V' < 0 of a pendulum, and `certify` of both examples with a known sign: the same
 claims, first on python-flint's balls alone, then with machine code.  What the code needs is made
-before, as by an earlier proof.
+before, as by an earlier proof.  A loop that was certified before is compared with python-control's
+own at one point, one with other gains at all of them.  Then sets of solutions of ARCH-COMP's
+nonlinear systems; with ``--long`` also the one that takes minutes.
 """
 
 from __future__ import annotations
 
+import itertools
+import sys
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -18,7 +22,7 @@ from rich.table import Table
 
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
-from nlctl.analysis.lyapunov import Box, certify, prove_decrease
+from nlctl.analysis.lyapunov import Box, certify, prove_decrease, reachable_set
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
 from nlctl.native.enclosures.divide import decide_claim
 
@@ -91,21 +95,69 @@ def decrease(table: Table) -> None:
 
 
 def certificates(table: Table) -> None:
-    """Measure `certify`."""
+    """Measure `certify`: of a loop with other gains than before, and of the same loop again."""
     for example, order in ((1, 2), (2, 3)):
-        loop, times, bounds = known_sign(order), [], []
-        for only in (only_balls, nullcontext):
+        loop, others = known_sign(order), (2.0 + 1e-9 * k for k in itertools.count(1))
+        another = lambda: certify(loop, params={"law.beta": next(others)})  # noqa: B023, E731
+        again = lambda: certify(loop)  # noqa: B023, E731
+        ways = (
+            ("balls, other gains", only_balls, another), ("other gains", nullcontext, another),
+            ("balls, again", only_balls, again), ("again", nullcontext, again),
+        )  # fmt: skip
+        times, bounds = [], []
+        for how, only, call in ways:
             with only():
-                certify(loop)
-                seconds, found = best(lambda: certify(loop))  # noqa: B023
+                call()
+                seconds, found = best(call)
             times.append(seconds)
             bounds.append(found.C_0)
-        share = (bounds[1] - bounds[0]) / bounds[0]
-        for how, seconds in zip(("balls", "machine code"), times, strict=True):
+            share = "" if len(bounds) % 2 else f"C_0 {(bounds[-1] - bounds[-2]) / bounds[-2]:+.1e}"
             table.add_row(
-                f"certify, Example {example}: {how}", f"C_0 {share:+.1e}" if how != "balls" else "",
-                "", f"{seconds:.3f} s", f"{times[0] / seconds:.1f}",
+                f"certify, Example {example}: {how}", share, "", f"{seconds:.3f} s",
+                f"{times[0] / seconds:.1f}",
             )  # fmt: skip
+
+
+def laub_loomis(x: Any) -> Any:
+    """Rates of the benchmark LALO20 of ARCH-COMP."""
+    x1, x2, x3, x4, x5, x6, x7 = x
+    return (
+        1.4 * x3 - 0.9 * x1, 2.5 * x5 - 1.5 * x2, 0.6 * x7 - 0.8 * x2 * x3, 2 - 1.3 * x3 * x4,
+        0.7 * x1 - x4 * x5, 0.3 * x1 - 3.1 * x6, 1.8 * x6 - 1.6 * x2 * x7,
+    )  # fmt: skip
+
+
+def coupled(x: Any) -> Any:
+    """Rates of the benchmark CVDP23: two of Van der Pol's oscillators, and what couples them."""
+    x1, y1, x2, y2, b = x
+    return (
+        y1, (1 - x1**2) * y1 + b * (x2 - x1) - x1, y2, (1 - x2**2) * y2 - b * (x2 - x1) - x2,
+        0.0 * b,
+    )  # fmt: skip
+
+
+def tubes(table: Table, *, long: bool) -> None:
+    """Prove the sets of solutions of ARCH-COMP's nonlinear systems; one takes minutes."""
+    centre = (1.2, 1.05, 1.5, 2.4, 1.0, 0.1, 0.45)
+    reachable_set(laub_loomis, Box.of(**{f"x{i + 1}": (v, v) for i, v in enumerate(centre)}), 0.1)
+    for width, limit in ((0.01, 4.5), (0.05, 4.5), (0.1, 5.0)):
+        box = Box.of(**{f"x{i + 1}": (v - width, v + width) for i, v in enumerate(centre)})
+        found = reachable_set(laub_loomis, box, 20.0, within=Box.of(x4=(-np.inf, limit)))
+        name = f"LALO20, W = {width:g}: x4 < {limit:g}"
+        _tube_row(table, name, found, f"width {found.end_high[3] - found.end_low[3]:.3g}")
+    if long:
+        x, y = (1.25, 1.55), (2.35, 2.45)
+        found = reachable_set(
+            coupled, Box.of(x1=x, y1=y, x2=x, y2=y, b=(1.0, 3.0)), 7.0, max_pieces=10_000,
+            within=Box.of(y1=(-np.inf, 2.75), y2=(-np.inf, 2.75)),
+        )  # fmt: skip
+        slack = max(found.bounds("y1")[1], found.bounds("y2")[1]) - 2.75
+        _tube_row(table, "CVDP23: y1, y2 < 2.75", found, f"slack {slack:.2g}")
+
+
+def _tube_row(table: Table, name: str, found: Any, what: str) -> None:
+    table.add_row(name, f"{found.status}, {what}", f"{found.pieces} pieces",
+                  f"{found.seconds:.2f} s", "")  # fmt: skip
 
 
 def main() -> None:
@@ -113,6 +165,7 @@ def main() -> None:
     table = Table("what", "result", "speed", "time", "ratio")
     decrease(table)
     certificates(table)
+    tubes(table, long="--long" in sys.argv)
     Console(width=120).print(table)
 
 

@@ -4,6 +4,7 @@ from ..intervals.box import Box, visited_box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove
 from ..intervals.level_set import prove_decrease
 from .attraction.barrier import Barrier, barrier
+from .attraction.reachable import ReachableSet, reachable_set
 from .attraction.region import AttractionRegion, region_of_attraction
 from .bounds.clipped import clipped_split
 from .bounds.decomposition import Decomposition, DecompositionError, decompose
@@ -58,6 +59,7 @@ __all__ = [
     "Premises",
     "Proof",
     "Range",
+    "ReachableSet",
     "Sector",
     "Signals",
     "SlidingModeCertificate",
@@ -90,6 +92,7 @@ __all__ = [
     "premises",
     "prove",
     "prove_decrease",
+    "reachable_set",
     "read_parts",
     "region_of_attraction",
     "safe_horizon",

@@ -47,7 +47,7 @@ def rates_and_outputs_now(
     system: Any, t: float, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return both, as `rates_now` and `outputs_now` do; a diagram's signals are computed once."""
-    own = (type(system)._rhs, type(system)._out)
+    own = tuple(getattr(each, "__func__", None) for each in (system._rhs, system._out))
     if own != (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out):
         return (
             rates_now(system, t, x, u) if system.nstates else np.empty(0),

@@ -62,7 +62,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],
-        ["ahead", "integrate.results"],
+        ["ahead", "integrate.results", "tubes"],
         ["integrate.driver", "own_errors"],
         ["ensemble", "response"],
     ],

@@ -36,7 +36,7 @@ from ..bounds.decomposition import decompose
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..loop.checked import read_checked
 from ..loop.external_inputs import disturbed
-from ..loop.roles import PIECES, Parts, has_law, read_parts
+from ..loop.roles import PIECES, Parts, has_law, parts_of
 from ..proofs.filtered import Demand, FilteredLoop, as_filtered, between, demand, feedforward
 from ..proofs.filtered_certificate import FilteredCertificate
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
@@ -153,8 +153,8 @@ def read_known_sign(
     starts: Any = None,
 ) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
-    parts = read_parts(loop, params=params, inputs=True)
     read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
+    parts = parts_of(read.given, read.roles)
     return KnownSignLoop(
         **as_filtered(read),
         parts=parts,

@@ -13,6 +13,7 @@ from nlctl.blocks import block
 from nlctl.diagrams import initial_state, interconnect, overridden, state_names
 
 from ..bounds.starts import Sides, Starts, read_starts
+from .content import LoopContent, loop_content
 from .external_inputs import bound_of_inputs
 from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
@@ -33,6 +34,10 @@ class CheckedLoop:
         Bound of what external inputs add to the plant's v.
     starts : Starts
         Initial states that the proof shall be about.
+    content : LoopContent
+        What the loop consists of.
+    given : control.InterconnectedSystem
+        A copy of the loop, with the parameters of the run.
     understood : control.InterconnectedSystem
         The loop, connected again by name, with all its signals as outputs.
     """
@@ -40,6 +45,8 @@ class CheckedLoop:
     roles: Roles
     disturbance: float
     starts: Starts
+    content: LoopContent = field(repr=False)
+    given: ct.InterconnectedSystem = field(repr=False)
     understood: ct.InterconnectedSystem = field(repr=False)
 
     def start(self, part: str) -> Sides:
@@ -58,9 +65,11 @@ def read_checked(
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
     """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
+    content = LoopContent(facts={}, key="")
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
+        content = loop_content(loop, params)
         loop = overridden(loop, params)
-    roles = read_roles(loop, pieces)
+    roles = read_roles(loop, pieces, content.key)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
     for part, wanted in kinds.items():
         if part in roles.places:  # a network may be left out
@@ -74,8 +83,11 @@ def read_checked(
     )
     again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
     understood = interconnect(again, name=str(loop.name))
-    check_same(loop, understood, _compared_at(loop, begins), params)
-    return CheckedLoop(roles=roles, disturbance=disturbance, starts=begins, understood=understood)
+    check_same(loop, understood, _compared_at(loop, begins), params, content=content.key)
+    return CheckedLoop(
+        roles=roles, disturbance=disturbance, starts=begins, content=content, given=loop,
+        understood=understood,
+    )  # fmt: skip
 
 
 def _states(loop: Any, roles: Roles, part: str) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ certificate encloses the latter, so that nothing rests on the two being the same
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from nlctl.expressions.arrays import Tracer, concatenated, traced
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.diagram.checks import check_functions
 from nlctl.native.enclosures.boxes import traced_numbers
+from nlctl.native.machine.fingerprint import content_of
 from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import current_parameters
 
@@ -41,13 +42,14 @@ class Acceleration(Protocol):
         ...
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class _Acceleration:
-    """The last rate of a plant's own update."""
+    """The last rate of a plant's own update; two of the same content are equal."""
 
-    plant: Place
-    update: Callable[..., Any]
-    p: Any
+    plant: Place = field(compare=False)
+    update: Callable[..., Any] = field(compare=False)
+    p: Any = field(compare=False)
+    content: object
 
     def __call__(self, t: Any, x: Any, v: Any) -> Any:
         return self.update(t, _objects(x), _objects((v,)), self.p)[-1]
@@ -81,7 +83,8 @@ def acceleration(plant: Place) -> Acceleration:
     """Return x_n', from what a run integrates, with its parameters."""
     p = current_parameters(plant.system)
     update = on_intervals(plant.path, plant.system.updfcn)  # with arrays of floats, as a run
-    return _Acceleration(plant=plant, update=update, p=p)
+    key, unseen = content_of(plant.system.updfcn, p)
+    return _Acceleration(plant=plant, update=update, p=p, content=object() if unseen else key)
 
 
 def check_chain(plant: Place) -> None:

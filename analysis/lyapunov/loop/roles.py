@@ -27,9 +27,20 @@ from nlctl.plants import coordinate_names
 from nlctl.upstream.control_internals import Around
 
 from ..bounds.final_bound import Gains
+from .content import Remembered
 
-__all__ = ["PIECES", "Parts", "Roles", "check_kind", "joined_again", "read_parts", "read_roles"]
+__all__ = [
+    "PIECES",
+    "Parts",
+    "Roles",
+    "check_kind",
+    "joined_again",
+    "parts_of",
+    "read_parts",
+    "read_roles",
+]
 
+_PURE = Remembered()  # loops whose functions were read
 Pieces = Mapping[str, tuple[str, tuple[str, ...]]]
 # A block is known by a signal that it outputs, and by what the proof reads of its record.
 PIECES: Pieces = {
@@ -89,13 +100,16 @@ def declared(place: Place, kind: str) -> list[str]:
     return list(labels if spec is None else getattr(spec, kind))
 
 
-def read_roles(loop: Any, pieces: Pieces = PIECES) -> Roles:
-    """Find the blocks of a closed loop and check every wire between them."""
+def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
+    """Find the blocks of a closed loop and check every wire between them; by a key of the loop."""
     diagram = isinstance(loop, ct.InterconnectedSystem)
     if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
         raise DiagramError("the proof needs a closed loop, a diagram with the output r")
     wiring = Wiring(loop)
     _check_blocks(loop, wiring)
+    if content not in _PURE:
+        _check_functions(wiring)
+        _PURE.add(content)
     places = _found(wiring, pieces)
     named = {
         name: Signal(i, k)
@@ -121,6 +135,10 @@ def _check_blocks(loop: Any, wiring: Wiring) -> None:
                 f"the proof is about continuous time, and '{place.path}' is sampled: put the block "
                 "itself there, without nlctl.sampled"
             )
+
+
+def _check_functions(wiring: Wiring) -> None:
+    """Functions of their arguments alone, which are the records' own."""
     for place in wiring.blocks:
         try:
             check_functions(place.path, place.system)
@@ -361,7 +379,6 @@ def read_parts(
     loop: ct.InterconnectedSystem,
     start: Mapping[str, float] | None = None,
     params: Mapping[str, Any] | None = None,
-    inputs: bool = False,
 ) -> Parts:
     """Read plant, actuator and controller pieces of a loop such as `nlctl.paper.example_1`.
 
@@ -373,8 +390,6 @@ def read_parts(
         Initial states other than the blocks' own, ``{"plant.x1": 0.8}``.
     params : mapping, optional
         Qualified parameters other than the blocks' own.
-    inputs : bool, optional
-        Whether external inputs may be added to the plant's v.
 
     Returns
     -------
@@ -398,12 +413,19 @@ def read_parts(
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         loop = overridden(loop, params)
     roles = read_roles(loop)
-    if roles.disturbances and not inputs:
+    if roles.disturbances:
         names = ", ".join(f"'{name}'" for name in roles.disturbances)
         raise DiagramError(
             f"external input {names} is added to the plant's v: the proof needs its bound, and "
             "takes one in certify(loop, inputs={...}) only"
         )
+    return parts_of(loop, roles, start)
+
+
+def parts_of(
+    loop: ct.InterconnectedSystem, roles: Roles, start: Mapping[str, float] | None = None
+) -> Parts:
+    """Return the parts of a loop that was read, with the parameters that its blocks have now."""
     specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
     own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}

@@ -33,6 +33,7 @@ from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
 from ..bounds.starts import Sides, Starts
 from ..loop.checked import read_checked
+from ..loop.content import LoopContent
 from ..loop.plant_form import Acceleration, acceleration, on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
@@ -88,6 +89,8 @@ class ModelReferenceLoop:
         Bound of what external inputs add to the plant's v.
     understood : control.InterconnectedSystem
         The loop, connected again by name, with all its signals as outputs.
+    content : LoopContent
+        What the loop consists of.
     """
 
     roles: Roles
@@ -103,6 +106,7 @@ class ModelReferenceLoop:
     regressor: Regressor = field(repr=False)
     disturbance: float
     understood: ct.InterconnectedSystem = field(repr=False)
+    content: LoopContent = field(repr=False)
 
     def spec(self, part: str) -> Any:
         """Return the record of a part, with the parameters of the run."""
@@ -153,6 +157,7 @@ def read_model_reference(
         regressor=_regressor(roles.places["basis"], order),
         disturbance=read.disturbance,
         understood=read.understood,
+        content=read.content,
     )
 
 

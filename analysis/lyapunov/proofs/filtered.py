@@ -24,6 +24,7 @@ from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_function, range_of_quotient
 from ..bounds.starts import Starts
 from ..loop.checked import CheckedLoop
+from ..loop.content import LoopContent
 from ..loop.plant_form import Acceleration, acceleration
 from ..loop.roles import Roles
 
@@ -46,6 +47,8 @@ class FilteredLoop:
         x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
     disturbance : float
         Bound of what external inputs add to the plant's v.
+    content : LoopContent
+        What the loop consists of.
     """
 
     roles: Roles = field(repr=False)
@@ -53,6 +56,7 @@ class FilteredLoop:
     starts: Starts
     e0: tuple[arb, ...]
     acceleration: Acceleration
+    content: LoopContent = field(repr=False)
     disturbance: float = 0.0
 
     @property
@@ -86,6 +90,7 @@ def as_filtered(read: CheckedLoop) -> dict[str, Any]:
         "e0": _initial_errors(read),
         "acceleration": acceleration(plant),
         "disturbance": read.disturbance,
+        "content": read.content,
     }
 
 

@@ -17,7 +17,6 @@ from flint import arb
 from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
-from ...loop_record import loop_facts
 from ..bounds.decomposition import Decomposition, only_declared
 from .result import Certificate, ProofResult
 
@@ -158,7 +157,7 @@ def certified(kind: Any, loop: Any, options: ProofOptions) -> Certificate:
         boxes=closed.region.boxes,
         arithmetic=closed.region.arithmetic,
         params=dict(options.params or {}),
-        loop_facts=loop_facts(loop),
+        loop_facts=dict(subject.loop.content.facts),
         **kind.found(subject, closed),
         seconds=time.perf_counter() - begun,
     )

@@ -104,6 +104,13 @@ def enclosure_text(
     return "\n".join([module.text(), *texts])
 
 
+def values_text(results: Sequence[Expr], lanes: int = LANES) -> str:
+    """Return the IR of `values` alone."""
+    module = Module(inlined=len(needed(results)) <= INLINED)
+    text = _values(module, results, lanes)
+    return f"{module.text()}\n{text}"
+
+
 class EnclosureWriter:
     """Writes enclosures of expressions; `names` says what each is called so far.
 

@@ -35,6 +35,8 @@ _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand
 MODULE = "\1of "  # begins a text that names a module and nothing of its content
 HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
 _CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
+_NUMBERS = frozenset({int, float, complex, bool, type(None)})
+_HOLDERS = (str, tuple, list, dict)
 _MACHINERY = (
     types.MemberDescriptorType,
     types.GetSetDescriptorType,
@@ -97,13 +99,20 @@ def content_key(*things: Any) -> str:
 
     Unlike `function_key` it does not tell functions of the same content in different modules.
     """
-    return _digest_of(text for text in _content(things) if not _is_place(text))
+    return content_of(*things)[0]
 
 
 def unseen_in(*things: Any) -> list[str]:
     """Return what `content_key` cannot see of functions: another content has the same key."""
-    found = (text for text in _content(things) if text.startswith(OPAQUE))
-    return list(dict.fromkeys(text.removeprefix(OPAQUE) for text in found))
+    return content_of(*things)[1]
+
+
+def content_of(*things: Any) -> tuple[str, list[str]]:
+    """Return a key of what functions compute, and what it cannot see of them."""
+    texts = list(_content(things))
+    key = _digest_of(text for text in texts if not _is_place(text))
+    unseen = (text.removeprefix(OPAQUE) for text in texts if text.startswith(OPAQUE))
+    return key, list(dict.fromkeys(unseen))
 
 
 def _content(things: Iterable[Any]) -> Iterator[str]:
@@ -129,15 +138,18 @@ def _digest(*things: Any) -> str:
 
 
 def _digest_of(texts: Iterable[str]) -> str:
-    digest = hashlib.sha256()
-    for text in texts:
-        digest.update(text.encode() + b"\0")
-    return digest.hexdigest()[:32]
+    every = "\0".join((*texts, ""))
+    return hashlib.sha256(every.encode()).hexdigest()[:32]
 
 
 def _fingerprint(thing: object, seen: _Seen, names: Iterable[str] = ()) -> Iterator[str]:
     """Yield text for a thing and all that it refers to; `names` are what is read of a module."""
-    if isinstance(thing, str | tuple | list | dict):
+    kind = type(thing)
+    if kind in _NUMBERS:
+        yield repr(thing)
+    elif kind is str:
+        yield _of_text(thing, seen)
+    elif isinstance(thing, _HOLDERS):
         is_text = isinstance(thing, str)
         yield from (_of_text(thing, seen),) if is_text else _of_container(thing, seen)
         if seen.deep and _is_users(type(thing)):
@@ -165,7 +177,7 @@ def _fingerprint(thing: object, seen: _Seen, names: Iterable[str] = ()) -> Itera
 
 def _of_text(text: str, seen: _Seen) -> str:
     """Return a text as it counts: python-control numbers the systems of a process, ``sys[7]``."""
-    return repr(re.sub(r"sys\[\d+\]", "sys[]", text) if seen.deep else text)
+    return repr(re.sub(r"sys\[\d+\]", "sys[]", text) if seen.deep and "sys[" in text else text)
 
 
 def _plain(thing: object, seen: _Seen | None = None) -> Any:
@@ -200,7 +212,7 @@ def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
     if not seen.add(function):
         return
     yield f"{MODULE}{function.__module__}"  # what is on disk refers to it by this name
-    yield from _code_text(function.__code__)
+    yield _code_text(function.__code__)
     for given in (function.__defaults__, function.__kwdefaults__):
         yield from _fingerprint(given, seen)
     names = _all_names(function.__code__)
@@ -396,7 +408,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
         for part in vars(thing).values() if isinstance(thing, type) else [thing]:
             if isinstance(function := _plain(part), types.FunctionType):
                 yield name
-                yield from _code_text(function.__code__)
+                yield _code_text(function.__code__)
 
 
 def _is_named(module: str) -> bool:
@@ -414,17 +426,24 @@ def _is_library(name: str | None) -> bool:
     return file is None or any(Path(file).is_relative_to(f) for f in STANDARD)
 
 
-def _code_text(code: types.CodeType) -> Iterator[str]:
+@functools.lru_cache(maxsize=4096)
+def _code_text(code: types.CodeType) -> str:
+    """Return text for a code object and those nested in it, which never change."""
+    return "\0".join(_code_parts(code))
+
+
+def _code_parts(code: types.CodeType) -> Iterator[str]:
     yield code.co_code.hex() + code.co_exceptiontable.hex()
     yield " ".join(code.co_names + code.co_varnames + code.co_freevars)
     yield f"{code.co_argcount} {code.co_kwonlyargcount} {code.co_flags}"
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            yield from _code_text(constant)
+            yield from _code_parts(constant)
         else:
             yield _constant(constant)
 
 
+@functools.lru_cache(maxsize=4096)
 def _all_names(code: types.CodeType) -> list[str]:
     """Return the global names of a code object and of those nested in it, in a fixed order."""
     names = set(code.co_names)
@@ -442,4 +461,7 @@ def _constant(value: object) -> str:
         return f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, set | frozenset):
         return f"{type(value).__name__} {sorted(map(repr, value))}"  # in an order of its own
-    return re.sub(r" at 0x[0-9a-f]+", "", repr(value))  # addresses differ between processes
+    text = repr(value)
+    return (
+        re.sub(r" at 0x[0-9a-f]+", "", text) if " at 0x" in text else text
+    )  # addresses differ between processes

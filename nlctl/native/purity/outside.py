@@ -36,15 +36,15 @@ _FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__bui
 
 def asked_outside(function: types.FunctionType) -> Iterator[str]:
     """Yield what a function asks, with the words that ask, ``time.time``."""
-    every = {**function.__globals__, **_cells(function)}
+    cells, names = _cells(function), function.__globals__
     for code in _codes(function.__code__):
-        for (_, word), (_, follower) in itertools.pairwise(_words(code)):
-            thing = every.get(word) if isinstance(word, str) else None
-            if not isinstance(thing, types.ModuleType) or not isinstance(follower, str):
+        for word, follower in _pairs(code):
+            thing = cells[word] if word in cells else names.get(word)
+            if not isinstance(thing, types.ModuleType):
                 continue
             if told := outside_of(thing.__name__, follower):
                 yield f"{told} when it is called ('{word}.{follower}'"
-        for name in sorted(_FRAMES & set(code.co_names)):
+        for name in sorted(_FRAMES.intersection(code.co_names)):
             yield f"what '{name}' finds ('{name}'"
 
 
@@ -75,6 +75,14 @@ def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) 
 def _words(code: types.CodeType) -> tuple[tuple[str, Any], ...]:
     """Return the instructions of a code object, each with what it is about."""
     return tuple((each.opname, each.argval) for each in dis.get_instructions(code))
+
+
+@functools.lru_cache(maxsize=4096)
+def _pairs(code: types.CodeType) -> tuple[tuple[str, str], ...]:
+    """Return words of a code object that stand next to each other."""
+    words = (word for _, word in _words(code))
+    near = ((a, b) for a, b in itertools.pairwise(words) if isinstance(a, str))
+    return tuple((a, b) for a, b in near if isinstance(b, str))
 
 
 def _codes(code: types.CodeType) -> Iterator[types.CodeType]:

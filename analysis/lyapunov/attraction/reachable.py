@@ -1,0 +1,286 @@
+"""Where all solutions from a box of initial states are over a time, enclosed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from nlctl.annotations import as_annotated
+from nlctl.arguments import integer, number, of_type
+from nlctl.errors import ParameterError
+from nlctl.expressions.graph import Untraceable
+from nlctl.native.tubes.series import SeriesCode, series_code
+from nlctl.native.tubes.tube import LEFT, OUTSIDE, REACHED, Tube, tube_from
+from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.wording import counted
+
+from ...intervals.box import Box
+from .motion import motion_of
+
+__all__ = ["ReachableSet", "reachable_set"]
+
+_THREADS = 2
+_CELLS = 200  # parts of the time for which there are bounds
+Status = Literal["proved", "refuted", "undecided"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachableSet:
+    """Boxes that hold all solutions from `start`, over each part of the time.
+
+    Attributes
+    ----------
+    names : tuple of str
+        States.
+    start : Box
+        Initial states.
+    within : Box or None
+        Where the states shall stay.
+    status : {"proved", "refuted", "undecided"}
+        Whether all solutions exist up to the horizon, and stay in `within`.
+    reason : str
+        What is missing, or where a solution leaves.
+    times : ndarray of shape (parts + 1,)
+        Ends of the parts (s).
+    low, high : ndarray of shape (parts, n)
+        Bounds of the states over each part; infinite where nothing is known.
+    end_low, end_high : ndarray of shape (n,)
+        Bounds at the horizon.
+    refuted : dict or None
+        Initial states from which the solution surely leaves `within`.
+    pieces : int
+        Into which the initial states were divided, all that were tried.
+    steps : int
+        Of all pieces.
+    seconds : float
+    arithmetic : str
+        What proved it.
+
+    Examples
+    --------
+    See `reachable_set`.
+    """
+
+    names: tuple[str, ...]
+    start: Box
+    within: Box | None
+    status: Status
+    reason: str
+    times: np.ndarray = field(repr=False)
+    low: np.ndarray = field(repr=False)
+    high: np.ndarray = field(repr=False)
+    end_low: np.ndarray = field(repr=False)
+    end_high: np.ndarray = field(repr=False)
+    refuted: dict[str, float] | None
+    pieces: int
+    steps: int
+    seconds: float
+    arithmetic: str = "floats rounded outwards"
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return proved bounds of a state over the whole time.
+
+        Parameters
+        ----------
+        name : str
+            A state.
+
+        Returns
+        -------
+        tuple of float
+            The least lower and the largest upper bound.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such state.
+        """
+        if name not in self.names:
+            raise ParameterError(f"bounds needs one of {', '.join(self.names)}, got {name!r}")
+        i = self.names.index(name)
+        return float(self.low[:, i].min()), float(self.high[:, i].max())
+
+    def __str__(self) -> str:
+        how = f"{counted(self.pieces, 'piece')}, {counted(self.steps, 'step')}"
+        claim = f"stays in {self.within}" if self.within is not None else "exists"
+        if self.status == "proved":
+            return f"{claim} up to {self.times[-1]:.6g} s: proved with {how}"
+        return f"{self.status}: {self.reason}"
+
+
+@as_annotated
+def reachable_set(
+    system: Any,
+    start: Box,
+    horizon: float,
+    *,
+    within: Box | None = None,
+    params: Mapping[str, Any] | None = None,
+    max_pieces: int = 1_000,
+) -> ReachableSet:
+    """Enclose all solutions from a box of initial states, and prove that they stay in another one.
+
+    Steps of Taylor's method in interval arithmetic prove that solutions exist and where they are.
+    How states depend on initial states is a polynomial of degree four, with proved errors.  Where
+    that does not suffice the initial states are divided, along the side that matters most.  A
+    parameter that is only known between bounds is a state with the rate 0.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem or callable
+        A diagram, whose external inputs are 0; or ``function((x1, ..., xn)) -> (x1', ..., xn')``.
+        Its rates must be smooth, and must not depend on time.
+    start : Box
+        Initial states, with a side for every state in their order; a side may be a single number.
+    horizon : float
+        How long (s).
+    within : Box, optional
+        Where the states shall stay; states that it does not name may be anywhere, and sides may be
+        infinite.
+    params : mapping, optional
+        Overrides of a diagram.
+    max_pieces : int, optional
+        Pieces of the initial states that are tried.
+
+    Returns
+    -------
+    ReachableSet
+        Proved, refuted by a solution that surely leaves, or undecided.
+
+    Raises
+    ------
+    ParameterError
+        If the rates cannot be read, have cases or kinks, or a box has other sides.
+    CompileError
+        If the diagram cannot be compiled.
+
+    Examples
+    --------
+    A pendulum without friction, from around rest and between two speeds, does not turn over:
+
+    >>> import numpy as np
+    >>> from nlctl.analysis.lyapunov import Box, reachable_set
+    >>> found = reachable_set(
+    ...     lambda x: (x[1], -np.sin(x[0])),
+    ...     Box.of(x1=(-0.1, 0.1), x2=(1.0, 1.2)),
+    ...     6.0,
+    ...     within=Box.of(x1=(-2.0, 2.0)),
+    ... )
+    >>> print(found.status)
+    proved
+    """
+    who = "reachable_set"
+    start = of_type(who, "start", start, Box, "Box.of(x1=(-1, 1))")
+    horizon, max_pieces = (
+        number(who, "horizon", horizon),
+        integer(who, "max_pieces", max_pieces, at_least=1),
+    )
+    if not 0 < horizon < np.inf:
+        raise ParameterError(f"reachable_set needs 0 < horizon < inf, got {horizon:g}")
+    if is_jit_disabled():
+        raise ParameterError("reachable_set needs machine code: unset NUMBA_DISABLE_JIT")
+    begun = time.perf_counter()
+    motion = motion_of(who, system, start, params)
+    try:
+        code = series_code(motion.rates)
+    except Untraceable as error:
+        raise ParameterError(f"reachable_set needs rates that are smooth: {error}") from None
+    search = _Search(code, _limits(motion.names, within), horizon)
+    box = np.array(start.cell, dtype=float)
+    search.run(box, max_pieces)
+    where = None
+    if search.refuted is not None:
+        where = dict(zip(motion.names, map(float, search.refuted), strict=True))
+    return ReachableSet(
+        names=motion.names, start=start, within=within, status=search.status, reason=search.reason,
+        times=np.linspace(0.0, horizon, _CELLS + 1), low=search.low, high=search.high,
+        end_low=search.end[:, 0], end_high=search.end[:, 1], refuted=where, pieces=search.pieces,
+        steps=search.steps, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _limits(names: Sequence[str], within: Any) -> np.ndarray:
+    """Return where each state shall stay, shape (n, 2)."""
+    limits = np.array([[-np.inf, np.inf]] * len(names))
+    if within is None:
+        return limits
+    within = of_type("reachable_set", "within", within, Box, "Box.of(x1=(-1, 1))")
+    for name, (low, high) in zip(within.names, within.cell, strict=True):
+        if name not in names:
+            raise ParameterError(
+                f"reachable_set needs within with sides of {', '.join(names)}, got '{name}'"
+            )
+        limits[names.index(name)] = low, high
+    return limits
+
+
+class _Search:
+    """Pieces of the initial states, divided until each is proved, one is refuted, or enough."""
+
+    def __init__(self, code: SeriesCode, limits: np.ndarray, horizon: float) -> None:
+        n = code.order
+        self.code, self.limits, self.horizon = code, limits, horizon
+        self.low, self.high = np.full((_CELLS, n), np.inf), np.full((_CELLS, n), -np.inf)
+        self.end = np.stack([np.full(n, np.inf), np.full(n, -np.inf)], axis=1)
+        self.pieces, self.steps, self.reason = 0, 0, ""
+        self.status: Status = "proved"
+        self.refuted: np.ndarray | None = None
+
+    def run(self, box: np.ndarray, most: int) -> None:
+        """Divide a box, a level after the other."""
+        waiting = [box]
+        with ThreadPoolExecutor(_THREADS) as pool:
+            while waiting and self.status == "proved":
+                now, later = waiting[: most - self.pieces], waiting[most - self.pieces :]
+                if not now:
+                    return self._give_up(later)
+                self.pieces += len(now)
+                waiting = list(later)
+                for piece, tube in zip(now, pool.map(self._tube, now), strict=True):
+                    self.steps += tube.steps
+                    waiting += self._halves(piece, tube)
+
+    def _tube(self, box: np.ndarray) -> Tube:
+        return tube_from(self.code, box, self.horizon, self.limits, cells=_CELLS)
+
+    def _halves(self, piece: np.ndarray, tube: Tube) -> list[np.ndarray]:
+        """Take a piece that is proved; return the halves of one that is not."""
+        if tube.status == REACHED:
+            self.low, self.high = np.minimum(self.low, tube.low), np.maximum(self.high, tube.high)
+            self.end[:, 0] = np.minimum(self.end[:, 0], tube.end[:, 0])
+            self.end[:, 1] = np.maximum(self.end[:, 1], tube.end[:, 1])
+            return []
+        middle = 0.5 * piece[:, 0] + 0.5 * piece[:, 1]
+        one = self._tube(np.stack([middle, middle], axis=1)) if tube.status == LEFT else tube
+        if one.status == OUTSIDE:
+            self.refuted, self.status = middle, "refuted"
+            self.reason = f"a solution leaves at t <= {one.time:.6g} s"
+            self._know_nothing()
+            return []
+        weight = np.where(np.isfinite(tube.weight), tube.weight, 0.0)
+        weight = weight if weight.any() else piece[:, 1] - piece[:, 0]
+        side = int(np.argmax(np.where(piece[:, 0] < piece[:, 1], weight + 1e-300, -1.0)))
+        if not piece[side, 0] < middle[side] < piece[side, 1]:
+            self._give_up([piece])
+            return []
+        first, second = piece.copy(), piece.copy()
+        first[side, 1] = second[side, 0] = middle[side]
+        return [first, second]
+
+    def _give_up(self, left: list[np.ndarray]) -> None:
+        around = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in left[0])
+        self.status, self.reason = (
+            "undecided",
+            (f"not proved from {around} after {counted(self.pieces, 'piece')}"),
+        )
+        self._know_nothing()
+
+    def _know_nothing(self) -> None:
+        """Leave no bounds where not all pieces have any."""
+        self.low[:], self.high[:] = -np.inf, np.inf
+        self.end[:, 0], self.end[:, 1] = -np.inf, np.inf

@@ -1,0 +1,80 @@
+"""What a loop consists of, and what has been seen of it before.
+
+Whatever was checked of a loop holds as long as its functions, wiring and values are the same.  A
+key of these sees whether they are; where no key sees everything nothing is remembered.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import control as ct
+
+from nlctl.blocks import Block
+from nlctl.diagrams import places
+
+from ...loop_record import facts_and_unseen, text_key, value_text
+
+__all__ = ["LoopContent", "Remembered", "loop_content"]
+
+_MOST = 1024  # checks that are remembered
+_RECORDS = ("spec", "current_spec")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopContent:
+    """What a loop consists of.
+
+    Attributes
+    ----------
+    facts : mapping
+        As of `nlctl.analysis.loop_record.loop_facts`.
+    key : str
+        Of all that python-control computes of it with the parameters of the run; empty where no
+        key sees everything.
+    """
+
+    facts: Mapping[str, dict[str, str]] = field(repr=False)
+    key: str
+
+
+class Remembered:
+    """Keys of the latest checks that were passed; an empty key stands for none."""
+
+    def __init__(self) -> None:
+        self._passed: OrderedDict[str, None] = OrderedDict()
+
+    def __contains__(self, key: str) -> bool:
+        return bool(key) and key in self._passed
+
+    def add(self, key: str) -> None:
+        """Note that a check was passed."""
+        if key:
+            self._passed[key] = None
+            while len(self._passed) > _MOST:
+                self._passed.popitem(last=False)
+
+
+def loop_content(
+    loop: ct.InterconnectedSystem, params: Mapping[str, Any] | None = None
+) -> LoopContent:
+    """Return what a loop consists of now."""
+    facts, unseen = facts_and_unseen(loop)
+    is_seen = not unseen and all(_is_plain(place.system) for place in places(loop))
+    values = {name: value_text(value) for name, value in (params or {}).items()}
+    return LoopContent(facts=facts, key=text_key(repr((facts, values))) if is_seen else "")
+
+
+def _is_plain(system: Any) -> bool:
+    """Whether a system computes what its class, its maps and its record say, and nothing else."""
+    own = {name: value for name, value in vars(system).items() if name not in _RECORDS}
+    update, output = own.pop("updfcn", None), own.pop("outfcn", None)
+    if any(callable(value) for value in own.values()):  # in the place of a method
+        return False
+    if type(system) is Block:
+        spec = system.spec
+        return output is spec.output and (not spec.states or update is spec.update)
+    return type(system) is ct.InterconnectedSystem
