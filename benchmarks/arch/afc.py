@@ -208,7 +208,11 @@ def decided(x: Any, u: Any) -> dict[str, Any]:
     pressure = pressure + 0.01 * 0.41328 * (flow - air)
     return {
         "states": (seconds, normal, power, failed, pressure, integral),
-        "outputs": (np.clip(air / wanted * trim, 0.13, 1.66), wanted, np.where(feedforward, 1.0, 0.0)),
+        "outputs": (
+            np.clip(air / wanted * trim, 0.13, 1.66),
+            wanted,
+            np.where(feedforward, 1.0, 0.0),
+        ),
     }
 
 
@@ -261,12 +265,20 @@ def engine(**given: Any) -> Any:
         "exhaust": looked(Exhaust(), "exhaust", 0.0), "then": looked(Then(), "then", 0.0), "since": Since(),
         "sensor": Sensor(), "error": Error(),
     }  # fmt: skip
-    return nlctl.interconnect({**given, **parts}, inputs=outside, outputs=["mu", "mode", "throttle"])
+    return nlctl.interconnect(
+        {**given, **parts}, inputs=outside, outputs=["mu", "mode", "throttle"]
+    )
 
 
-START = {"controller.fuel_held": 0.1726, "controller.wanted_held": RATIO, "controller.mode_held": 1.0}
+START = {
+    "controller.fuel_held": 0.1726,
+    "controller.wanted_held": RATIO,
+    "controller.mode_held": 1.0,
+}
 
 
 def plant() -> Any:
     """Return the loop whose throttle has twenty pieces, at one engine speed."""
-    return engine(throttle=pieces("throttle", COUNT, PERIOD), engine=pieces("engine", 1, 50.0, 1000.0))
+    return engine(
+        throttle=pieces("throttle", COUNT, PERIOD), engine=pieces("engine", 1, 50.0, 1000.0)
+    )

@@ -42,7 +42,12 @@ def gear_ratio(gear: Any) -> Any:
 class Converter:
     """What the torque converter takes from the engine, and gives to the wheels through a gear."""
 
-    inputs, outputs, states, feedthrough = ("rpm", "wheel", "gear"), ("impeller", "torque"), (), True
+    inputs, outputs, states, feedthrough = (
+        ("rpm", "wheel", "gear"),
+        ("impeller", "torque"),
+        (),
+        True,
+    )
 
     @staticmethod
     @nlctl.equation

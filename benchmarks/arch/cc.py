@@ -124,10 +124,13 @@ def cars(**pedals: Any) -> Any:
     """Return the cars; throttle and brake are given blocks, or inputs of the diagram."""
     outside = [pedal for pedal in ("throttle", "brake") if pedal not in pedals]
     behind = {
-        f"car{i}": Follower(ahead=f"y{i - 1}", place=f"y{i}", first=10.0 * (i - 1)) for i in range(2, 6)
+        f"car{i}": Follower(ahead=f"y{i - 1}", place=f"y{i}", first=10.0 * (i - 1))
+        for i in range(2, 6)
     }
     return nlctl.interconnect(
-        {**pedals, "car1": Leader(), **behind, "gaps": Gaps()}, inputs=outside, outputs=["gap2", "gap5"]
+        {**pedals, "car1": Leader(), **behind, "gaps": Gaps()},
+        inputs=outside,
+        outputs=["gap2", "gap5"],
     )
 
 

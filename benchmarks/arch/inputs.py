@@ -34,16 +34,17 @@ class Pieces:
     @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
-        """The value of the piece."""
+        """The value of the piece; it is looked at when a piece begins, and half of it is slack."""
         found = p.value[0]
         for k in range(1, len(p.value)):
-            found = np.where(t >= k * p.period, p.value[k], found)
+            found = np.where(t >= (k - 0.5) * p.period, p.value[k], found)
         return (found,)
 
 
-def pieces(signal: str, count: int, period: float, start: float = 0.0) -> Pieces:
-    """Return a signal of so many pieces, all equal until their parameters say otherwise."""
-    return Pieces(outputs=(signal,), value=(start,) * count, period=period)
+def pieces(signal: str, count: int, period: float, start: float = 0.0) -> Any:
+    """Return a block of so many pieces, all equal until their parameters say otherwise."""
+    made = Pieces(outputs=(signal,), value=(start,) * count, period=period)
+    return nlctl.sampled(nlctl.block(made, signal), period)
 
 
 def names(signal: str, count: int) -> list[str]:

@@ -92,7 +92,9 @@ class Controller:
 class Requirement:
     """What the requirement looks at: |position - reference| - beta |reference|."""
 
-    beta: float = nlctl.param(0.03, unit="1", meaning="part of the reference that is allowed", at_least=0)
+    beta: float = nlctl.param(
+        0.03, unit="1", meaning="part of the reference that is allowed", at_least=0
+    )
     inputs, outputs, states, feedthrough = ("reference", "position"), ("excess",), (), True
 
     @staticmethod
@@ -109,7 +111,9 @@ def levitation(beta: float = 0.03, **given: Any) -> Any:
         "magnet": Magnet(), "requirement": Requirement(beta=beta),
     }  # fmt: skip
     outside = [] if given else ["reference"]
-    return nlctl.interconnect({**given, **parts}, inputs=outside, outputs=["position", "current", "excess"])
+    return nlctl.interconnect(
+        {**given, **parts}, inputs=outside, outputs=["position", "current", "excess"]
+    )
 
 
 def plant(beta: float = 0.03) -> Any:

@@ -39,6 +39,7 @@ class Row:
     method: str = "auto"
     zlscheck: tuple[int, float] | None = None
     aristeo: tuple[int, float] | None = None
+    suspect: bool = False
     note: str = ""
 
     @property
@@ -68,12 +69,16 @@ def implies(left: Formula, right: Formula) -> Formula:
 def shifts(gear: int) -> Formula:
     """AT5: a gear that is shifted to is kept for 2.5 s."""
     on = in_band("gear", lower=gear - 0.5, upper=gear + 0.5)
-    return always(implies(~on & eventually(on, 0.001, 0.1), eventually(always(on, 0, 2.5), 0.001, 0.1)), 0, 30)
+    return always(
+        implies(~on & eventually(on, 0.001, 0.1), eventually(always(on, 0, 2.5), 0.001, 0.1)), 0, 30
+    )
 
 
 def slow(end: float, speed: float) -> Formula:
     """AT6: with less than 3000 rpm for 30 s the car is not faster than so many mph until so many s."""
-    return implies(always(in_band("rpm", upper=3000), 0, 30), always(in_band("speed", upper=speed), 0, end))
+    return implies(
+        always(in_band("rpm", upper=3000), 0, 30), always(in_band("speed", upper=speed), 0, end)
+    )
 
 
 PEDALS = {"throttle": (0.0, 100.0, at.COUNT), "brake": (0.0, 325.0, at.COUNT)}
@@ -108,6 +113,11 @@ def _cc(key: str, formula: Formula, **published: Any) -> Row:
     return Row(key=key, build=cc.plant, signals=DRIVER, formula=formula, until=100.0, **published)
 
 
+FALCAUN = {
+    "AT1": "1029 (4) / 896", "AT2": "501 (6) / 256", "AT6a": "458 / 1002", "AT6b": "600 / -",
+    "AT6c": "901 / 898", "CC1": "229 / 396", "CC2": "119 / 76", "CC3": "195 / 122", "CC4": "- / 1256",
+}  # fmt: skip
+
 GAP2, GAP5 = "gap2", "gap5"
 ROWS = (
     _at("AT1", always(in_band("speed", upper=120), 0, 20), 20.0, zlscheck=(50, 3.4), aristeo=(0, np.nan)),
@@ -128,13 +138,13 @@ ROWS = (
     Row(key="NN.03", build=nn.plant, signals=REFERENCE, formula=settles(), until=40.0,
         zlscheck=(50, 1.0), aristeo=(50, 62.8)),
     _cc("CC1", always(in_band(GAP5, upper=40), 0, 100), zlscheck=(50, 8.8), aristeo=(50, 16.0)),
-    _cc("CC2", always(eventually(in_band(GAP5, lower=15), 0, 30), 0, 70), zlscheck=(50, 4.7), aristeo=(50, 1.0)),
+    _cc("CC2", always(eventually(in_band(GAP5, lower=15), 0, 30), 0, 70), zlscheck=(50, 4.7), aristeo=(50, 1.0), suspect=True),
     _cc("CC3", always(always(in_band(GAP2, upper=20), 0, 20) | eventually(in_band(GAP5, lower=40), 0, 20), 0, 80),
         zlscheck=(50, 23.0), aristeo=(50, 46.0)),
     _cc("CC4", always(eventually(always(in_band(GAP5, lower=8), 0, 5), 0, 30), 0, 65),
-        zlscheck=(32, 125.0), aristeo=(50, 1.0)),
+        zlscheck=(32, 125.0), aristeo=(50, 1.0), suspect=True),
     _cc("CC5", always(eventually(implies(always(in_band(GAP2, lower=9), 0, 5), always(in_band(GAP5, lower=9), 5, 20)),
         0, 8), 0, 72), zlscheck=(50, 2.0), aristeo=(49, 54.0)),
     Row(key="SC", build=sc.plant, signals=STEAM, formula=always(in_band("pressure", lower=87, upper=87.5), 30, 35),
-        until=35.0, zlscheck=(50, 2.1), aristeo=(50, 1.0)),
+        until=35.0, zlscheck=(50, 2.1), aristeo=(50, 1.0), suspect=True),
 )  # fmt: skip
