@@ -22,12 +22,12 @@ _GENERATIONS = 2
 """Of CMA-ES in each round."""
 _STEPS = 10
 """Descents have at most so many steps."""
-_SMALLEST = 1 / 16
+_SMALLEST = 1 / 256
 """Shortest step of a descent, in units of the boxes."""
 _SHORTER = 4
 """By what a step is shortened that did not go down."""
 _TRUSTED = 0.5
-"""A step that gains less than this part of what the first order says is shortened as well."""
+"""The next step is twice as long where one gains this part of what the first order says."""
 _MOST_CONSTANT = 16
 """Test signals that are constant."""
 _PIECE = re.compile(r"(.*)\[(\d+)\]")
@@ -84,6 +84,7 @@ def test_signals(space: Space) -> np.ndarray:
         last = len(groups) - 1
         add([1.0 - (gray >> (last - i) & 1) for i in range(len(groups))])
     if pieces:
+        add([0.5] * len(groups))
         halves = [np.arange(len(each)) >= len(each) // 2 for each in groups]
         add([1.0 * half for half in halves])
         add([1.0 - half for half in halves])
@@ -124,6 +125,6 @@ def _step(
         (new,) = found.run("gradient", from_unit_cube(space, unit[None, :]).assign(**labels))
         if new < margin:
             trusted = margin - new >= _TRUSTED * (margin - said)
-            return found.margins.size - 1, min(1.0, 2 * radius) if trusted else radius / 2
+            return found.margins.size - 1, min(1.0, 2 * radius) if trusted else radius
         radius /= _SHORTER
     return None
