@@ -56,8 +56,9 @@ def test_signals(space: Space) -> np.ndarray:
     """Return points of the unit cube: signals that an engineer tries first.
 
     Quantities ``name[0]``, ``name[1]``, ... are the pieces of one signal; what has no pieces is in
-    the middle.  All signals alternate between their ends; then all are constant at an end, from
-    one to the next only one of them changes; then all step up halfway, then down.
+    the middle.  All signals alternate between their ends; all step up halfway; all are constant
+    at an end, at first at different ones, and from one to the next only one of them changes; all
+    are in the middle; all step down halfway.
     """
     quantities = [q.name for q in space.quantities]
     signals: dict[str, list[int]] = {}
@@ -75,18 +76,15 @@ def test_signals(space: Space) -> np.ndarray:
             row[group] = value
         made.append(row)
 
+    halves = [np.arange(len(each)) >= len(each) // 2 for each in groups]
     if pieces:
         add([1.0 - np.arange(len(each)) % 2 for each in groups])
-    else:
-        add([0.5] * len(groups))
+        add([1.0 * half for half in halves])
     for number in itertools.islice(range(1 << min(len(groups), 30)), _MOST_CONSTANT):
         gray = number ^ (number >> 1)
-        last = len(groups) - 1
-        add([1.0 - (gray >> (last - i) & 1) for i in range(len(groups))])
+        add([1.0 - ((gray >> i & 1) + i) % 2 for i in range(len(groups))])
+    add([0.5] * len(groups))
     if pieces:
-        add([0.5] * len(groups))
-        halves = [np.arange(len(each)) >= len(each) // 2 for each in groups]
-        add([1.0 * half for half in halves])
         add([1.0 - half for half in halves])
     return np.array(made)
 
