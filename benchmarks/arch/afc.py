@@ -3,13 +3,15 @@
 Simulink's ``AbstractFuelControl_M1`` (Jin, Deshmukh, Kapinski, Ueda, Butts: Powertrain control
 verification benchmark, HSCC 2014).  Equations and tables were read from the model file
 ``arch/arch20/shared/benchmarks/powertrain/AbstractFuelControl_M1.slx`` in
-github.com/ismailbennani/zlscheck.  ZlsCheck's own text of it (``models/afc``) reads the time constant
-of the puddle at rad/s in a table of rpm, and delays by a time instead of by a transport; the model file
-is followed here.  Its controller is off for the first 0.001 s, which changes nothing.
+github.com/ismailbennani/zlscheck.  ZlsCheck's own text of it (``models/afc``) reads the time
+constant of the puddle at rad/s in a table of rpm, and delays by a time instead of by a transport;
+the model file is followed here.  Its controller is off for the first 0.001 s, which changes
+nothing.
 
-The exhaust is the one part that is not exact: its ratio arrives when gas that moves with 1/delay has
-gone a unit of way, with a delay that depends on the state.  Here it is looked at every 0.01 s, with the
-controller, and is straight in between (`Exhaust`); Simulink interpolates between its steps.
+The exhaust is the one part that is not exact: its ratio arrives when gas that moves with 1/delay
+has gone a unit of way, with a delay that depends on the state.  Here it is looked at every 0.01 s,
+with the controller, and is straight in between (`Exhaust`); Simulink interpolates between its
+steps.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ def pumped(pressure: Any, speed: Any) -> Any:
 
 
 def through(angle: Any, pressure: Any) -> Any:
-    """Return the flow of air through the throttle (g/s), by its angle and the pressure behind it."""
+    """Return the flow of air through the throttle (g/s), by angle and pressure behind it."""
     opening = 2.821 - 0.05231 * angle + 0.10299 * angle**2 - 0.00063 * angle**3
     ratio = np.minimum(pressure, 1.0 / pressure)
     subsonic = 2.0 * np.sqrt(np.maximum(ratio - ratio**2, 0.0))
@@ -65,7 +67,7 @@ class Intake:
     @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
-        """Angle, air that comes in and that goes to the cylinders, and the engine's speed in rad/s."""
+        """Angle, air that comes in and that goes to the cylinders, and the speed in rad/s."""
         return intake(x, u)
 
 
@@ -100,7 +102,7 @@ class Cylinder:
 
 
 def wetting(x: Any, u: Any) -> Any:
-    """Return what part of the fuel stays in the air, what evaporates, and the pace of the exhaust."""
+    """Return what part of the fuel stays in the air, what evaporates, and the exhaust's pace."""
     _, air, speed = u
     rpm, charge = speed * 30.0 / np.pi, np.pi * air / speed
     kappa, tau = KAPPA([[rpm, charge]])[0], PUDDLE([[rpm, charge]])[0]
@@ -116,7 +118,7 @@ def read(ways: Any, ratios: Any, way: Any) -> Any:
 
 @nlctl.record
 class Exhaust:
-    """Gas on its way, one unit long: at every look what arrives, and how it changes until the next."""
+    """Gas on its way, one unit long: what arrives at a look, and how it changes until the next."""
 
     inputs, outputs = ("ratio", "way", "pace"), ("arrives", "changes")
     states = (*(f"way{k}" for k in range(STORED)), *(f"ratio{k}" for k in range(STORED)))
@@ -146,7 +148,7 @@ class Exhaust:
 
 @nlctl.record
 class Sensor:
-    """Mixing with a lag of 0.1 s, and a sensor with one of 0.02 s; `since` is the time since a look."""
+    """Mixing with a lag of 0.1 s, and a sensor with one of 0.02 s; `since` is since a look."""
 
     inputs, outputs, states = ("arrives", "changes", "since"), ("measured",), ("mixed", "measured")
     feedthrough = False
@@ -261,8 +263,9 @@ def engine(**given: Any) -> Any:
         return nlctl.sampled(made, LOOK, offset=offset)
 
     parts = {
-        "intake": Intake(), "controller": looked(Controller(), "controller", LOOK), "cylinder": Cylinder(),
-        "exhaust": looked(Exhaust(), "exhaust", 0.0), "then": looked(Then(), "then", 0.0), "since": Since(),
+        "intake": Intake(), "controller": looked(Controller(), "controller", LOOK),
+        "cylinder": Cylinder(), "exhaust": looked(Exhaust(), "exhaust", 0.0),
+        "then": looked(Then(), "then", 0.0), "since": Since(),
         "sensor": Sensor(), "error": Error(),
     }  # fmt: skip
     return nlctl.interconnect(

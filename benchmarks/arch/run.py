@@ -1,9 +1,9 @@
-"""Falsification next to what others published: the table of ARCH-COMP, with one setting for all rows.
+"""Falsification next to what others published: ARCH-COMP's table, one setting for all rows.
 
     python benchmarks/arch/run.py [--rows AT1 CC3] [--attempts 50] [--simulations 300]
 
-A cell is attempts falsified of 50 and the mean number of simulations of these.  A run with derivatives
-counts as one simulation, and one of a row that was run before as another one.
+A cell is attempts falsified of 50 and the mean number of simulations of these.  A run with
+derivatives counts as one simulation, and one of a row that was run before as another one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from nlctl.analysis.robustness import (
 )
 
 SOURCES = """\
-zlscheck: ARCH-COMP 2020, instance 1 (github.com/ismailbennani/zlscheck_arch20_counterexamples), by gradients.
+zlscheck: ARCH-COMP 2020, instance 1, by gradients
+  (github.com/ismailbennani/zlscheck_arch20_counterexamples).
 ARIsTEO: recomputed from its .mat files of ARCH-COMP 2020.
 FalCAuN: ARCH-COMP 2023 / 2024, mean of 10 attempts with more simulations each.
 suspect: 1.0 of a requirement that others needed many runs for."""
@@ -103,7 +104,7 @@ def best_published(row: Row) -> float:
 
 
 def line(row: Row, found: Found, attempts: int) -> tuple[list[str], bool, bool]:
-    """Return the cells of a row, whether all attempts falsified, and whether the mean is the best."""
+    """Return the cells of a row, whether all attempts falsified, and if the mean is the best."""
     falsified = found.falsified
     mean = float(np.mean(falsified)) if falsified else np.nan
     every = len(falsified) == attempts

@@ -22,7 +22,7 @@ PRESSURE, TEMPERATURE, FLOW = 90.0, 80.0, 107.8880952381  # at the start: kPa, d
 COOLING = 60.0  # degrees C of the cooling water
 STEP, BEFORE, AFTER = 2.0, 90.0, 87.0  # s, kPa: when the set point falls, from what to what
 LAG = 10.0  # 1/s of the network's memories
-COUNT, PERIOD = 20, 35.0 / 20  # pieces of the steam flow, s
+COUNT, PERIOD = 100, 0.35  # pieces of the steam flow, s
 
 STEAM_TEMPERATURE = line(TABLES["pressure"], TABLES["temperature"])
 LATENT_HEAT = line(TABLES["pressure"], TABLES["latent_heat"])
@@ -101,5 +101,5 @@ def loop(**given: Any) -> Any:
 
 
 def plant() -> Any:
-    """Return the loop whose steam flow has twenty pieces."""
+    """Return the loop whose steam flow has a hundred pieces."""
     return loop(steam=pieces("steam", COUNT, PERIOD, start=4.0))

@@ -39,8 +39,8 @@ def search_with_derivatives(
     """Run rows until the budget is spent or the target met; return why derivatives ended."""
     reasons: dict[str, None] = {}
     tests = from_unit_cube(found.space, test_signals(found.space))
-    in_batches(found, "test signals", tests.iloc[:1])
-    in_batches(found, "test signals", tests.iloc[1:])
+    for k in range(len(tests)):  # few are needed, often
+        in_batches(found, "test signals", tests.iloc[[k]])
     _descend(found, derivatives, reasons, 0)
     while found.left:
         first = found.margins.size
