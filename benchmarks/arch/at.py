@@ -2,7 +2,7 @@
 
 Simulink's ``Autotrans_shift`` (Hoxha, Abbas, Fainekos: Benchmarks for temporal logic requirements
 for automotive systems, ARCH 2014).  Equations and constants were read from the model file and from
-github.com/ismailbennani/zlscheck, ``arch/arch20`` (``models/at``, ``shared/benchmarks/transmission``).
+github.com/ismailbennani/zlscheck, ``arch/arch20`` (``models/at``).
 
 The shift logic is the model's chart, which looks every 0.04 s: a gear changes where the speed is
 beyond its threshold two looks later as well.  The sign of the speed, by which brakes act, slides at

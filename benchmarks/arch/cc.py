@@ -1,7 +1,7 @@
 """Five cars that run towards minus infinity, four of which keep their distance from the car ahead.
 
 Simulink's ``cars`` (after Hu, Lygeros, Sastry: Towards a theory of stochastic hybrid systems, HSCC
-2000).  Equations were read from the charts of ``arch/arch20/shared/benchmarks/chasing-cars/cars.mdl``
+2000).  Equations were read from the charts, ``arch/arch20/shared/benchmarks/chasing-cars/cars.mdl``
 in github.com/ismailbennani/zlscheck; they are in continuous time, and so they are here.  ZlsCheck
 takes Euler's step of 0.01 s (``models/cc``).
 """

@@ -1,6 +1,6 @@
 """Inputs that are constant for a while, and tables that go on in straight lines.
 
-Plants of the competition take signals in pieces; their tables go on beyond their ends, as Simulink's do.
+Plants of the competition take signals in pieces; their tables go on beyond their ends.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DATA = Path(__file__).parent / "data"
 class Pieces:
     """A signal that is constant for a period each; the last value stays.
 
-        signal(t) = value[k],   k period <= t < (k + 1) period
+    signal(t) = value[k],   k period <= t < (k + 1) period
     """
 
     outputs: tuple[str, ...]

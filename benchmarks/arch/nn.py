@@ -2,10 +2,10 @@
 
     pos'' = -9.8 - (12/3) pos' + (15/3) sign(i) i^2 / pos,    pos(0) = 0.5,  pos'(0) = 0
 
-MathWorks' ``narmamaglev_v1``.  Equations, weights and sampling times were read from the model file and
-from github.com/ismailbennani/zlscheck, ``arch/arch20`` (``models/nn``, ``shared/benchmarks/neural``).
-The controller looks every 0.01 s; a second hold of the model, of 0.001 s, changes nothing of what is
-held already.
+MathWorks' ``narmamaglev_v1``.  Equations, weights and sampling times were read from the model
+file and from github.com/ismailbennani/zlscheck, ``arch/arch20`` (``models/nn``).
+The controller looks every 0.01 s; a second hold of the model, of 0.001 s, changes nothing of what
+is held already.
 """
 
 from __future__ import annotations

@@ -127,7 +127,8 @@ _AFC = (
 )
 _CC = (
     ("CC1", always(FAR, 0, 100), (50, 8.8), (50, 16.0), False),
-    ("CC2", always(eventually(in_band("gap5", lower=15), 0, 30), 0, 70), (50, 4.7), (50, 1.0), True),
+    ("CC2", always(eventually(in_band("gap5", lower=15), 0, 30), 0, 70),
+     (50, 4.7), (50, 1.0), True),
     ("CC3", always(always(CLOSE, 0, 20) | eventually(in_band("gap5", lower=40), 0, 20), 0, 80),
      (50, 23.0), (50, 46.0), False),
     ("CC4", always(eventually(always(in_band("gap5", lower=8), 0, 5), 0, 30), 0, 65),

@@ -1,10 +1,10 @@
 """A steam condenser with a recurrent network as its controller.
 
-Yaghoubi, Fainekos: Gray-box adversarial testing for control systems with machine learning components
-(HSCC 2019).  Equations, tables and weights were read from the model file
+Yaghoubi, Fainekos: Gray-box adversarial testing for control systems with machine learning
+components (HSCC 2019).  Equations, tables and weights were read from the model file
 ``arch/arch20/shared/benchmarks/SteamCondenser/steamcondense_RNN_22_ZLS.slx`` in
-github.com/ismailbennani/zlscheck.  ZlsCheck's own text of it (``models/sc/sc_d.zls``) adds one of the
-six feedback terms of the network twice; the model file, which is followed here, does not.
+github.com/ismailbennani/zlscheck.  ZlsCheck's own text of it (``models/sc/sc_d.zls``) adds one of
+the six feedback terms of the network twice; the model file, which is followed here, does not.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def hidden(x: Any, pressure: Any, t: Any) -> Any:
 
 @nlctl.record
 class Network:
-    """Three neurons that see the error, and themselves through lags 1/(s + 10) and their squares."""
+    """Three neurons that see the error, and themselves through lags 1/(s + 10), once and twice."""
 
     inputs, outputs, states = ("pressure",), ("demand",), ("d1", "d2", "d3", "d4", "d5", "d6")
     feedthrough, vector = True, True

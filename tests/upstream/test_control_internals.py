@@ -136,7 +136,7 @@ def test_inputs_of_parts_are_those_of_the_connections():
 
 @pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
 def test_a_quotient_of_inputs_is_no_loop():
-    """python-control's first pass has inputs of 0, and 0/0 times its maps' zeros is NaN for good."""
+    """python-control's first pass has inputs of 0, and 0/0 times a zero is NaN for good."""
     quotient = ct.nlsys(
         None, lambda t, x, u, p: [u[0] / u[1]], inputs=["n", "d"], outputs=["r"], name="quotient"
     )

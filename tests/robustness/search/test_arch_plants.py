@@ -1,4 +1,4 @@
-"""Plants of the falsification table: next to python-control, to traces, and to what is known exactly."""
+"""Plants of the falsification table: python-control, traces, and what is known exactly."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_tables_go_on_in_straight_lines():
 
 class TestTransmission:
     def test_a_passing_manoeuvre_is_simulinks(self):
-        """Speed, engine and gears of ``tests/autotrans/test_data.h5`` of cpslab-asu/model-autotrans.
+        """Speed, engine and gears of ``test_data.h5`` of cpslab-asu/model-autotrans.
 
         Simulink has a fixed step of 0.04 s there.  MathWorks' schedule: the throttle falls from
         60 to 40 % until 14.9 s, is 100 % at 15 s and falls to 0 at 100 s.

@@ -1,4 +1,4 @@
-"""The search with derivatives: linear programs against what is known, and loops with known worst inputs."""
+"""The search with derivatives: linear programs, and loops whose worst inputs are known."""
 
 from functools import partial
 
@@ -84,7 +84,7 @@ def trace(formula, y):
     if kind == "And":
         return np.min([trace(part, y) for part in formula.parts], axis=0)
     inner, take = trace(formula.part, y), np.min if kind == "Always" else np.max
-    windows = [(T >= t + formula.start) & (T <= t + formula.end) for t in T]
+    windows = [(t + formula.start <= T) & (t + formula.end >= T) for t in T]
     return np.array([take(inner[w]) if w.any() else inner[-1] for w in windows])
 
 
@@ -115,7 +115,8 @@ def oscillator(count, end):
 def experiment(build, count, formula, end):
     return Experiment(
         space=Space(quantities=tuple(
-            Uncertain(name=name, bounds=(-1.0, 1.0), nominal=0.0) for name in inputs.names("u", count)
+            Uncertain(name=name, bounds=(-1.0, 1.0), nominal=0.0)
+            for name in inputs.names("u", count)
         )),
         build=build, spec=Spec(requirements=(Requirement(key="low", formula=formula, until=end),)),
         timepts=np.linspace(0, end, 201),
