@@ -47,7 +47,19 @@ class FirstOrder:
 
     Examples
     --------
-    See `lowest`.
+    y = z(t) with z of three pieces; the largest is lowered by lowering all that are largest:
+
+    >>> import numpy as np
+    >>> from nlctl.analysis.robustness import Requirement, eventually, in_band
+    >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest
+    >>> high = Requirement(key="high", formula=eventually(in_band("y", lower=1.0)), until=2.0)
+    >>> made = FirstOrder(
+    ...     t=np.arange(3.0), signals={"y": np.array([0.9, 0.8, 0.2])},
+    ...     derivatives={"y": np.eye(3)}, requirements=(high,),
+    ... )
+    >>> place, margin = lowest(made, np.array([0.9, 0.8, 0.2]), 0.5)
+    >>> print(place[:2].round(6), round(margin, 6))
+    [0.4 0.3] -0.6
     """
 
     t: np.ndarray
@@ -64,36 +76,8 @@ FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
 def lowest(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
     """Return where the first order makes the least margin lowest, and that margin.
 
-    Parameters
-    ----------
-    of : FirstOrder
-        Of the row at `place`.
-    place : ndarray of shape (d,)
-        In the unit cube.
-    radius : float
-        No coordinate moves further, nor out of the cube.
-
-    Returns
-    -------
-    place : ndarray of shape (d,)
-    margin : float
-        Infinite where there is no derivative.
-
-    Examples
-    --------
-    y = z(t) with z of three pieces; the largest is lowered by lowering all that are largest:
-
-    >>> import numpy as np
-    >>> from nlctl.analysis.robustness import Requirement, eventually, in_band
-    >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest
-    >>> high = Requirement(key="high", formula=eventually(in_band("y", lower=1.0)), until=2.0)
-    >>> made = FirstOrder(
-    ...     t=np.arange(3.0), signals={"y": np.array([0.9, 0.8, 0.2])},
-    ...     derivatives={"y": np.eye(3)}, requirements=(high,),
-    ... )
-    >>> place, margin = lowest(made, np.array([0.9, 0.8, 0.2]), 0.5)
-    >>> print(place[:2].round(6), round(margin, 6))
-    [0.4 0.3] -0.6
+    No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite where
+    there is no derivative.
     """
     best, least = place, np.inf
     for requirement in of.requirements:
