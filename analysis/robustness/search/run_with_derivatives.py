@@ -50,7 +50,7 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
     >>> from nlctl.analysis.robustness import (
     ...     Experiment, Requirement, Space, Spec, Uncertain, always, first_order, in_band, prepare
     ... )
-    >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.5, 1.5)),))
+    >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.5, 1.5), nominal=1.0),))
     >>> low = Requirement(key="low", formula=always(in_band("v", upper=0.9)), until=1.0)
     >>> experiment = Experiment(
     ...     space=space, build=lambda: nlctl.actuators.cascade({"lag": nlctl.Lag()}),
