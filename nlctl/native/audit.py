@@ -159,9 +159,9 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
         code.out(tt[0].copy(), xx, uu, c, y)
         found = [dx[:, -1], y[:, -1]]
         for sample in code.samples:
-            s = np.zeros((rows.size, code.width))  # 0 as python-control has it where nothing is due
+            s = np.zeros((room, code.width))  # 0 as python-control has it where nothing is due
             sample(tt[0].copy(), xx, uu, c, s)
-            found.append(s[:, -1])
+            found.append(s[: rows.size, -1])
         if code.resets is not None:
             code.resets(tt[0].copy(), xx, uu, c, after)
         return *found, *without_nan(np.append(g[:, -1], m[:, -1])[declared], after[:jumping, -1])

@@ -21,7 +21,7 @@ import numba
 
 from ..upstream.numba_internals import checks_indices, is_jit_disabled
 from .integrate import advance, evaluate, start
-from .integrate.memory import address_of
+from .integrate.memory import data_address
 from .integrate.workspace import TASK, WORK
 from .machine import address, store
 from .machine.fingerprint import function_key, module_key
@@ -72,7 +72,7 @@ def _callable(address: int, arguments: Any, owner: object) -> Callable[..., None
     nothing = (ctypes.c_void_p * 2)()  # places for a result and an exception, never read
 
     def function(*given: Any) -> None:
-        values = (g if isinstance(g, int) else address_of(g.table) for g in given)
+        values = (g if isinstance(g, int) else data_address(g.table) for g in given)
         status = call(nothing, ctypes.byref(nothing, 8), *values)
         if status not in _RETURNED:
             raise MemoryError(f"the integrators have failed for want of memory (status {status})")

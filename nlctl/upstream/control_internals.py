@@ -35,32 +35,86 @@ def current_parameters(system: Any) -> Any:
 
 def rates_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return derivatives, or next states, with the parameters that a system has now."""
-    return np.asarray(system._rhs(t, x, u)).reshape(-1)
+    if not _is_plain_diagram(system):
+        return np.asarray(system._rhs(t, x, u)).reshape(-1)
+    return _rates_of_parts(system, t, x, _signals_now(system, t, x, u)[0])
 
 
 def outputs_now(system: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Return outputs with the parameters that a system has now."""
-    return np.asarray(system._out(t, x, u)).reshape(-1)
+    if not _is_plain_diagram(system):
+        return np.asarray(system._out(t, x, u)).reshape(-1)
+    return _without_zeros(system.output_map, _signals_now(system, t, x, u)[1])
 
 
 def rates_and_outputs_now(
     system: Any, t: float, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return both, as `rates_now` and `outputs_now` do; a diagram's signals are computed once."""
-    own = tuple(getattr(each, "__func__", None) for each in (system._rhs, system._out))
-    if own != (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out):
+    if not _is_plain_diagram(system):
         return (
             rates_now(system, t, x, u) if system.nstates else np.empty(0),
             outputs_now(system, t, x, u) if system.noutputs else np.empty(0),
         )
-    inputs, outputs = system._compute_static_io(t, x, u)
+    inputs, outputs = _signals_now(system, t, x, u)
+    return _rates_of_parts(system, t, x, inputs), _without_zeros(system.output_map, outputs)
+
+
+def _is_plain_diagram(system: Any) -> bool:
+    own = tuple(getattr(each, "__func__", None) for each in (system._rhs, system._out))
+    return own == (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out)
+
+
+def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     rates, n, m = np.zeros(system.nstates or 0), 0, 0
     for part in system.syslist:
         states, given = part.nstates or 0, part.ninputs or 0
         if states:
-            rates[n : n + states] = part._rhs(t, x[n : n + states], inputs[m : m + given])
+            rates[n : n + states] = rates_now(part, t, x[n : n + states], inputs[m : m + given])
         n, m = n + states, m + given
-    return rates, system.output_map @ outputs
+    return rates
+
+
+def _signals_now(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs and outputs of all parts: python-control's, or ours where it finds none.
+
+    python-control's first pass has inputs of 0, and it multiplies every output by every element of
+    its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls a loop.
+    """
+    try:
+        return system._compute_static_io(t, x, u)
+    except RuntimeError:
+        found = _signals_by_passes(system, t, x, u)
+        if found is None:
+            raise
+        return found
+
+
+def _signals_by_passes(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return inputs and outputs of all parts by python-control's passes, without its 0 * NaN."""
+    inputs = _without_zeros(system.input_map, u)
+    for _ in range(len(system.syslist) + 1):
+        outputs, n, m = [], 0, 0
+        for part in system.syslist:
+            states, given = part.nstates or 0, part.ninputs or 0
+            outputs.append(outputs_now(part, t, x[n : n + states], inputs[m : m + given]))
+            n, m = n + states, m + given
+        every = np.concatenate(outputs)
+        now = _without_zeros(system.connect_map, every) + _without_zeros(system.input_map, u)
+        if np.array_equal(now, inputs, equal_nan=True):
+            return inputs, np.concatenate([every, inputs])
+        inputs = now
+    return None
+
+
+def _without_zeros(matrix: Any, values: Any) -> np.ndarray:
+    """Return a product with a matrix whose zeros stay zeros, also times NaN."""
+    matrix = np.asarray(matrix)
+    return np.sum(np.where(matrix == 0, 0.0, matrix * np.asarray(values)), axis=1)
 
 
 def parts_now(
@@ -70,7 +124,7 @@ def parts_now(
     if not isinstance(system, ct.InterconnectedSystem):
         yield system, x, u
         return
-    given, _ = system._compute_static_io(t, x, u)
+    given, _ = _signals_now(system, t, x, u)
     n = m = 0
     for part in system.syslist:
         states, inputs = part.nstates or 0, part.ninputs or 0

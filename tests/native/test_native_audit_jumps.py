@@ -115,3 +115,14 @@ def test_the_right_run_is_not_refused():
     times = [each.events.query("which == 'half'").time.to_numpy() for each in (native, reference)]
     np.testing.assert_allclose(times[0], np.sqrt(1 / 9.81), rtol=1e-6)
     np.testing.assert_allclose(times[1], times[0], rtol=1e-6)
+
+
+def test_samples_next_to_resets_of_more_states_are_compared():
+    """One number that is held, next to a ball whose two states are reset: h = 1 - g t^2 / 2."""
+    constant = ct.nlsys(None, lambda t, x, u, p: [2.0], inputs=0, outputs=["c"], name="constant")
+    loop = ct.interconnect(
+        [nlctl.sampled(constant, 0.1), nlctl.block(Ball(), "ball")], inputs=[], inplist=[],
+        outputs=["c", "u"],
+    )  # fmt: skip
+    run = nlctl.input_output_response(loop, TIMES, audit="every run")
+    np.testing.assert_allclose(run.outputs, [0 * TIMES + 2, 1 - 9.81 / 2 * TIMES**2], atol=1e-9)

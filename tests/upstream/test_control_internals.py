@@ -132,3 +132,36 @@ def test_inputs_of_parts_are_those_of_the_connections():
     assert [part.name for part, _, _ in found] == ["first", "second", "third"]
     np.testing.assert_array_equal([own for _, own, _ in found], x[:, None])
     np.testing.assert_array_equal([given for _, _, given in found], [[2.0], [1.0], [-2.0]])
+
+
+@pytest.mark.filterwarnings("ignore:.*:RuntimeWarning")
+def test_a_quotient_of_inputs_is_no_loop():
+    """python-control's first pass has inputs of 0, and 0/0 times a zero is NaN for good."""
+    quotient = ct.nlsys(
+        None, lambda t, x, u, p: [u[0] / u[1]], inputs=["n", "d"], outputs=["r"], name="quotient"
+    )
+    rest = ct.nlsys(
+        lambda t, x, u, p: [u[0] - x[0], 0.0], lambda t, x, u, p: [x[0], 2.0 + x[1]],
+        inputs=["r"], outputs=["n", "d"], states=2, name="rest",
+    )  # fmt: skip
+    loop = ct.interconnect([quotient, rest], inputs=[], inplist=[], outputs=["r", "n"])
+    x, none = np.array([3.0, 1.0]), np.zeros(0)
+    internals.set_parameters(loop, None)
+    with pytest.raises(RuntimeError, match="algebraic loop"):
+        loop._compute_static_io(0.0, x, none)
+    np.testing.assert_allclose(internals.rates_now(loop, 0.0, x, none), [-2.0, 0.0])
+    np.testing.assert_allclose(internals.outputs_now(loop, 0.0, x, none), [1.0, 3.0])
+    rates, outputs = internals.rates_and_outputs_now(loop, 0.0, x, none)
+    np.testing.assert_allclose(np.append(rates, outputs), [-2.0, 0.0, 1.0, 3.0])
+    given = [u.tolist() for _, _, u in internals.parts_now(loop, 0.0, x, none)]
+    assert given == [[3.0, 3.0], [1.0]]
+
+
+def test_a_true_loop_is_still_one():
+    double = ct.nlsys(
+        None, lambda t, x, u, p: [2 * u[0] + 1], inputs=["y"], outputs=["y"], name="d"
+    )
+    loop = ct.interconnect([double], inputs=[], inplist=[], outputs=["y"])
+    internals.set_parameters(loop, None)
+    with pytest.raises(RuntimeError, match="algebraic loop"):
+        internals.outputs_now(loop, 0.0, np.zeros(0), np.zeros(0))

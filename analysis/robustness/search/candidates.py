@@ -17,7 +17,16 @@ from ..uncertainty.lattice import corners
 from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = ["Found", "corner_count", "search_worst"]
+__all__ = [
+    "Found",
+    "corner_count",
+    "evolve",
+    "in_batches",
+    "places",
+    "search_worst",
+    "some_corners",
+    "uniform",
+]
 
 _SHARE = 4
 """Corners, and uniform draws, take one part in this many of the runs each."""
@@ -57,7 +66,16 @@ class Found:
     def run(self, searcher: str, table: pd.DataFrame) -> np.ndarray:
         """Run rows, return their margins."""
         table = with_row_numbers(table, self.margins.size)
-        results = evaluated(self.evaluate, table)
+        return self._kept(searcher, table, evaluated(self.evaluate, table))
+
+    def run_again(self, searcher: str, number: int) -> dict[str, Any]:
+        """Count a row that is run once more, for what that yields besides; return it."""
+        new = [self.margins.size]
+        table, results = self.points.iloc[[number]], pd.concat(self.results).iloc[[number]]
+        self._kept(searcher, table.set_axis(new), results.set_axis(new))
+        return table.iloc[0].to_dict()
+
+    def _kept(self, searcher: str, table: pd.DataFrame, results: pd.DataFrame) -> np.ndarray:
         margins = margins_of(results)
         self.tables.append(table)
         self.results.append(results)
@@ -72,17 +90,17 @@ def search_worst(found: Found, rng: np.random.Generator) -> None:
     is_finite = not space.quantities or space.scale == 0  # the corners are everything
     share = found.runs if is_finite else max(found.runs // _SHARE, 1)
     has_all = corner_count(space) <= share
-    some = corners(space).table if has_all else _some_corners(space, share, rng)
-    _in_batches(found, "corners", some)
+    some = corners(space).table if has_all else some_corners(space, share, rng)
+    in_batches(found, "corners", some)
     if is_finite:
         return
-    _in_batches(found, "uniform", _uniform(space, min(share, found.left), rng))
+    in_batches(found, "uniform", uniform(space, min(share, found.left), rng))
     for restart in itertools.count():
         size = int(max(GENERATION, 4 + 3 * np.log(len(space.quantities)))) << restart
         if size > found.left:
             break
-        _evolve(found, rng, size, is_first=restart == 0)
-    _in_batches(found, "uniform", _uniform(space, found.left, rng))
+        evolve(found, rng, size, is_first=restart == 0)
+    in_batches(found, "uniform", uniform(space, found.left, rng))
 
 
 def corner_count(space: Space) -> int:
@@ -90,30 +108,37 @@ def corner_count(space: Space) -> int:
     return 2 ** len(space.quantities) * math.prod(len(c.options) for c in space.choices)
 
 
-def _some_corners(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+def some_corners(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+    """Return random corners of the box."""
     unit = rng.random((count, len(space.names)))
     d = len(space.quantities)
     unit[:, :d] = np.rint(unit[:, :d])
     return from_unit_cube(space, unit).drop_duplicates(ignore_index=True)
 
 
-def _uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+def uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
+    """Return uniform draws in the box."""
     return from_unit_cube(space, rng.random((count, len(space.names))))
 
 
-def _in_batches(found: Found, searcher: str, table: pd.DataFrame) -> None:
+def in_batches(found: Found, searcher: str, table: pd.DataFrame) -> None:
+    """Run rows of a table until the target is met."""
     for first in range(0, len(table), BATCH):
         if found.left:
             found.run(searcher, table.iloc[first : first + min(BATCH, found.left)])
 
 
-def _evolve(found: Found, rng: np.random.Generator, size: int, *, is_first: bool) -> None:
-    """One search by CMA-ES with `size` rows in a generation."""
+def evolve(
+    found: Found, rng: np.random.Generator, size: int, *, is_first: bool, most: int | None = None
+) -> None:
+    """One search by CMA-ES with `size` rows in a generation, and `most` generations."""
     space, d = found.space, len(found.space.quantities)
-    start = found.points.iloc[[np.argmin(found.margins)]] if is_first else _uniform(space, 1, rng)
+    start = found.points.iloc[[np.argmin(found.margins)]] if is_first else uniform(space, 1, rng)
     labels = start[[choice.name for choice in space.choices]].iloc[0].to_dict()
-    strategy = _strategy(_places(space, start)[0], size, rng)
-    while not strategy.stop() and found.left >= size:
+    strategy = _strategy(places(space, start)[0], size, rng)
+    for generation in itertools.count():
+        if strategy.stop() or found.left < size or generation == most:
+            break
         asked = strategy.ask()
         unit = np.full((size, len(space.names)), 0.5)
         unit[:, :d] = np.clip(asked, 0.0, 1.0)[:, :d]
@@ -122,7 +147,7 @@ def _evolve(found: Found, rng: np.random.Generator, size: int, *, is_first: bool
             strategy.tell(asked, list(np.clip(margins, -EXTREME, EXTREME)))
 
 
-def _places(space: Space, table: pd.DataFrame) -> np.ndarray:
+def places(space: Space, table: pd.DataFrame) -> np.ndarray:
     """Return the places of rows in their boxes, the opposite of `from_unit_cube`."""
     box = ends(space)
     low, high = box.to_numpy()

@@ -15,7 +15,9 @@ from nlctl.wording import counted
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
 from .candidates import Found, corner_count, search_worst
+from .descent import search_with_derivatives
 from .evaluation import Evaluate, margins_of, row_text
+from .first_order import FirstOrderOf
 
 __all__ = ["WorstCase", "worst_case"]
 
@@ -32,11 +34,16 @@ class WorstCase:
     results : pandas.DataFrame
         What was evaluated, by row.
     searchers : ndarray of str, shape (design.size,)
-        What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``.
+        What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``; with derivatives also
+        ``"test signals"`` and ``"gradient"``, and ``"derivatives"`` for a row that was run once
+        more, for its derivatives.
     is_finished : bool
         False if Ctrl-C ended the search.
     all_corners : bool
         Whether every corner of the box is among the rows; otherwise they are a random subset.
+    without_derivative : tuple of str
+        Why there was none at some rows, or from some time on: there the other searchers did the
+        work.
 
     Examples
     --------
@@ -48,6 +55,7 @@ class WorstCase:
     searchers: np.ndarray
     is_finished: bool
     all_corners: bool
+    without_derivative: tuple[str, ...] = ()
 
     @property
     def number(self) -> int:
@@ -81,6 +89,12 @@ class WorstCase:
         return dict(zip(map(str, names), map(int, counts), strict=True))
 
     @property
+    def first_violation(self) -> int | None:
+        """Number of the first row that violates the spec, None if none does."""
+        low = np.flatnonzero(~(margins_of(self.results) > 0))
+        return int(low[0]) if low.size else None
+
+    @property
     def best_so_far(self) -> np.ndarray:
         """Lowest margin after each run."""
         return np.minimum.accumulate(margins_of(self.results))
@@ -94,7 +108,10 @@ class WorstCase:
             f"{row_text(self.witness)}"
         )
         verdict = "A violation" if self.is_violated else "No violation, which proves nothing"
-        return f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {found}."
+        said = f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {found}."
+        if self.without_derivative:
+            said += f" Not everywhere was there a derivative: {self.without_derivative[0]}."
+        return said
 
 
 @as_annotated
@@ -105,6 +122,7 @@ def worst_case(
     *,
     entropy: int | None = None,
     target: float | None = None,
+    derivatives: FirstOrderOf | None = None,
 ) -> WorstCase:
     """Search the box for the row with the lowest margin.
 
@@ -114,6 +132,13 @@ def worst_case(
     arXiv:1604.00772) on the margin.  CMA-ES starts from the worst row so far, and whenever it has
     come to an end from a random point with twice the population (Auger, Hansen, CEC 2005);
     choices stand still within one such search.  What is left of the runs is uniform draws.
+
+    With `derivatives` the order is another one, for few runs: test signals (quantities ``name[0]``,
+    ``name[1]``, ... are the pieces of a signal: all alternate between their ends, all are constant
+    at an end, all step halfway), a descent from the worst of them, and then in turn corners,
+    uniform draws, a descent from the worst of these, and CMA-ES.  A descent moves all signals of a
+    row along their derivatives, and goes where their margin would be lowest, by linear programs in
+    a box that shrinks (`first_order.lowest`).  A run with derivatives counts as one run.
 
     Parameters
     ----------
@@ -129,6 +154,8 @@ def worst_case(
     target : float, optional
         The search ends with the first batch that has a margin <= target; 0 ends it with the first
         violation.
+    derivatives : callable, optional
+        ``functools.partial(first_order, prepared)``: takes a row, returns its `FirstOrder`.
 
     Returns
     -------
@@ -161,9 +188,12 @@ def worst_case(
         number("a worst case", "target", target)
     entropy = checked_entropy(entropy)
     found = Found(evaluate, space, runs, target)
-    is_finished = True
+    is_finished, reasons = True, []
     try:
-        search_worst(found, np.random.default_rng(entropy))
+        if derivatives is None:
+            search_worst(found, np.random.default_rng(entropy))
+        else:
+            reasons = search_with_derivatives(found, np.random.default_rng(entropy), derivatives)
     except KeyboardInterrupt:
         if not found.tables:
             raise
@@ -175,4 +205,5 @@ def worst_case(
         searchers=searchers,
         is_finished=is_finished,
         all_corners=int(np.sum(searchers == "corners")) == corner_count(space),
+        without_derivative=tuple(reasons),
     )

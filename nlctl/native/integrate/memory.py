@@ -101,10 +101,10 @@ def _entry(record: Any, name: str, value: Any, dtype: Any, ndim: int) -> tuple[i
         _check_format(record, name, value)
     if not value.flags.c_contiguous:
         raise ValueError(f"'{name}' of {record.__name__} needs a C-contiguous array")
-    return (address_of(value), *value.shape, *_REST[ndim])
+    return (data_address(value), *value.shape, *_REST[ndim])
 
 
-def address_of(array: np.ndarray) -> int:
+def data_address(array: np.ndarray) -> int:
     """Return where a contiguous array begins; one without elements begins nowhere."""
     if not array.size:
         return 0
@@ -117,7 +117,7 @@ def _number(record: Any, name: str, value: Any) -> int:
     """Return what a table has for a number: a float's bits, an integer; for a record its table."""
     if hasattr(value, "_fields"):
         _check_format(record, name, value)
-        return address_of(value.table)
+        return data_address(value.table)
     if type(value) is float and type_of(record).fields[name] is types.float64:
         return _BITS.unpack(_FLOAT.pack(value))[0]
     if type(value) is int and type_of(record).fields[name] is types.int64:

@@ -1,0 +1,128 @@
+"""The search for the worst case with derivatives: test signals, descents, draws, CMA-ES."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..uncertainty.space import Space, from_unit_cube
+from .candidates import GENERATION, Found, evolve, in_batches, places, some_corners, uniform
+from .first_order import FirstOrder, FirstOrderOf, lowest
+
+__all__ = ["search_with_derivatives", "test_signals"]
+
+_DRAWS = 4
+"""Corners, and uniform draws, of each round."""
+_GENERATIONS = 2
+"""Of CMA-ES in each round."""
+_STEPS = 10
+"""Descents have at most so many steps."""
+_SMALLEST = 1 / 256
+"""Shortest step of a descent, in units of the boxes."""
+_SHORTER = 4
+"""By what a step is shortened that did not go down."""
+_TRUSTED = 0.5
+"""The next step is twice as long where one gains this part of what the first order says."""
+_MOST_CONSTANT = 16
+"""Test signals that are constant."""
+_PIECE = re.compile(r"(.*)\[(\d+)\]")
+
+
+def search_with_derivatives(
+    found: Found, rng: np.random.Generator, derivatives: FirstOrderOf
+) -> list[str]:
+    """Run rows until the budget is spent or the target met; return why derivatives ended."""
+    reasons: dict[str, None] = {}
+    tests = from_unit_cube(found.space, test_signals(found.space))
+    for k in range(len(tests)):  # few are needed, often
+        in_batches(found, "test signals", tests.iloc[[k]])
+    _descend(found, derivatives, reasons, 0)
+    while found.left:
+        first = found.margins.size
+        for searcher, draw in (("corners", some_corners), ("uniform", uniform)):
+            in_batches(found, searcher, draw(found.space, min(_DRAWS, found.left), rng))
+        _descend(found, derivatives, reasons, first)
+        if found.left >= GENERATION:
+            evolve(found, rng, GENERATION, is_first=True, most=_GENERATIONS)
+    return list(reasons)
+
+
+def test_signals(space: Space) -> np.ndarray:
+    """Return points of the unit cube: signals that an engineer tries first.
+
+    Quantities ``name[0]``, ``name[1]``, ... are the pieces of one signal; what has no pieces is in
+    the middle.  All signals alternate between their ends; all step up halfway; all are constant
+    at an end, at first at different ones, and from one to the next only one of them changes; all
+    are in the middle; all step down halfway.
+    """
+    quantities = [q.name for q in space.quantities]
+    signals: dict[str, list[int]] = {}
+    for place, name in enumerate(quantities):
+        if (piece := _PIECE.fullmatch(name)) is not None:
+            signals.setdefault(piece[1], []).append(place)
+    pieces = [each for each in signals.values() if len(each) > 1]
+    singles = [k for k in range(len(quantities)) if not any(k in each for each in pieces)]
+    groups = pieces or [[k] for k in singles]
+    made = []
+
+    def add(values: Any) -> None:
+        row = np.full(len(space.names), 0.5)
+        for group, value in zip(groups, values, strict=True):
+            row[group] = value
+        made.append(row)
+
+    halves = [np.arange(len(each)) >= len(each) // 2 for each in groups]
+    if pieces:
+        add([1.0 - np.arange(len(each)) % 2 for each in groups])
+        add([1.0 * half for half in halves])
+    for number in itertools.islice(range(1 << min(len(groups), 30)), _MOST_CONSTANT):
+        gray = number ^ (number >> 1)
+        add([1.0 - ((gray >> i & 1) + i) % 2 for i in range(len(groups))])
+    add([0.5] * len(groups))
+    if pieces:
+        add([1.0 - half for half in halves])
+    return np.array(made)
+
+
+def _descend(found: Found, derivatives: FirstOrderOf, reasons: dict[str, None], first: int) -> None:
+    """Go down from the worst row since the first one, by linear programs in shrinking boxes."""
+    if not found.left or not np.isfinite(found.margins[first:]).any():
+        return
+    number, radius = first + int(np.argmin(found.margins[first:])), 1.0
+    for _ in range(_STEPS):
+        if found.left < 2:
+            return
+        row = found.run_again("derivatives", number)
+        made = derivatives(row)
+        if made.reason:
+            reasons[made.reason] = None
+        better = _step(found, made, row, found.margins[number], radius)
+        if better is None:
+            return
+        number, radius = better
+
+
+def _step(
+    found: Found, made: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
+) -> tuple[int, float] | None:
+    """Run rows that the first order calls lower until one is; return it and the next radius."""
+    space = found.space
+    place = places(space, pd.DataFrame([row]))[0]
+    while radius >= _SMALLEST and found.left:
+        lower, said = lowest(made, place, radius)
+        if not said < margin:
+            return None
+        unit = np.full(len(space.names), 0.5)
+        unit[: lower.size] = np.clip(lower, 0.0, 1.0)
+        labels = {choice.name: row[choice.name] for choice in space.choices}
+        (new,) = found.run("gradient", from_unit_cube(space, unit[None, :]).assign(**labels))
+        if new < margin:
+            trusted = margin - new >= _TRUSTED * (margin - said)
+            return found.margins.size - 1, min(1.0, 2 * radius) if trusted else radius
+        radius /= _SHORTER
+    return None

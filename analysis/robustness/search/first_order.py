@@ -1,0 +1,245 @@
+"""What a requirement's margin may become near a row, by signals that move along their derivatives.
+
+    y(t; z + d) = y(t; z) + D(t) d + ...          z, d in the unit cube of the space
+
+A margin is made of least and largest values of signals.  Where it is to go down, a least value goes
+down with any one of its arguments, a largest one with all of them.  So of every least value the
+argument that is least now is taken, of every largest one all arguments: a linear program for d (the
+convex-concave procedure, Yuille, Rangarajan, Neural Computation 15, 2003), repeated while it gains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linprog
+
+from ..stl.formula import Always, And, Band, Eventually, Formula, Not
+from ..stl.spec import Requirement
+
+__all__ = ["FirstOrder", "FirstOrderOf", "lowest"]
+
+_REPEATS = 4  # linear programs at most
+_GAIN = 1e-9  # a further one must lower the margin by so much
+_NESTED = 60  # arguments of a largest value of windows that are followed
+_TIMES = 400  # samples that are looked at
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrder:
+    """Signals of a row, and their derivatives.
+
+    Attributes
+    ----------
+    t : ndarray of shape (m,)
+        Times (s).
+    signals : mapping
+        For each name samples of shape (m,).
+    derivatives : mapping
+        For each name an array of shape (m, d), by the quantities of the space in units of their
+        boxes.
+    requirements : tuple of Requirement
+    reason : str
+        Why there are none, or none up to the end; empty if there are.
+
+    Examples
+    --------
+    y = z(t) with z of three pieces; the largest is lowered by lowering all that are largest:
+
+    >>> import numpy as np
+    >>> from nlctl.analysis.robustness import Requirement, eventually, in_band
+    >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest
+    >>> high = Requirement(key="high", formula=eventually(in_band("y", lower=1.0)), until=2.0)
+    >>> made = FirstOrder(
+    ...     t=np.arange(3.0), signals={"y": np.array([0.9, 0.8, 0.2])},
+    ...     derivatives={"y": np.eye(3)}, requirements=(high,),
+    ... )
+    >>> place, margin = lowest(made, np.array([0.9, 0.8, 0.2]), 0.5)
+    >>> print(place[:2].round(6), round(margin, 6))
+    [0.4 0.3] -0.6
+    """
+
+    t: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    derivatives: Mapping[str, np.ndarray]
+    requirements: tuple[Requirement, ...]
+    reason: str = ""
+
+
+FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
+"""Takes a row; for a loop ``functools.partial(first_order, prepared)``."""
+
+
+def lowest(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
+    """Return where the first order makes the least margin lowest, and that margin.
+
+    No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite
+    where there is no derivative.
+    """
+    best, least = place, np.inf
+    for requirement in of.requirements:
+        found = _lowered(of, requirement, place, radius)
+        if found is not None and found[1] < least:
+            best, least = found
+    return best, least
+
+
+def _lowered(
+    of: FirstOrder, requirement: Requirement, place: np.ndarray, radius: float
+) -> tuple[np.ndarray, float] | None:
+    """Repeat linear programs for one requirement while they gain."""
+    names = requirement.signals
+    if any(name not in of.derivatives for name in names):
+        return None
+    stride = -(-of.t.size // _TIMES)
+    t = of.t[::stride]
+    y = {name: of.signals[name][::stride] for name in names}
+    slopes = np.array([of.derivatives[name][::stride] for name in names])
+    if not np.isfinite(slopes).all() or not all(np.isfinite(v).all() for v in y.values()):
+        return None
+    bounds = [(max(-z, -radius), min(1.0 - z, radius)) for z in place]
+    change, least = np.zeros(place.size), np.inf
+    for _ in range(_REPEATS):
+        moved = {name: y[name] + slopes[i] @ change for i, name in enumerate(names)}
+        picked = _Picked(t=t, y=moved, names=names)
+        atoms = picked.lowering(requirement.formula, 0)
+        further, margin = _program(atoms, slopes, change, bounds)
+        if not margin < least - _GAIN * max(1.0, abs(least) if np.isfinite(least) else 1.0):
+            break
+        change, least = further, margin
+    return place + change, least
+
+
+@dataclass(frozen=True)
+class _Atoms:
+    """Numbers offset + factor y[signal](t[k])."""
+
+    signal: np.ndarray
+    k: np.ndarray
+    factor: np.ndarray
+    value: np.ndarray
+
+    @property
+    def opposite(self) -> _Atoms:
+        return replace(self, factor=-self.factor, value=-self.value)
+
+
+def _program(
+    atoms: _Atoms, slopes: np.ndarray, change: np.ndarray, bounds: list[tuple[float, float]]
+) -> tuple[np.ndarray, float]:
+    """Minimise the largest of the atoms over changes within bounds."""
+    rows = atoms.factor[:, None] * slopes[atoms.signal, atoms.k]
+    offsets = atoms.value - rows @ change
+    scale = max(float(np.abs(rows).max(initial=0.0)), 1e-300)
+    if scale == 1e-300:
+        return change, float(atoms.value.max())
+    matrix = np.column_stack([rows / scale, -np.ones(len(rows))])
+    goal = np.append(np.zeros(change.size), 1.0)
+    made = linprog(
+        goal, A_ub=matrix, b_ub=-offsets / scale, bounds=[*bounds, (None, None)], method="highs"
+    )
+    if made.x is None:
+        return change, np.inf
+    found = np.clip(made.x[:-1], *np.transpose(bounds))
+    return found, float(np.max(offsets + rows @ found))
+
+
+@dataclass(frozen=True)
+class _Picked:
+    """Of a formula the numbers that count, by the values that signals have now."""
+
+    t: np.ndarray
+    y: Mapping[str, np.ndarray]
+    names: tuple[str, ...]
+    known: dict[int, np.ndarray] = field(default_factory=dict)
+
+    def margins(self, formula: Formula) -> np.ndarray:
+        """Return the margin at every time, of samples."""
+        if id(formula) not in self.known:
+            self.known[id(formula)] = self._margins(formula)
+        return self.known[id(formula)]
+
+    def _margins(self, formula: Formula) -> np.ndarray:
+        if isinstance(formula, Band):
+            y = self.y[formula.signal]
+            return np.minimum(formula.upper - y, y - formula.lower) / formula.scale
+        if isinstance(formula, Not):
+            return -self.margins(formula.part)
+        if isinstance(formula, And):
+            return np.min([self.margins(part) for part in formula.parts], axis=0)
+        inner, (first, last) = self.margins(formula.part), self._window(formula)
+        take = np.min if isinstance(formula, Always) else np.max
+        return np.array([take(inner[a:b]) for a, b in zip(first, last, strict=True)])
+
+    def _window(self, formula: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Return for every time the first sample of its window, and that behind its last."""
+        slack = 1e-9 * self.t[-1]
+        first = np.searchsorted(self.t, self.t + formula.start - slack)
+        last = np.searchsorted(self.t, self.t + formula.end + slack, side="right")
+        first = np.minimum(first, self.t.size - 1)
+        return first, np.maximum(last, first + 1)
+
+    def lowering(self, formula: Formula, k: int) -> _Atoms:
+        """Return numbers of which the largest is to go down."""
+        if isinstance(formula, Not):
+            return self.raising(formula.part, k).opposite
+        if isinstance(formula, Band):
+            return self._band(formula, np.array([k]), every=False)
+        if isinstance(formula, And):
+            return self.lowering(min(formula.parts, key=lambda part: self.margins(part)[k]), k)
+        times = self._times(formula, k)
+        inner = self.margins(formula.part)[times]
+        if isinstance(formula, Always):
+            return self.lowering(formula.part, int(times[np.argmin(inner)]))
+        return self._all(formula.part, times[np.argsort(-inner)], self.lowering, every=False)
+
+    def raising(self, formula: Formula, k: int) -> _Atoms:
+        """Return numbers of which the least is to go up."""
+        if isinstance(formula, Not):
+            return self.lowering(formula.part, k).opposite
+        if isinstance(formula, Band):
+            return self._band(formula, np.array([k]), every=True)
+        if isinstance(formula, And):
+            return _together([self.raising(part, k) for part in formula.parts])
+        times = self._times(formula, k)
+        inner = self.margins(formula.part)[times]
+        if isinstance(formula, Eventually):
+            return self.raising(formula.part, int(times[np.argmax(inner)]))
+        return self._all(formula.part, times[np.argsort(inner)], self.raising, every=True)
+
+    def _times(self, formula: Any, k: int) -> np.ndarray:
+        first, last = self._window(formula)
+        return np.arange(first[k], last[k])
+
+    def _all(
+        self, part: Formula, times: np.ndarray, one: Callable[..., _Atoms], *, every: bool
+    ) -> _Atoms:
+        """Return the numbers of a part at many times, the most important first."""
+        if isinstance(part, Band):
+            return self._band(part, times, every=every)
+        if isinstance(part, Not) and isinstance(part.part, Band):
+            return self._band(part.part, times, every=not every).opposite
+        return _together([one(part, int(k)) for k in times[:_NESTED]])
+
+    def _band(self, band: Band, k: np.ndarray, *, every: bool) -> _Atoms:
+        """Return the distances to the ends of a band: to both, or to the nearer one."""
+        y = self.y[band.signal][k]
+        above, below = (band.upper - y) / band.scale, (y - band.lower) / band.scale
+        nearer = above <= below
+        sides = [(above, -1.0, np.isfinite(band.upper) & (nearer | every)),
+                 (below, 1.0, np.isfinite(band.lower) & (~nearer | every))]  # fmt: skip
+        signal = np.full(k.size, self.names.index(band.signal))
+        return _together([
+            _Atoms(signal[kept], k[kept], np.full(int(kept.sum()), sign / band.scale), value[kept])
+            for value, sign, kept in sides
+        ])  # fmt: skip
+
+
+def _together(parts: list[_Atoms]) -> _Atoms:
+    return _Atoms(*(
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("signal", "k", "factor", "value")
+    ))  # fmt: skip

@@ -1,0 +1,157 @@
+"""Falsification next to what others published: ARCH-COMP's table, one setting for all rows.
+
+    python benchmarks/arch/run.py [--rows AT1 CC3] [--attempts 50] [--simulations 300]
+
+A cell is attempts falsified of 50 and the mean number of simulations of these.  A run with
+derivatives counts as one simulation, and one of a row that was run before as another one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rows import FALCAUN, ROWS, Row
+
+from nlctl.analysis.robustness import (
+    Experiment,
+    Prepared,
+    Spec,
+    evaluate,
+    first_order,
+    prepare,
+    worst_case,
+)
+
+SOURCES = """\
+zlscheck: ARCH-COMP 2020, instance 1, by gradients
+  (github.com/ismailbennani/zlscheck_arch20_counterexamples).
+ARIsTEO: recomputed from its .mat files of ARCH-COMP 2020.
+FalCAuN: ARCH-COMP 2023 / 2024, mean of 10 attempts with more simulations each.
+suspect: 1.0 of a requirement that others needed many runs for."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the attempts of one row have come to."""
+
+    simulations: tuple[int | None, ...]
+    searchers: tuple[str, ...]
+    seconds: float
+    reasons: tuple[str, ...]
+
+    @property
+    def falsified(self) -> list[int]:
+        """Simulations of the attempts that falsified."""
+        return [count for count in self.simulations if count is not None]
+
+
+def prepared(row: Row, loops: dict[Callable[[], Any], Prepared]) -> Prepared:
+    """Return the experiment of a row; rows of one plant share its machine code."""
+    experiment = Experiment(
+        space=row.space,
+        build=row.build,
+        spec=Spec(requirements=(row.requirement,)),
+        timepts=row.timepts,
+        method=row.method,
+    )
+    if row.build not in loops:
+        loops[row.build] = prepare(experiment)
+    return replace(loops[row.build], experiment=experiment)
+
+
+def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Found:
+    """Search a row again and again, each time with other random numbers."""
+    counts, searchers, reasons, start = [], [], {}, time.perf_counter()
+    for entropy in range(attempts):
+        made = worst_case(
+            partial(evaluate, ready),
+            row.space,
+            simulations,
+            entropy=entropy,
+            target=0.0,
+            derivatives=partial(first_order, ready),
+        )
+        first = made.first_violation
+        counts.append(None if first is None else first + 1)
+        searchers += [] if first is None else [str(made.searchers[first])]
+        reasons |= dict.fromkeys(made.without_derivative)
+    seconds = time.perf_counter() - start
+    return Found(tuple(counts), tuple(searchers), seconds, tuple(reasons))
+
+
+def cell(result: tuple[int, float] | None) -> str:
+    """Return a published result as text."""
+    if result is None:
+        return ""
+    return f"{result[0]}" if np.isnan(result[1]) else f"{result[0]} / {result[1]:g}"
+
+
+def best_published(row: Row) -> float:
+    """Return the least mean of those who falsified all 50 attempts, or of all if none did."""
+    published = [each for each in (row.zlscheck, row.aristeo) if each is not None]
+    most = max((each[0] for each in published), default=0)
+    means = [mean for count, mean in published if count == most and not np.isnan(mean)]
+    return min(means, default=np.nan)
+
+
+def line(row: Row, found: Found, attempts: int) -> tuple[list[str], bool, bool]:
+    """Return the cells of a row, whether all attempts falsified, and if the mean is the best."""
+    falsified = found.falsified
+    mean = float(np.mean(falsified)) if falsified else np.nan
+    every = len(falsified) == attempts
+    best = every and not mean > best_published(row)
+    names, counts = np.unique(found.searchers, return_counts=True)
+    by = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
+    cells = [
+        row.key,
+        f"{len(falsified)} / {mean:.1f}" + (" *" if best else ""),
+        cell(row.zlscheck),
+        cell(row.aristeo) + row.suspect * " (suspect)",
+        FALCAUN.get(row.key, ""),
+        by,
+        f"{found.seconds:.0f}",
+        row.note,
+    ]
+    return cells, every, best
+
+
+def main() -> None:
+    """Print a table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rows", nargs="+", choices=[row.key for row in ROWS], metavar="ROW")
+    parser.add_argument("--attempts", type=int, default=50)
+    parser.add_argument("--simulations", type=int, default=300)
+    asked = parser.parse_args()
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
+    console = Console()
+    heads = ["row", "nlctl", "zlscheck", "ARIsTEO", "FalCAuN", "found by", "s", "note"]
+    table, loops, whole = Table(*heads), {}, []
+    start = time.perf_counter()
+    for row in [row for row in ROWS if not asked.rows or row.key in asked.rows]:
+        found = attempted(row, prepared(row, loops), asked.attempts, asked.simulations)
+        cells, every, best = line(row, found, asked.attempts)
+        whole.append((every, best))
+        table.add_row(*cells)
+        console.print(" | ".join(cells), highlight=False)
+        for reason in found.reasons[:1]:
+            console.print(f"    no derivative everywhere: {reason[:150]}", highlight=False)
+    console.print(table)
+    every, best = np.sum(whole, axis=0)
+    console.print(
+        f"{len(whole)} rows: {every} falsified in every attempt, {best} with the best mean (*), "
+        f"{time.perf_counter() - start:.0f} s"
+    )
+    console.print(SOURCES)
+
+
+if __name__ == "__main__":
+    main()
