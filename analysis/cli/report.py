@@ -213,7 +213,7 @@ def _study(
     trust: bool,
 ) -> Made:
     """Report a study."""
-    from ..studies.page.claims import claims
+    from ..pages.study.claims import claims
     from .study_report import report_study
     from .sweep_progress import sweep_bar
 

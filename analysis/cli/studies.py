@@ -403,7 +403,7 @@ def _show(result: Any, json: bool) -> None:
 def _write_study_claims(path: Path | None, result: Any) -> None:
     """Write the claims of a study where that is wanted."""
     if path is not None:
-        from ..studies.page.claims import claims
+        from ..pages.study.claims import claims
 
         write_claims(path, result.study.study.title, claims(result))
 

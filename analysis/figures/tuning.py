@@ -9,8 +9,17 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.annotations import as_annotated
+from nlctl.plotting.axes import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SHORT_LINE,
+    TIME,
+    legend_above,
+    stacked_axes,
+)
 
-from .axes import BLUE, GREEN, GREY, ORANGE, SHORT_LINE, TIME, legend_above, stacked_axes
 from .labels import number_axes, plain
 from .runs import clipped_margins
 

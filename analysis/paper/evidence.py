@@ -7,6 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from threading import Event
+from typing import cast
 
 import control as ct
 import numpy as np
@@ -98,7 +99,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
         ledger=ledger(study),
         conservatism=conservatism(study),
         slow_drift=long_run(loop, LOOK, rtol=1e-7).predictions[0],
-        certificate=certify(tame, k=SPLIT.get(str(loop.name))),
+        certificate=cast(KnownSignCertificate, certify(tame, k=SPLIT.get(str(loop.name)))),
         certified_max_r=_max_r(tame, s.t),
         t=s.t,
         curves={

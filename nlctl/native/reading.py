@@ -80,7 +80,8 @@ class Reading:
             self._check_captured()
             override(self.schedule.system, params)
             p = packed(self.schedule.holders, self.program.layout, self.program.fixed)
-            known += [] if now is None else [_Resolved(now, handed(self.apart), p.copy())]
+            if self.apart is not None and now is not None:
+                known.append(_Resolved(now, handed(self.apart), p.copy()))
             return p
 
     def _check_captured(self) -> None:

@@ -61,7 +61,7 @@ class Response(ct.TimeResponseData):
     wires: Wires = Wires()
 
     @property
-    def states(self) -> Any:
+    def states(self) -> np.ndarray:
         """The states, found by ``"plant.x1"`` as well as by python-control's ``"plant_x1"``."""
         found: Any = super().states
         if len(self.state_names) == len(found.signal_labels or ()):
@@ -74,8 +74,6 @@ class Response(ct.TimeResponseData):
         def time(self) -> np.ndarray: ...
         @property
         def outputs(self) -> np.ndarray: ...
-        @property
-        def states(self) -> np.ndarray: ...
         @property
         def inputs(self) -> np.ndarray: ...
 

@@ -93,8 +93,10 @@ class ModelReferenceCertificate(Certificate):
         yield "beta", match.beta, per_second(n), "computed", "coefficient of v in x_n'", "all x"
         yield "lambda", match.lam, "1", "computed", "beta k / gain of the law, must be > 0", "all x"
         size = match.W_squared**0.5
-        chosen = ("given", "chosen") if match.chosen else ("computed", "elimination, exactly")
-        yield "|W|", size, "1", *chosen, "all x"
+        if match.chosen:
+            yield "|W|", size, "1", "given", "chosen", "all x"
+        else:
+            yield "|W|", size, "1", "computed", "elimination, exactly", "all x"
         yield "mu", form.mu, "1/s", "proved", "Q - mu P > 0, Q = -(A^T P + P A) exactly", "all E"
         q = float(int(form.q.p) / int(form.q.q))
         yield "q", q, "1", "computed", "b^T P Q^-1 P b, rational", "all E"

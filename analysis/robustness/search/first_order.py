@@ -162,7 +162,7 @@ class _Picked:
             self.known[id(formula)] = self._margins(formula)
         return self.known[id(formula)]
 
-    def _margins(self, formula: Formula) -> np.ndarray:
+    def _margins(self, formula: Any) -> np.ndarray:
         if isinstance(formula, Band):
             y = self.y[formula.signal]
             return np.minimum(formula.upper - y, y - formula.lower) / formula.scale
@@ -182,7 +182,7 @@ class _Picked:
         first = np.minimum(first, self.t.size - 1)
         return first, np.maximum(last, first + 1)
 
-    def lowering(self, formula: Formula, k: int) -> _Atoms:
+    def lowering(self, formula: Any, k: int) -> _Atoms:
         """Return numbers of which the largest is to go down."""
         if isinstance(formula, Not):
             return self.raising(formula.part, k).opposite
@@ -196,7 +196,7 @@ class _Picked:
             return self.lowering(formula.part, int(times[np.argmin(inner)]))
         return self._all(formula.part, times[np.argsort(-inner)], self.lowering, every=False)
 
-    def raising(self, formula: Formula, k: int) -> _Atoms:
+    def raising(self, formula: Any, k: int) -> _Atoms:
         """Return numbers of which the least is to go up."""
         if isinstance(formula, Not):
             return self.lowering(formula.part, k).opposite

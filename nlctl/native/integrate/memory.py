@@ -11,7 +11,7 @@ import ctypes
 import functools
 import math
 import struct
-from typing import Annotated, Any, get_origin, get_type_hints
+from typing import Annotated, Any, cast, get_origin, get_type_hints
 
 import numba
 import numpy as np
@@ -110,7 +110,7 @@ def data_address(array: np.ndarray) -> int:
         return 0
     if not array.flags.writeable:
         return array.ctypes.data
-    return ctypes.addressof(_ANY.from_buffer(array))  # several times as fast
+    return ctypes.addressof(_ANY.from_buffer(cast(Any, array)))  # several times as fast
 
 
 def _number(record: Any, name: str, value: Any) -> int:

@@ -147,7 +147,7 @@ def _fingerprint(thing: object, seen: _Seen, names: Iterable[str] = ()) -> Itera
     kind = type(thing)
     if kind in _NUMBERS:
         yield repr(thing)
-    elif kind is str:
+    elif kind is str and isinstance(thing, str):
         yield _of_text(thing, seen)
     elif isinstance(thing, _HOLDERS):
         is_text = isinstance(thing, str)
