@@ -20,7 +20,6 @@ from .places import (
     state_names,
     supplied_blocks,
 )
-from .standing import handed, standing
 from .third_party import Apart, apart
 
 __all__ = [
@@ -30,7 +29,6 @@ __all__ = [
     "apart",
     "as_system",
     "check_read",
-    "handed",
     "initial_state",
     "interconnect",
     "known_system",
@@ -43,7 +41,6 @@ __all__ = [
     "places",
     "reconnected",
     "samplings",
-    "standing",
     "state_names",
     "supplied_blocks",
 ]

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..diagrams import Apart, handed, override, standing
+from ..diagrams import Apart, override
+from ..diagrams.standing import handed, standing
 from ..errors import UsageError
 from .cache import Cache
 from .diagram.parameters import packed

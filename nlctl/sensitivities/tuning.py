@@ -52,7 +52,7 @@ class SpaceLike(Protocol):
     def quantities(self) -> Sequence[QuantityLike]: ...
 
 
-class SpecLike(Protocol):
+class RequirementsLike(Protocol):
     """What is asked of a spec, such as `nlctl.analysis.robustness.Spec`."""
 
     @property
@@ -63,7 +63,7 @@ class SpecLike(Protocol):
 def tune(
     diagram: Any,
     space: Mapping[str, Any] | SpaceLike,
-    spec: SpecLike | Sequence[MetricLike] | MetricLike,
+    spec: RequirementsLike | Sequence[MetricLike] | MetricLike,
     budget: float = 200,
     timepts: Any = None,
     inputs: Any = 0.0,

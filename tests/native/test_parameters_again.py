@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl.diagrams import apart, standing
+from nlctl.diagrams import apart
+from nlctl.diagrams.standing import standing
 
 
 def decay(t, x, u, params):

@@ -85,7 +85,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["derivatives", "trace"],
     ],
     "nlctl.analysis.lyapunov": [
-        ["bounds"],
+        ["bounds", "convex"],
         ["loop"],
         ["proofs", "nussbaum"],
         ["model_reference", "attraction"],

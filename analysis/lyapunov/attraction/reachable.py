@@ -15,7 +15,7 @@ from nlctl.arguments import integer, number, of_type
 from nlctl.errors import ParameterError
 from nlctl.expressions.graph import Untraceable
 from nlctl.native.tubes.series import SeriesCode, series_code
-from nlctl.native.tubes.tube import LEFT, OUTSIDE, REACHED, Tube, tube_from
+from nlctl.native.tubes.tube import LEAVES, MUST_LEAVE, REACHED, Tube, tube_from
 from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
@@ -26,7 +26,7 @@ __all__ = ["ReachableSet", "reachable_set"]
 
 _THREADS = 2
 _CELLS = 200  # parts of the time for which there are bounds
-Status = Literal["proved", "refuted", "undecided"]
+_Status = Literal["proved", "refuted", "undecided"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ class ReachableSet:
     names: tuple[str, ...]
     start: Box
     within: Box | None
-    status: Status
+    status: _Status
     reason: str
     times: np.ndarray = field(repr=False)
     low: np.ndarray = field(repr=False)
@@ -228,7 +228,7 @@ class _Search:
         self.low, self.high = np.full((_CELLS, n), np.inf), np.full((_CELLS, n), -np.inf)
         self.end = np.stack([np.full(n, np.inf), np.full(n, -np.inf)], axis=1)
         self.pieces, self.steps, self.reason = 0, 0, ""
-        self.status: Status = "proved"
+        self.status: _Status = "proved"
         self.refuted: np.ndarray | None = None
 
     def run(self, box: np.ndarray, most: int) -> None:
@@ -256,8 +256,8 @@ class _Search:
             self.end[:, 1] = np.maximum(self.end[:, 1], tube.end[:, 1])
             return []
         middle = 0.5 * piece[:, 0] + 0.5 * piece[:, 1]
-        one = self._tube(np.stack([middle, middle], axis=1)) if tube.status == LEFT else tube
-        if one.status == OUTSIDE:
+        one = self._tube(np.stack([middle, middle], axis=1)) if tube.status == LEAVES else tube
+        if one.status == MUST_LEAVE:
             self.refuted, self.status = middle, "refuted"
             self.reason = f"a solution leaves at t <= {one.time:.6g} s"
             self._know_nothing()

@@ -36,7 +36,7 @@ from ..bounds.decomposition import decompose
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
 from ..loop.checked import read_checked
 from ..loop.external_inputs import disturbed
-from ..loop.roles import PIECES, Parts, has_law, parts_of
+from ..loop.roles import PIECES, Parts, has_law, loop_parts
 from ..proofs.filtered import Demand, FilteredLoop, as_filtered, between, demand, feedforward
 from ..proofs.filtered_certificate import FilteredCertificate
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
@@ -154,7 +154,7 @@ def read_known_sign(
 ) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
     read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
-    parts = parts_of(read.given, read.roles)
+    parts = loop_parts(read.given, read.roles)
     return KnownSignLoop(
         **as_filtered(read),
         parts=parts,

@@ -35,7 +35,7 @@ __all__ = [
     "Roles",
     "check_kind",
     "joined_again",
-    "parts_of",
+    "loop_parts",
     "read_parts",
     "read_roles",
 ]
@@ -419,10 +419,10 @@ def read_parts(
             f"external input {names} is added to the plant's v: the proof needs its bound, and "
             "takes one in certify(loop, inputs={...}) only"
         )
-    return parts_of(loop, roles, start)
+    return loop_parts(loop, roles, start)
 
 
-def parts_of(
+def loop_parts(
     loop: ct.InterconnectedSystem, roles: Roles, start: Mapping[str, float] | None = None
 ) -> Parts:
     """Return the parts of a loop that was read, with the parameters that its blocks have now."""

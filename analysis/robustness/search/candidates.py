@@ -22,10 +22,10 @@ __all__ = [
     "corner_count",
     "evolve",
     "in_batches",
-    "places",
     "search_worst",
     "some_corners",
     "uniform",
+    "unit_places",
 ]
 
 _SHARE = 4
@@ -135,7 +135,7 @@ def evolve(
     space, d = found.space, len(found.space.quantities)
     start = found.points.iloc[[np.argmin(found.margins)]] if is_first else uniform(space, 1, rng)
     labels = start[[choice.name for choice in space.choices]].iloc[0].to_dict()
-    strategy = _strategy(places(space, start)[0], size, rng)
+    strategy = _strategy(unit_places(space, start)[0], size, rng)
     for generation in itertools.count():
         if strategy.stop() or found.left < size or generation == most:
             break
@@ -147,7 +147,7 @@ def evolve(
             strategy.tell(asked, list(np.clip(margins, -EXTREME, EXTREME)))
 
 
-def places(space: Space, table: pd.DataFrame) -> np.ndarray:
+def unit_places(space: Space, table: pd.DataFrame) -> np.ndarray:
     """Return the places of rows in their boxes, the opposite of `from_unit_cube`."""
     box = ends(space)
     low, high = box.to_numpy()

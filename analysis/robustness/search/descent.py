@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from ..uncertainty.space import Space, from_unit_cube
-from .candidates import GENERATION, Found, evolve, in_batches, places, some_corners, uniform
-from .first_order import FirstOrder, FirstOrderOf, lowest
+from .candidates import GENERATION, Found, evolve, in_batches, some_corners, uniform
+from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 __all__ = ["search_with_derivatives", "test_signals"]
 
@@ -112,9 +112,9 @@ def _step(
 ) -> tuple[int, float] | None:
     """Run rows that the first order calls lower until one is; return it and the next radius."""
     space = found.space
-    place = places(space, pd.DataFrame([row]))[0]
+    place = unit_places(space, pd.DataFrame([row]))[0]
     while radius >= _SMALLEST and found.left:
-        lower, said = lowest(made, place, radius)
+        lower, said = lowest_nearby(made, place, radius)
         if not said < margin:
             return None
         unit = np.full(len(space.names), 0.5)

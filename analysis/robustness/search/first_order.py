@@ -20,7 +20,7 @@ from scipy.optimize import linprog
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not
 from ..stl.spec import Requirement
 
-__all__ = ["FirstOrder", "FirstOrderOf", "lowest"]
+__all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
 
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
@@ -51,13 +51,13 @@ class FirstOrder:
 
     >>> import numpy as np
     >>> from nlctl.analysis.robustness import Requirement, eventually, in_band
-    >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest
+    >>> from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
     >>> high = Requirement(key="high", formula=eventually(in_band("y", lower=1.0)), until=2.0)
     >>> made = FirstOrder(
     ...     t=np.arange(3.0), signals={"y": np.array([0.9, 0.8, 0.2])},
     ...     derivatives={"y": np.eye(3)}, requirements=(high,),
     ... )
-    >>> place, margin = lowest(made, np.array([0.9, 0.8, 0.2]), 0.5)
+    >>> place, margin = lowest_nearby(made, np.array([0.9, 0.8, 0.2]), 0.5)
     >>> print(place[:2].round(6), round(margin, 6))
     [0.4 0.3] -0.6
     """
@@ -73,7 +73,7 @@ FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
 """Takes a row; for a loop ``functools.partial(first_order, prepared)``."""
 
 
-def lowest(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
+def lowest_nearby(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
     """Return where the first order makes the least margin lowest, and that margin.
 
     No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite

@@ -88,7 +88,7 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     >>> study.space["actuator.b_r"].uniform, study.spec["tracks"].formula
     ((0.3, 0.7), 'always from 10 s on |e| <= 0.15')
     >>> study.solver.rtol  # the default
-    1e-06
+    1e-08
     """
     return model_of(own or {}).model_validate(read_toml(text))
 

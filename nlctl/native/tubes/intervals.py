@@ -8,24 +8,24 @@ from __future__ import annotations
 
 from ..machine.machine_code import kept
 
-PART, TINY = 2.0**-51, 2.0**-1070
-INNER = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
+_PART, _TINY = 2.0**-51, 2.0**-1070
+AS_NUMPY = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def down(v):
     """Return a lower bound of what was rounded to v."""
-    return v - (abs(v) * PART + TINY)
+    return v - (abs(v) * _PART + _TINY)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def up(v):
     """Return an upper bound of what was rounded to v."""
-    return v + (abs(v) * PART + TINY)
+    return v + (abs(v) * _PART + _TINY)
 
 
-@kept(**INNER)
-def product(a, b, c, d):
+@kept(**AS_NUMPY)
+def interval_product(a, b, c, d):
     """Return the ends of [a, b] [c, d]."""
     p, q, r, s = a * c, a * d, b * c, b * d
     below, under = p if p < q else q, r if r < s else s  # as processors have it: no calls
@@ -35,14 +35,14 @@ def product(a, b, c, d):
     return down(low) + known, up(high) + known
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def add_product(s, a, b, c, d):
     """Add [a, b] [c, d] to the interval s, of shape (2,)."""
-    low, high = product(a, b, c, d)
+    low, high = interval_product(a, b, c, d)
     s[0], s[1] = down(s[0] + low), up(s[1] + high)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def power_of_time(h, k, s):
     """Write [0, h]^k for k > 0 to s, and return bounds of h^k."""
     low = high = h
@@ -52,7 +52,7 @@ def power_of_time(h, k, s):
     return low, high
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def matrix_product(x, y, z):
     """Write the product of matrices of intervals, each of shape (n, m, 2), to z."""
     for i in range(x.shape[0]):
@@ -62,7 +62,7 @@ def matrix_product(x, y, z):
                 add_product(z[i, j], x[i, k, 0], x[i, k, 1], y[k, j, 0], y[k, j, 1])
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def add_image(x, y, z):
     """Add the product of a matrix (n, m, 2) and a vector (m, 2) to z."""
     for i in range(x.shape[0]):

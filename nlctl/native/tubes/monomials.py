@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Monomials:
+class MonomialTable:
     """The monomials of degree 1 to some degree.
 
     Attributes
@@ -37,7 +37,7 @@ class Monomials:
 
 
 @functools.lru_cache(maxsize=16)
-def monomials(variables: int, degree: int) -> Monomials:
+def monomials(variables: int, degree: int) -> MonomialTable:
     """Return all monomials of so many variables."""
     powers = [
         tuple(chosen.count(v) for v in range(variables))
@@ -50,7 +50,7 @@ def monomials(variables: int, degree: int) -> Monomials:
         for (p, i), (q, j) in itertools.product(numbers.items(), repeat=2)
         if sum(p) + sum(q) <= degree
     )
-    return Monomials(
+    return MonomialTable(
         degrees=np.array([sum(p) for p in powers], dtype=np.int64),
         even=np.array([all(a % 2 == 0 for a in p) for p in powers]),
         products=np.array([*sums], dtype=np.int64).reshape(-1, 3),

@@ -17,14 +17,14 @@ import math
 import numpy as np
 
 from ..machine.machine_code import kept
-from .intervals import INNER, add_image, add_product, down, matrix_product, up
+from .intervals import AS_NUMPY, add_image, add_product, down, matrix_product, up
 
 _ROUNDED = 1e-13  # of all terms of a sum of less than 800
 _UP = 1.0 + 1e-12  # what sums of sizes may be rounded by
 
 
-@kept(**INNER)
-def hull(c, P, even, B, r, box):
+@kept(**AS_NUMPY)
+def box_of_set(c, P, even, B, r, box):
     """Write the box around a set."""
     box[:] = c
     for i in range(P.shape[0]):
@@ -36,7 +36,7 @@ def hull(c, P, even, B, r, box):
     add_image(B, r, box)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def sizes(P, degrees, by_degree, whole):
     """Write the sums of the coefficients' sizes, of each degree and of all."""
     by_degree[:] = 0.0
@@ -46,7 +46,7 @@ def sizes(P, degrees, by_degree, whole):
         whole[i] = by_degree[i].sum() * _UP
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def next_polynomials(J, H, P, table, error):
     """Carry polynomials on, in place, and add what that leaves out to errors.
 
@@ -67,7 +67,7 @@ def next_polynomials(J, H, P, table, error):
     square = np.empty(P.shape[1])
     for i in range(n):
         for j in range(i + 1):
-            beyond = multiply(P[i], P[j], products, by_degree[i], by_degree[j], square)
+            beyond = polynomial_product(P[i], P[j], products, by_degree[i], by_degree[j], square)
             all_of_it, part = whole[i] * whole[j], 0.5 if i == j else 1.0
             for k in range(n):
                 middle = part * (0.5 * H[k, i, j, 0] + 0.5 * H[k, i, j, 1])
@@ -82,8 +82,8 @@ def next_polynomials(J, H, P, table, error):
         error[k, 0], error[k, 1] = down(error[k, 0] - around), up(error[k, 1] + around)
 
 
-@kept(**INNER)
-def multiply(p, q, products, p_sizes, q_sizes, found):
+@kept(**AS_NUMPY)
+def polynomial_product(p, q, products, p_sizes, q_sizes, found):
     """Multiply polynomials, and return how large the product is beyond their degree at most."""
     found[:] = 0.0
     for f in range(products.shape[0]):
@@ -95,7 +95,7 @@ def multiply(p, q, products, p_sizes, q_sizes, found):
     return beyond * _UP
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def slopes_within(J, H, box, middle, K):
     """Write J + H d for all d between the middle and a box.
 
@@ -110,7 +110,7 @@ def slopes_within(J, H, box, middle, K):
                 add_product(K[k, i], H[k, i, j, 0], H[k, i, j, 1], first, last)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def next_errors(K, error, at, c, B, r):
     """Carry errors on, in place: those of `r`, with `error` added; `c` becomes what is around `at`.
 
@@ -139,7 +139,7 @@ def next_errors(K, error, at, c, B, r):
     add_left_out(B, transposed, whole, c)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def add_left_out(B, transposed, x, c):
     """Add x - B B^T x, which is 0 but for rounding, to c."""
     n = x.shape[0]
@@ -152,7 +152,7 @@ def add_left_out(B, transposed, x, c):
     add_image(found, x, c)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def renewed(c, P, even, B, r, most):
     """Begin with new numbers s where errors have become larger than a part of the polynomials.
 
@@ -175,8 +175,8 @@ def renewed(c, P, even, B, r, most):
     transposed = np.ascontiguousarray(Q.transpose(1, 0, 2))
     matrix_product(transposed, B, turned)
     box, whole = np.zeros((n, 2)), np.empty((n, 2))
-    hull(np.zeros((n, 2)), P, even, B, r, whole)
-    hull(box, np.ascontiguousarray(transposed[:, :, 0]) @ P, even, turned, r, box)
+    box_of_set(np.zeros((n, 2)), P, even, B, r, whole)
+    box_of_set(box, np.ascontiguousarray(transposed[:, :, 0]) @ P, even, turned, r, box)
     for i in range(n):
         rounded = 0.0
         for k in range(n):
@@ -200,7 +200,7 @@ def renewed(c, P, even, B, r, most):
     return True
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def orthogonal(columns, B):
     """Write orthogonal directions of columns, a matrix (n, m), those that matter most first."""
     n = columns.shape[0]
@@ -236,7 +236,7 @@ def orthogonal(columns, B):
                 rest[i, j] -= part * B[i, place, 0]
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def _without(v, B, count):
     """Take away what a vector has of the first columns, and return its length."""
     for _ in range(2):

@@ -15,17 +15,17 @@ import numpy as np
 from ..enclosures.address import call_enclosure
 from ..machine.machine_code import kept
 from .intervals import (
-    INNER,
+    AS_NUMPY,
     down,
+    interval_product,
     power_of_time,
-    product,
     up,
 )
 
 _TRIES = 2  # of what the rest may be, for one step size
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def coefficients(code, places, folds, box, orders, k, read, first):
     """Enclose the coefficients up to an order on a box in every lane.
 
@@ -45,7 +45,7 @@ def coefficients(code, places, folds, box, orders, k, read, first):
         call_enclosure(code[1], read, k[order])
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def _sum_products(folds, order, k, read):
     """Add up what an order needs of those before."""
     for f in range(folds.shape[0]):
@@ -56,11 +56,11 @@ def _sum_products(folds, order, k, read):
             a, b = k[j, left, 0], k[j, left, 1]
             c, d = k[order - j, right, 0], k[order - j, right, 1]
             for lane in range(least.size):
-                low, high = product(a[lane], b[lane], c[lane], d[lane])
+                low, high = interval_product(a[lane], b[lane], c[lane], d[lane])
                 least[lane], most[lane] = down(least[lane] + low), up(most[lane] + high)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def fill_lanes(box, middle, lanes):
     """Give each pair of directions a lane with the box, and each direction one with the middle.
 
@@ -84,8 +84,8 @@ def fill_lanes(box, middle, lanes):
         lanes[(pairs + i) // width, n + i, :, (pairs + i) % width] = 1.0
 
 
-@kept(**INNER)
-def derivatives(lanes, at, J, H):
+@kept(**AS_NUMPY)
+def flow_derivatives(lanes, at, J, H):
     """Read where the middle comes to, and both derivatives.
 
     Shapes: `at` (n, 2), `J` (n, n, 2), `H` (n, n, n, 2).
@@ -105,7 +105,7 @@ def derivatives(lanes, at, J, H):
             J[k, i] = lanes[(lane + i) // width, n + k, :, (lane + i) % width]
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def add_up(k, orders, time, rest, found):
     """Write the polynomial at a time, an interval of shape (2,), with a rest of one more order.
 
@@ -115,13 +115,13 @@ def add_up(k, orders, time, rest, found):
         for lane in range(found.shape[2]):
             low, high = rest[i, 0, lane], rest[i, 1, lane]
             for order in range(orders, -1, -1):
-                low, high = product(low, high, time[0], time[1])
+                low, high = interval_product(low, high, time[0], time[1])
                 low = down(low + k[order, i, 0, lane])
                 high = up(high + k[order, i, 1, lane])
             found[i, 0, lane], found[i, 1, lane] = low, high
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, first):
     """Find the rest of a step of size h; return whether there is one.
 
@@ -153,7 +153,7 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
     return True
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def _widen(lanes, pad):
     for i in range(lanes.shape[0]):
         for lane in range(lanes.shape[2]):
@@ -161,13 +161,13 @@ def _widen(lanes, pad):
             lanes[i, 1, lane] = up(lanes[i, 1, lane] + pad[i, 1, lane])
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def _held(coefficient, power, pad):
     """Whether the rest lies where it was looked for; otherwise make that wider."""
     holds = True
     for i in range(pad.shape[0]):
         for lane in range(pad.shape[2]):
-            low, high = product(
+            low, high = interval_product(
                 coefficient[i, 0, lane], coefficient[i, 1, lane], power[0], power[1]
             )
             if not (pad[i, 0, lane] <= low and high <= pad[i, 1, lane]):

@@ -9,14 +9,14 @@ import numpy as np
 
 from ..enclosures.writer import LANES
 from ..machine.machine_code import kept
-from .intervals import INNER, add_image, add_product, down, power_of_time, product, up
+from .intervals import AS_NUMPY, add_image, add_product, down, interval_product, power_of_time, up
 from .monomials import monomials
 from .series import SeriesCode
-from .sets import hull, next_errors, next_polynomials, renewed, slopes_within
-from .steps import add_up, coefficients, derivatives, fill_lanes, rest_of_step
+from .sets import box_of_set, next_errors, next_polynomials, renewed, slopes_within
+from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_step
 
-REACHED, LEFT, OUTSIDE, STUCK = range(4)
-ORDER, DEGREE, TOLERANCE = 6, 4, 1e-8
+REACHED, LEAVES, MUST_LEAVE, STUCK = range(4)
+FIRST_ORDER, SET_DEGREE, TOLERANCE = 6, 4, 1e-8
 _BEYOND = 1.0 + 1e-9  # a last step leads so far, relative to it
 _HALVINGS = 12  # of a step in which no solution is found
 _NEW = 0.5  # of the polynomials, beyond which errors become numbers of their own
@@ -30,7 +30,7 @@ class Tube:
     Attributes
     ----------
     status : int
-        `REACHED` the end; `LEFT`: not known to stay within the limits; `OUTSIDE`: all are outside
+        `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are outside
         of them at one time; `STUCK`: no step is found.
     time : float
         Up to which it is known.
@@ -59,8 +59,8 @@ def tube_from(
     limits: np.ndarray,
     *,
     cells: int,
-    order: int = ORDER,
-    degree: int = DEGREE,
+    order: int = FIRST_ORDER,
+    degree: int = SET_DEGREE,
     tolerance: float = TOLERANCE,
 ) -> Tube:
     """Enclose all solutions from a box of shape (n, 2) over a time; see `Tube`."""
@@ -89,7 +89,7 @@ def integrated(
     c, P, B, r = first_set(box, table[0].size)
     middle, over, begin = np.empty(n), np.empty((n, 2)), np.empty((n, 2))
     early, late, h, steps, status, first_numbers = 0.0, 0.0, duration, 0, REACHED, True
-    hull(c, P, table[1], B, r, end)
+    box_of_set(c, P, table[1], B, r, end)
     while early < duration:
         for i in range(n):
             middle[i] = 0.5 * c[i, 0] + 0.5 * c[i, 1]
@@ -110,9 +110,9 @@ def integrated(
             matter(P, table, box, weight)
         first_numbers = not renewed(c, P, table[1], B, r, _NEW) and first_numbers
         begin[:] = end
-        hull(c, P, table[1], B, r, end)
-        between(ky[0], h, begin, end, over)
-        enter(over, early / duration, up(late + h) / duration, low, high)
+        box_of_set(c, P, table[1], B, r, end)
+        range_over_step(ky[0], h, begin, end, over)
+        write_limits(over, early / duration, up(late + h) / duration, low, high)
         steps, early, late = steps + 1, down(early + h), up(late + h)
         if early >= duration:
             back_to(end, ky[0, 1], up(late - duration))
@@ -122,7 +122,7 @@ def integrated(
     return status, early, steps
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, pad, read, first):
     """Return the size of a step for which there is a rest, at most `most`; 0 for none."""
     groups, n, lanes = boxes.shape[0], boxes.shape[1] // 4, boxes.shape[3]
@@ -139,7 +139,7 @@ def step_found(code, places, folds, order, tol, most, left, k, ky, boxes, rest, 
     return 0.0
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def first_set(box, count):
     """Return the set {c + P(s) + B r} that is a box, of so many monomials."""
     n = box.shape[0]
@@ -153,13 +153,13 @@ def first_set(box, count):
     return c, P, B, r
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def carry_on(lanes, table, box, middle, c, P, B, r):
     """Carry a set on by a step, in place."""
     n = middle.size
     at, J, H = np.empty((n, 2)), np.empty((n, n, 2)), np.empty((n, n, n, 2))
     K, error, point = np.empty_like(J), np.empty((n, 2)), np.empty(n)
-    derivatives(lanes, at, J, H)
+    flow_derivatives(lanes, at, J, H)
     slopes_within(J, H, box, middle, K)
     for i in range(n):
         point[i] = 0.5 * at[i, 0] + 0.5 * at[i, 1]
@@ -170,7 +170,7 @@ def carry_on(lanes, table, box, middle, c, P, B, r):
     next_errors(K, error, point, c, B, r)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def step_size(k, order, lane, n, tol):
     """Return the step at which the last coefficients of the middle count for a tolerance."""
     scale, last, before = 0.0, 0.0, 0.0
@@ -184,20 +184,22 @@ def step_size(k, order, lane, n, tol):
     return min(one, other)
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def span(k, ky, order, h, boxes, over):
     """Write where the states are during a step: in the first lane, which has the whole set."""
     power = np.empty(2)
     power_of_time(h, order + 1, power)
     add_up(k, order, np.array([0.0, h]), np.zeros_like(boxes), boxes)
     for i in range(over.shape[0]):
-        low, high = product(ky[order + 1, i, 0, 0], ky[order + 1, i, 1, 0], power[0], power[1])
+        low, high = interval_product(
+            ky[order + 1, i, 0, 0], ky[order + 1, i, 1, 0], power[0], power[1]
+        )
         over[i, 0] = down(boxes[i, 0, 0] + low)
         over[i, 1] = up(boxes[i, 1, 0] + high)
 
 
-@kept(**INNER)
-def between(ky, h, begin, end, over):
+@kept(**AS_NUMPY)
+def range_over_step(ky, h, begin, end, over):
     """Narrow where the states are during a step, by where they are before and after it.
 
     A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second coefficient.
@@ -209,8 +211,8 @@ def between(ky, h, begin, end, over):
         over[i, 1] = min(over[i, 1], up(max(begin[i, 1], end[i, 1]) + above))
 
 
-@kept(**INNER)
-def enter(over, begin, end, low, high):
+@kept(**AS_NUMPY)
+def write_limits(over, begin, end, low, high):
     """Enter a box into the parts of the time that a step has to do with."""
     cells = low.shape[0]
     first = max(0, math.floor(begin * cells - 1e-9))
@@ -221,29 +223,29 @@ def enter(over, begin, end, low, high):
             high[cell, i] = max(high[cell, i], over[i, 1])
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def judged(over, end, limits):
     """Say what is known of the limits, from a step and from where it ends."""
     status = REACHED
     for i in range(limits.shape[0]):
         if not (limits[i, 0] <= over[i, 0] and over[i, 1] <= limits[i, 1]):
-            status = LEFT
+            status = LEAVES
         if not (-math.inf < end[i, 0] and end[i, 1] < math.inf):
             return STUCK
     for i in range(limits.shape[0]):
         if end[i, 0] > limits[i, 1] or end[i, 1] < limits[i, 0]:
-            return OUTSIDE
+            return MUST_LEAVE
     return status
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def back_to(end, rates, beyond):
     """Take back what the last step may have gone beyond the end."""
     for i in range(end.shape[0]):
         add_product(end[i], -beyond, 0.0, rates[i, 0, 0], rates[i, 1, 0])
 
 
-@kept(**INNER)
+@kept(**AS_NUMPY)
 def matter(P, table, box, weight):
     """Write how much each side of the first box has to do with what is not linear in it."""
     for j in range(weight.size):

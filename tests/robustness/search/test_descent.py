@@ -25,7 +25,7 @@ from nlctl.analysis.robustness import (
     worst_case,
 )
 from nlctl.analysis.robustness.search.descent import test_signals as signals_to_try
-from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest
+from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
 
 T = np.arange(12.0)
 A, B = in_band("a", upper=1.0), in_band("b", lower=-1.0, upper=2.0, scale=1.5)
@@ -60,7 +60,7 @@ def margin_at(made, change):
 def test_what_is_said_is_the_margin_there_and_no_random_place_of_the_box_is_far_lower(seed, number):
     rng = np.random.default_rng(seed)
     made, place = model(rng, FORMULAS[number]), np.full(3, 0.5)
-    found, said = lowest(made, place, 0.5)
+    found, said = lowest_nearby(made, place, 0.5)
     assert np.all((found >= -1e-12) & (found <= 1 + 1e-12))
     assert said == pytest.approx(sampled(made, found - place), abs=1e-9)
     assert said <= sampled(made, np.zeros(3)) + 1e-9
@@ -93,7 +93,7 @@ def test_where_only_largest_values_count_it_is_the_lowest_of_all(seed):
     """Eventually of a half-line is convex in the signals: a linear program has its least."""
     rng = np.random.default_rng(seed)
     made = model(rng, eventually(in_band("a", lower=0.0, scale=1.0)))
-    _, said = lowest(made, np.full(3, 0.5), 0.5)
+    _, said = lowest_nearby(made, np.full(3, 0.5), 0.5)
     others = [sampled(made, rng.uniform(-0.5, 0.5, 3)) for _ in range(200)]
     assert said <= min(others) + 1e-9
 
