@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..uncertainty.space import Space, from_unit_cube
-from .candidates import GENERATION, Found, evolve, in_batches, some_corners, uniform
+from .candidates import GENERATION, Found, evolve, in_batches, some_corners, uniform, unit_places
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 __all__ = ["search_with_derivatives", "test_signals"]

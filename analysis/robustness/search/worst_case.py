@@ -138,7 +138,7 @@ def worst_case(
     at an end, all step halfway), a descent from the worst of them, and then in turn corners,
     uniform draws, a descent from the worst of these, and CMA-ES.  A descent moves all signals of a
     row along their derivatives, and goes where their margin would be lowest, by linear programs in
-    a box that shrinks (`first_order.lowest`).  A run with derivatives counts as one run.
+    a box that shrinks (`first_order.lowest_nearby`).  A run with derivatives counts as one run.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ class Tube:
     Attributes
     ----------
     status : int
-        `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are outside
-        of them at one time; `STUCK`: no step is found.
+        `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are
+        outside of them at one time; `STUCK`: no step is found.
     time : float
         Up to which it is known.
     low, high : ndarray of shape (cells, n)
