@@ -190,10 +190,14 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
             t, u = end * k / (_POINTS - 1), spread[start.size :]
             try:
                 rate, output = values_now(own, (t, x, u))
-                outputs += (1 + k % 3) * output
-                rates += (1 + k % 3) * rate
             except Exception as error:  # whatever a function of the user's raises
                 raised.append(f"{type(error).__name__} at point {k}")
+                continue
+            if not np.isfinite([*rate, *output]).all():  # one point would hide all others
+                raised.append(f"no finite values at point {k}")
+                continue
+            outputs += (1 + k % 3) * output
+            rates += (1 + k % 3) * rate
     names = [*(f"{name}'" for name in state_names(system)), *system.output_labels]
     values = dict(zip(names, [*rates.tolist(), *outputs.tolist()], strict=True))
     return _steady(system, values) | ({"raises": ", ".join(raised)} if raised else {})

@@ -56,6 +56,7 @@ _FIELDS = [
     ("misses", "i8"),  # such steps in a row that have not led across
     ("left_zero", "i8"),  # whether the step before led away from a condition that was exactly 0
     ("right_high", "i8"),  # whether the error of the step `high` is small
+    ("low_error", "f8"),  # that of the step `low`
     ("low_before", "f8"),  # the step without it that was tried before `low`
     ("whole", "f8"),  # the step in which the condition that is being located was found
     ("fell_at", "f8"),  # time of the last reset

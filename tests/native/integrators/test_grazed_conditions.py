@@ -47,3 +47,20 @@ def test_a_slow_drift_over_a_level(method, s):
         rtol=1e-9, atol=1e-11,
     ).states[1, -1]  # fmt: skip
     assert z == pytest.approx(1.0, abs=1e-8 + 4e-15 / s)
+
+
+def closing(t, x, u, params):
+    """Falls to 600 at about 88 a second, and stays there."""
+    return [np.where(x[0] <= 600, 0.0, -88.0 + 0.01 * (x[0] - 600) + np.sin(3 * t))]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
+def test_a_state_that_stops_where_its_rate_ends(method, rtol):
+    """No stage of a step that ends before the level has seen the rate behind it."""
+    diagram = compiled(closing, 1)
+    for start in np.linspace(700.0, 1500.0, 25):
+        x = nlctl.input_output_response(
+            diagram, [0, 20], 0, [start], method=method, rtol=rtol, atol=1e-2 * rtol, audit=False
+        ).states[0, -1]
+        assert x == pytest.approx(600.0, abs=600.0 * rtol)

@@ -24,6 +24,7 @@ _CLOSEST = 8e-16  # of the time: no condition can be told closer than that
 _ROUNDING = 1e-14  # of what is integrated, in the error of a step
 _WIDER = 4.0  # each time that a step across has not led across
 _TRIES = 60
+_GROWS = 100.0  # an error that is small by chance
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
 _NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
@@ -72,11 +73,15 @@ def crossed_before(task, lane, w, j):
 def _has_seen_a_jump(task, lane, w, j):
     """Whether a step is wrong: one of its stages has looked behind, whatever is said of its end.
 
-    On the near side the error of a shorter step is smaller at least by the cube of its part.
+    On the near side the error of a shorter step is smaller at least by the cube of its part, and
+    that of a longer one larger by no more than the sixth power.
     """
     most = 1.0
     if lane.traces > 0 and not task.taylor.highest:
         most = min(1.0, 10.0 * (lane.step / lane.whole) ** 3 + _ROUNDING / task.rtol)
+        if lane.low > 0.0:
+            longer = _GROWS * lane.low_error * (lane.step / lane.low) ** 6
+            most = min(most, longer + _ROUNDING / task.rtol)
     return not w.error[j] <= most
 
 
@@ -217,7 +222,7 @@ def _bracket(task, lane, w, bad, j):
         lane.high, lane.right_high = lane.step, 1 if w.error[j] <= 1.0 else 0
         lane.same_side = max(lane.same_side, 0) + 1
     else:
-        lane.low_before, lane.low = lane.low, lane.step
+        lane.low_before, lane.low, lane.low_error = lane.low, lane.step, w.error[j]
         lane.same_side = min(lane.same_side, 0) - 1
     weight = 0.5 if lane.right_high and abs(lane.same_side) > 1 else 1.0  # Illinois
     for i in range(task.rows.declared, task.rows.switching):
