@@ -28,7 +28,6 @@ COMPETITORS = {
     "boost": "boost_odeint",
     "tuned": "tuned_cpp",
 }
-TARGET = 1e-6  # largest error in the plant's states
 SAME = 1e-9 / 27  # of right-hand sides, a node: a few roundings, amplified by exp(zeta^2)
 PATIENCE = 1.5  # s: what takes longer is timed once
 
@@ -107,7 +106,7 @@ def _timed(function: Callable, *arguments, threads: int = 1) -> tuple[float, np.
 
 
 def _tolerance(problem: Problem, solver: Solver) -> tuple[float, Accuracy, float]:
-    """Return the loosest tolerance from which on the error is at most TARGET, the error, and s.
+    """Return the loosest tolerance from which on the error is at most the target, the error, and s.
 
     One good result may be luck, so the next tolerance must confirm it.  If none does, the most
     accurate one is returned.
@@ -117,7 +116,7 @@ def _tolerance(problem: Problem, solver: Solver) -> tuple[float, Accuracy, float
         solver.prepare(rtol)
         seconds, states = _timed(solver.run, rtol)
         tried.append((rtol, accuracy(problem, states, problem.answers), seconds))
-        if len(tried) > 1 and all(t[1].plant <= TARGET for t in tried[-2:]):
+        if len(tried) > 1 and all(t[1].plant <= problem.target for t in tried[-2:]):
             return tried[-2]
     return min(tried, key=lambda t: np.nan_to_num(t[1].plant, nan=np.inf))
 
@@ -135,7 +134,7 @@ def ensembles(
     rows = []
     for solver, single in zip(solvers, singles, strict=True):
         members = int(np.clip(PATIENCE / single.seconds, 16, limit))
-        if solver.ensemble is None or not single.accuracy.plant <= TARGET:
+        if solver.ensemble is None or not single.accuracy.plant <= problem.target:
             rows.append(single)
             continue
         solver.ensemble(single.rtol, problem.spread(members), 1)  # JAX compiles for a shape

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from competitors.problem import Problem
-from measure import TARGET, Row
+from measure import Row
 from rich.table import Table
 
 PACKAGES = ("nlctl", "control", "numpy", "scipy", "numba", "heyoka", "numbalsoda", "diffrax", "jax")
@@ -54,8 +54,10 @@ def comparison(problem: Problem, title: str, rows: Sequence[Row]) -> Table:
     for heading in (*sizes, "rtol", "ms", "x python-control", "of tuned C++", *errors, *truth):
         table.add_column(heading, justify="right")
     slow, fast = _seconds(rows, "python-control"), _seconds(rows, "C++ tuned")
-    for row in sorted(rows, key=lambda row: (row.threads, _reached(row), -row.seconds)):
-        reached, counts = row.accuracy, _reached(row)
+    for row in sorted(
+        rows, key=lambda row: (row.threads, _reached(row, problem.target), -row.seconds)
+    ):
+        reached, counts = row.accuracy, _reached(row, problem.target)
         table.add_row(
             row.name,
             *((str(row.members), str(row.threads)) if ensemble else ()),
@@ -72,9 +74,9 @@ def comparison(problem: Problem, title: str, rows: Sequence[Row]) -> Table:
     return table
 
 
-def _reached(row: Row) -> bool:
+def _reached(row: Row, target: float) -> bool:
     """Whether a row is as accurate as asked for; members differ, which the factor allows for."""
-    return row.accuracy.plant <= 2 * TARGET  # false for NaN
+    return row.accuracy.plant <= 2 * target  # false for NaN
 
 
 def _seconds(rows: Sequence[Row], start: str) -> float | None:

@@ -34,10 +34,13 @@ class Problem:
         Of the network: 27, in Example 1 also 125 or 1000.
     times, coarse : ndarray
         Times (s) at which a run, and each member of an ensemble, is sampled.
+    target : float
+        Largest error in the plant's states that a solver may have.
     """
 
     example: int
     nodes: int = 27
+    target: float = 1e-6
     times = np.linspace(0, 20, 201)
     coarse = np.linspace(0, 20, 21)
 

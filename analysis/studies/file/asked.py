@@ -14,27 +14,26 @@ __all__ = ["Asked", "Varied"]
 class Asked(Strict):
     """What a study file says of every analysis; the schema of a kind adds its own keys.
 
-        Examples
-        --------
-        The keys of a table of one's own, checked as those of nlctl's kinds are:
+    Examples
+    --------
+    The keys of a table of one's own, checked as those of nlctl's kinds are:
 
-        >>> from typing import Any, ClassVar
-
-    from pydantic import Field
-        >>> from nlctl.analysis.studies import Asked
-        >>> class Spread(Asked):
-        ...     of: str = Field("spec", description="Column of the main table.")
-        ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
-        ...     @property
-        ...     def claim(self):
-        ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
-        >>> Spread(kind="spread", limit=0.5).claim
-        'the spread is at most 0.5'
-        >>> Spread(kind="spread", limit=-1.0)
-        Traceback (most recent call last):
-        pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
-        limit
-          Input should be greater than 0 ...
+    >>> from typing import Any, ClassVar
+    >>> from pydantic import Field
+    >>> from nlctl.analysis.studies import Asked
+    >>> class Spread(Asked):
+    ...     of: str = Field("spec", description="Column of the main table.")
+    ...     limit: float | None = Field(None, gt=0, description="Claim: it is at most this.")
+    ...     @property
+    ...     def claim(self):
+    ...         return "" if self.limit is None else f"the spread is at most {self.limit:g}"
+    >>> Spread(kind="spread", limit=0.5).claim
+    'the spread is at most 0.5'
+    >>> Spread(kind="spread", limit=-1.0)
+    Traceback (most recent call last):
+    pydantic_core._pydantic_core.ValidationError: 1 validation error for Spread
+    limit
+      Input should be greater than 0 ...
     """
 
     key: str = Field(
