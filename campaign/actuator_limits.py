@@ -21,13 +21,13 @@ from matplotlib.figure import Figure
 from page_tables import markdown_table
 
 from nlctl import actuators, native, paper
-from nlctl.analysis.figures.axes import GREY, STYLES, legend_above, set_style
 from nlctl.analysis.lyapunov.bounds.decomposition import DecompositionError, decompose
 from nlctl.analysis.paper.cases import HORIZON, TAIL
 from nlctl.analysis.paper.rivals import rival_controller, rival_controllers
 from nlctl.analysis.paper.sampling_limits import BAND, meets_the_spec
 from nlctl.analysis.report.svg import svg_files
 from nlctl.native import Status
+from nlctl.plotting.axes import GREY, STYLES, legend_above, set_style
 from nlctl.response import input_output_response
 
 ACTUATOR_RECORD = Path(__file__).with_name("actuator-limits.csv")

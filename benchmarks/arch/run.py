@@ -17,9 +17,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from published import FALCAUN, ROWS, Row
 from rich.console import Console
 from rich.table import Table
-from rows import FALCAUN, ROWS, Row
 
 from nlctl.analysis.robustness import (
     Experiment,

@@ -11,7 +11,7 @@ import at
 import cc
 import inputs
 import nn
-import rows
+import published
 import sc
 
-__all__ = ["afc", "at", "cc", "inputs", "nn", "rows", "sc"]
+__all__ = ["afc", "at", "cc", "inputs", "nn", "published", "sc"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from arch_plants import afc, at, cc, inputs, nn, rows, sc
+from arch_plants import afc, at, cc, inputs, nn, published, sc
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -22,7 +22,7 @@ def moved(row, rng):
 @pytest.mark.parametrize("key", ["AT1", "AFC29", "NN.03", "CC1", "SC"])
 def test_machine_code_is_python_controls_at_points_of_a_run(key):
     """Every block is read as expressions, and the audit compares with its equations."""
-    row = next(row for row in rows.ROWS if row.key == key)
+    row = next(row for row in published.ROWS if row.key == key)
     compiled = nlctl.compile(row.build())
     assert "called as" not in str(compiled)
     params = moved(row, np.random.default_rng(2))
@@ -36,7 +36,7 @@ def test_machine_code_is_python_controls_at_points_of_a_run(key):
 
 @pytest.mark.parametrize("key", ["NN.03", "SC"])
 def test_a_run_is_the_reference_engines(key):
-    row = next(row for row in rows.ROWS if row.key == key)
+    row = next(row for row in published.ROWS if row.key == key)
     system, t = row.build(), np.linspace(0, 1.5, 16)
     params = moved(row, np.random.default_rng(3))
     ours, theirs = (
