@@ -8,7 +8,7 @@ They are the numbers of `nlctl.analysis.paper.controllers.baselines`.
 from __future__ import annotations
 
 import numpy as np
-from tuning import EvolvedGains, evolved_gains
+from tuning import TOLERANCES, EvolvedGains, evolved_gains
 
 from nlctl import paper
 from nlctl.analysis.metrics import tracking_metrics
@@ -31,7 +31,9 @@ def tuned_baselines(
     cost, limited = by_key["iae"], by_key["peak_u"]
     published = compiled_loop(build(sensor=sensor(example)))
     own = {"law.beta": np.array([part_of(published_controller(example), "law").spec.beta])}
-    row = ensemble_response(published, times, params=own, metrics=(limited,)).table.iloc[0]
+    row = ensemble_response(
+        published, times, params=own, metrics=(limited,), **TOLERANCES
+    ).table.iloc[0]
     limit = float(row[limited.key])
     bounds = {
         "PID": {f"controller.{k}": (0.01, 1000.0) for k in ("k_p", "k_i", "k_d")}

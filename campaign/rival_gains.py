@@ -8,7 +8,7 @@ They are `nlctl.analysis.paper.rivals.RIVAL_GAINS`.
 from __future__ import annotations
 
 import numpy as np
-from tuning import EvolvedGains, evolved_gains, split_samples
+from tuning import TOLERANCES, EvolvedGains, evolved_gains, split_samples
 
 from nlctl import paper
 from nlctl.analysis.metrics import tracking_metrics
@@ -66,7 +66,9 @@ def tuned_rivals(
     actuator = rival_actuators(example)[TRAINED_BEHIND[example]]
     start, params = split_samples(samples)
     printed = compiled_loop(example_with(example, published_controller(example), actuator))
-    table = ensemble_response(printed, times, 0.0, start, params=params, metrics=(limited,)).table
+    table = ensemble_response(
+        printed, times, 0.0, start, params=params, metrics=(limited,), **TOLERANCES
+    ).table
     found = {}
     for label, bounds in search_bounds(example).items():
         middle = {key: float(np.sqrt(low * high)) for key, (low, high) in bounds.items()}

@@ -16,6 +16,7 @@ from nlctl.errors import ParameterError
 from nlctl.native import Compiled, ensemble_response
 
 _REFUSED = 1e6  # cost of gains that break the limit, beyond every cost that a run can have
+TOLERANCES = {"rtol": 1e-6, "atol": 1e-8}  # with which the recorded gains were found
 LOST = 1e3  # what counts as the excess of a run that did not reach its end
 
 
@@ -78,7 +79,7 @@ def evolved_gains(
         table = ensemble_response(
             loop, timepts, 0.0, {key: np.tile(x0, times) for key, x0 in start.items()},
             params=gains | {key: np.tile(value, times) for key, value in params.items()},
-            metrics=(cost, limited), max_steps=max_steps,
+            metrics=(cost, limited), max_steps=max_steps, **TOLERANCES,
         ).table  # fmt: skip
         runs += len(table)
         numbers = table[[cost.key, limited.key]].to_numpy().reshape(times, size, 2)
