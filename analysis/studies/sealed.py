@@ -92,6 +92,12 @@ def file_bytes(path: Path) -> bytes:
     return path.read_bytes()
 
 
+# the last is Arrow's word for numbers that are text
+_NOT_WRITTEN = (
+    ArithmeticError, AttributeError, LookupError, TypeError, ValueError, NotImplementedError,
+)  # fmt: skip
+
+
 @contextmanager
 def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
     """Refuse content that fits together and that no run writes: of other versions, or made up."""
@@ -99,7 +105,7 @@ def as_written(what: str, remedy: str = ANEW) -> Iterator[None]:
         yield
     except UsageError:
         raise
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except _NOT_WRITTEN as error:
         reason = f"{type(error).__name__}: {error}".partition("\n")[0][:200]
         raise RunFolderError(f"{what} holds what no run writes ({reason}): {remedy}") from error
 

@@ -6,6 +6,7 @@ code, lies in a field of its own, by kinds of things; whoever makes a kind looks
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 _T = TypeVar("_T")
@@ -20,3 +21,12 @@ class Cache:
     def of(self, kind: type[_T]) -> list[_T]:
         """Return all things of a class; what is appended to the list is kept."""
         return self._kept.setdefault(kind, [])
+
+    def found(self, kind: type[_T], fits: Callable[[_T], bool], make: Callable[[], _T]) -> _T:
+        """Return the first thing of a class that fits; it is made if there is none."""
+        known = self.of(kind)
+        for each in known:
+            if fits(each):
+                return each
+        known.append(make())
+        return known[-1]

@@ -41,12 +41,11 @@ class _Labelled(NamedTuple):
 
 def row_labels(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
     """Return block and name of each row of g that is noted."""
-    known = compiled.cache.of(_Labelled)
-    for each in known:
-        if each.conditions is conditions:
-            return each.rows
-    known.append(_Labelled(conditions, _labelled(compiled, conditions)))
-    return known[-1].rows
+    return compiled.cache.found(
+        _Labelled,
+        lambda each: each.conditions is conditions,
+        lambda: _Labelled(conditions, _labelled(compiled, conditions)),
+    ).rows
 
 
 def _labelled(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:

@@ -28,18 +28,16 @@ class Laid(NamedTuple):
 
 def laid_out(reading: Reading, code: Machine) -> Laid:
     """Return what tasks with this machine code have."""
-    known = reading.cache.of(Laid)
-    for each in known:
-        if each.code is code:
-            return each
-    made = Laid(
-        code=code,
-        rows=_rows(reading.program, code, reading.schedule.watched),
-        resets=_resets(reading.program, code),
-        stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
+    return reading.cache.found(
+        Laid,
+        lambda each: each.code is code,
+        lambda: Laid(
+            code=code,
+            rows=_rows(reading.program, code, reading.schedule.watched),
+            resets=_resets(reading.program, code),
+            stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
+        ),
     )
-    known.append(made)
-    return made
 
 
 def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tuning import evolved_gains
+from tuning import TOLERANCES, evolved_gains
 
 import nlctl
 from nlctl.analysis.lyapunov import certify
@@ -245,7 +245,7 @@ class TestComparedControllers:
                 grid[n][1 + 2 * i : 3 + 2 * i] *= (0.5, 2.0)
             table = nlctl.ensemble_response(
                 nlctl.compile(loop), T, params=grid, metrics=(cost, most), max_steps=15_000,
-                rtol=1e-6, atol=1e-8,
+                **TOLERANCES,
             ).table  # fmt: skip
             assert table["peak"][0] <= 1.01 * limit
             searched = table["steps"] <= 10_000

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
-from ..stl.formula import Always, And, Band, Eventually, Formula, Not
+from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
 
 __all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
@@ -164,8 +164,7 @@ class _Picked:
 
     def _margins(self, formula: Any) -> np.ndarray:
         if isinstance(formula, Band):
-            y = self.y[formula.signal]
-            return np.minimum(formula.upper - y, y - formula.lower) / formula.scale
+            return np.minimum(*within_bounds(formula, self.y[formula.signal]))
         if isinstance(formula, Not):
             return -self.margins(formula.part)
         if isinstance(formula, And):
@@ -226,8 +225,7 @@ class _Picked:
 
     def _band(self, band: Band, k: np.ndarray, *, every: bool) -> _Atoms:
         """Return the distances to the ends of a band: to both, or to the nearer one."""
-        y = self.y[band.signal][k]
-        above, below = (band.upper - y) / band.scale, (y - band.lower) / band.scale
+        above, below = within_bounds(band, self.y[band.signal][k])
         nearer = above <= below
         sides = [(above, -1.0, np.isfinite(band.upper) & (nearer | every)),
                  (below, 1.0, np.isfinite(band.lower) & (~nearer | every))]  # fmt: skip

@@ -384,10 +384,15 @@ def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple
     return t, signals.samples[band.signal][near], breaks
 
 
+def within_bounds(band: Band, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far values lie below the upper bound and above the lower one, in scales."""
+    return (band.upper - y) / band.scale, (y - band.lower) / band.scale
+
+
 def _beyond(band: Band, y: np.ndarray) -> list[np.ndarray]:
     """Return by how much values lie above the upper bound, and below the lower one."""
-    sides = [] if np.isinf(band.upper) else [(y - band.upper) / band.scale]
-    return sides if np.isinf(band.lower) else [*sides, (band.lower - y) / band.scale]
+    sides = zip((band.upper, band.lower), within_bounds(band, y), strict=True)
+    return [-within for bound, within in sides if np.isfinite(bound)]
 
 
 def _band(band: Band, signals: SampledSignals, low: float, high: float) -> Trace:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from nlctl.errors import CompileError, ParameterError, UsageError
+from nlctl.errors import CompileError, ParameterError
 from nlctl.native import Compiled
 from nlctl.native.ensemble import MetricLike
 from nlctl.sensitivities import MetricGradient, metric_gradient, sensitivity_response
@@ -167,12 +167,7 @@ def _asked_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
 
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the tornado."""
-    n = finding.numbers
-    try:
-        table = finding.tables["effects"].astype(float)
-    except (TypeError, ValueError) as error:
-        why = f"the table 'effects' of '{finding.key}' has what is not a number: {error}"
-        raise UsageError(f"{why}; run the study again") from None
+    n, table = finding.numbers, finding.tables["effects"]
     caption = _CAPTION.format(of=n["of"], value=n["value"])
     yield Figure(
         key=f"{key}-tornado",

@@ -83,10 +83,8 @@ def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
 def changed(values: Iterable[Captured]) -> Captured | None:
     """Return the first value that is not what it was."""
     for each in values:
-        holder, then = each.holder, each.then
-        is_plain = type(holder) not in (dict, CellType)
-        now = getattr(holder, each.name, GONE) if is_plain else each.now
-        if now is not then and not same(now, then):
+        now = each.now
+        if now is not each.then and not same(now, each.then):
             return each
     return None
 

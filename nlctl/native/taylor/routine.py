@@ -66,12 +66,11 @@ class Series:
 def series(reading: Reading, p: np.ndarray, width: int) -> Series:
     """Return the coefficients of `width` members' solutions, made when they are first needed."""
     with _ONCE:
-        known = reading.cache.of(Series)
-        for made in known:
-            if made.lowered.lanes == width and made.lowered.holds_for(p):
-                return made
-        known.append(_made(reading, p, width))
-        return known[-1]
+        return reading.cache.found(
+            Series,
+            lambda each: each.lowered.lanes == width and each.lowered.holds_for(p),
+            lambda: _made(reading, p, width),
+        )
 
 
 def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
