@@ -1,22 +1,27 @@
-"""Names that users give, as labels of figures: harmless to draw, and of bounded length."""
+"""Names that users give as labels, and numbers of any size: harmless to draw."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nlctl.plotting.axes import WIDTH, set_style
 from nlctl.plotting.labels import plain
 
-__all__ = ["arms", "number_axes", "plain"]
+__all__ = ["arms", "drawable", "number_axes", "plain", "within_reach"]
+
+LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
 
 
 def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
     """Return axes with one line for each name, from the top: names may be alike once cut."""
     labels = [plain(name) for name in names]
+    if not labels:
+        raise ValueError("there are no rows to draw")
     figure = Figure(figsize=(WIDTH, 0.32 * len(labels) + 0.9), layout="constrained")
     ax = figure.subplots()
     set_style(ax)
@@ -28,3 +33,15 @@ def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
 def arms(value: np.ndarray, low: object, high: object) -> np.ndarray:
     """Return the lengths of error bars; a bootstrap interval may lie beside its estimate."""
     return np.maximum([value - np.asarray(low), np.asarray(high) - value], 0.0)
+
+
+def within_reach(values: object) -> np.ndarray:
+    """Return numbers with infinite ones just beyond the finite ones; NaN stays, and is not drawn."""
+    y = np.asarray(values, dtype=float)
+    reach = 1.15 * float(np.max(np.abs(y), initial=0.0, where=np.isfinite(y))) or 1.0
+    return np.clip(y, -min(reach, LARGEST), min(reach, LARGEST))
+
+
+def drawable(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table of numbers in one unit with all of them within reach."""
+    return pd.DataFrame(within_reach(table), index=table.index, columns=table.columns)

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
 
-from .labels import arms, number_axes
+from .labels import arms, drawable, number_axes, within_reach
 
 __all__ = ["paired_differences", "screening", "set_apart", "shares", "tornado"]
 __all__ += ["violation_rates"]
@@ -34,6 +34,7 @@ def screening(effects: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     effects = effects.sort_values("mu_star", ascending=False, kind="stable")
+    effects = drawable(effects[["mu_star", "low", "high", "sigma"]])
     figure, ax = number_axes(effects.index)
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
     at = np.arange(len(effects))
@@ -58,6 +59,7 @@ def shares(indices: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     indices = indices.sort_values("ST", ascending=False, kind="stable")
+    indices = drawable(indices[["S1", "S1_low", "S1_high", "ST", "ST_low", "ST_high"]])
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
     _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
@@ -84,11 +86,13 @@ def tornado(effects: pd.DataFrame, value: float) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     reach = effects[["low", "high"]].abs().max(axis=1).fillna(-1.0)
-    effects = effects.loc[reach.sort_values(ascending=False, kind="stable").index]
+    order = np.argsort(-reach.to_numpy(), kind="stable")
+    effects = drawable(effects[["low", "high", "run_low", "run_high"]]).iloc[order]
+    value = float(within_reach(value))
     figure, ax = number_axes(effects.index)
     figure.set_figheight(figure.get_figheight() + 0.4)
     at, ends = np.arange(len(effects)), (("low", ORANGE, "v", "///"), ("high", BLUE, "^", ""))
-    wide = 3.0 * float(np.nanmax(effects[["low", "high"]].abs().to_numpy(), initial=0.0)) or 1.0
+    wide = 3.0 * float(effects[["low", "high"]].abs().max(axis=None, skipna=True)) or 1.0
     for end, colour, marker, hatch in ends:
         name = "lower end" if end == "low" else "upper end"
         ax.barh(
@@ -122,7 +126,7 @@ def set_apart(table: pd.DataFrame) -> Figure:
     """
     table = table.sort_values("statistic", ascending=False, kind="stable")
     figure, ax = number_axes(table.index)
-    ax.barh(np.arange(len(table)), table["statistic"], 0.6, color=BLUE)
+    ax.barh(np.arange(len(table)), within_reach(table["statistic"]), 0.6, color=BLUE)
     ax.set(xlabel="distance between failing and passing runs (1)", xlim=(0.0, 1.0))
     return figure
 
@@ -142,7 +146,8 @@ def violation_rates(ranking: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(ranking.index)
-    _bar(ax, ranking, ("rate", "rate_low", "rate_high"), ORANGE, "", hatch="///")
+    shares = drawable(ranking[["rate", "rate_low", "rate_high"]])
+    _bar(ax, shares, ("rate", "rate_low", "rate_high"), ORANGE, "", hatch="///")
     ax.set(xlabel="share of runs that violate the spec", xlim=(0.0, 1.02))
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))
     return figure
@@ -167,15 +172,15 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(labels)
-    middle, low, high = (table[c].to_numpy() for c in ("median", "median_low", "median_high"))
-    finite = np.concatenate([x[np.isfinite(x)] for x in (middle, low, high)])
-    reach = 1.15 * float(np.max(np.abs(finite), initial=0.0)) or 1.0
+    exact = table["median"].to_numpy(dtype=float)
+    numbers = within_reach(table[["median", "median_low", "median_high"]])
+    reach = float(np.max(np.abs(numbers), initial=0.0, where=~np.isnan(numbers))) or 1.0
+    middle, low, high = numbers.T
     at = np.arange(len(table))
-    ax.hlines(at, np.clip(low, -reach, reach), np.clip(high, -reach, reach), color=BLUE)
-    for infinite, marker in ((middle == -np.inf, "<"), (middle == np.inf, ">")):
-        ends = np.clip(middle[infinite], -reach, reach)
-        ax.plot(ends, at[infinite], marker, color=ORANGE, markersize=7)
-    inside = np.isfinite(middle)
+    ax.hlines(at, low, high, color=BLUE)
+    for infinite, marker in ((exact == -np.inf, "<"), (exact == np.inf, ">")):
+        ax.plot(middle[infinite], at[infinite], marker, color=ORANGE, markersize=7)
+    inside = np.isfinite(exact)
     ax.plot(middle[inside], at[inside], "o", color=BLUE, markersize=5)
     ax.axvline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     ax.set_xlim(-1.05 * reach, 1.05 * reach)

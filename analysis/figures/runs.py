@@ -29,7 +29,7 @@ from nlctl.plotting.axes import (
 from nlctl.plotting.bands import LIMIT, Limit, bands, most_frequent, quantile
 
 from ..robustness.stl.spec import violates
-from .labels import arms
+from .labels import arms, within_reach
 
 __all__ = [
     "CLIP",
@@ -51,7 +51,7 @@ _NOTHING: Mapping[str, Any] = MappingProxyType({})
 def clipped_margins(values: object) -> np.ndarray:
     """Return margins as they are drawn: clipped at -CLIP, NaN there as well."""
     y = np.asarray(values, dtype=float)
-    return np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP)
+    return within_reach(np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP))
 
 
 @as_annotated

@@ -26,7 +26,7 @@ from nlctl.plotting.axes import (
 )
 
 from ..robustness.stl.spec import violates
-from .labels import arms, number_axes, plain
+from .labels import arms, drawable, number_axes, plain, within_reach
 from .runs import clipped_margins
 
 __all__ = ["degradation", "deviations", "failure_map_figure", "radius_steps", "search"]
@@ -86,7 +86,7 @@ def deviations(table: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(table.index)
-    height = 0.7 / len(table.columns)
+    table, height = drawable(table), 0.7 / len(table.columns)
     for i, ((name, values), (colour, hatch)) in enumerate(
         zip(table.items(), ((GREY, ""), (ORANGE, "///")), strict=False)
     ):
@@ -118,9 +118,10 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
         Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
-    size, rate = curve.index.to_numpy(dtype=float), curve["rate"].to_numpy()
+    size = within_reach(curve.index)
+    rate, low, high = within_reach(curve[["rate", "lower", "upper"]]).T
     ax.errorbar(
-        size, rate, yerr=arms(rate, curve["lower"], curve["upper"]), color=BLUE, marker="o",
+        size, rate, yerr=arms(rate, low, high), color=BLUE, marker="o",
         markersize=4, linewidth=1.2, capsize=3,
     )  # fmt: skip
     if at is not None and limit is not None:
@@ -149,14 +150,14 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
-    margin = clipped_margins(steps["margin"])
+    size, margin = within_reach(steps["size"]), clipped_margins(steps["margin"])
     violated = violates(margin)
     for chosen, marker, colour, name in (
         (~violated, "o", BLUE, "no violation found"),
         (violated, "X", ORANGE, "violation"),
     ):
         if chosen.any():
-            ax.plot(steps["size"][chosen], margin[chosen], marker, color=colour, label=name)
+            ax.plot(size[chosen], margin[chosen], marker, color=colour, label=name)
     if np.isfinite(radius):
         ax.axvline(radius, color=ORANGE, linewidth=1.2, linestyle="--", label="radius at most")
     ax.axhline(0.0, color=GREY, linewidth=1.0)
@@ -198,12 +199,17 @@ def failure_map_figure(
     -------
     Figure
         Of matplotlib; nothing is written or shown.
+
+    Raises
+    ------
+    ValueError
+        Points that are no numbers, or that the triangles do not fit.
     """
     figure = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = figure.subplots()
     x, y = (points[name].to_numpy(dtype=float) for name in names)
     margin = np.clip(clipped_margins(points["spec"]), -1.0, 1.0)
-    net = Triangulation(x, y, triangles)
+    net = _net(x, y, triangles)
     span = (x.min(), x.max(), y.min(), y.max())
     plane = np.meshgrid(np.linspace(*span[:2], 240), np.linspace(*span[2:], 180))
     field = LinearTriInterpolator(net, margin)(*plane)
@@ -228,6 +234,18 @@ def failure_map_figure(
     bar = figure.colorbar(image, ax=ax, label="margin (1)")
     bar.ax.set_ylim(float(margin.min()), max(float(margin.max()), float(margin.min()) + 1e-6))
     return figure
+
+
+def _net(x: np.ndarray, y: np.ndarray, triangles: np.ndarray) -> Triangulation:
+    """Return the net of a map; points and triangles of two maps make none."""
+    if not np.isfinite([x, y]).all():
+        raise ValueError("points of the map are no numbers")
+    net = Triangulation(x, y, triangles)
+    try:
+        net.get_trifinder()
+    except RuntimeError:
+        raise ValueError("points and triangles of the map do not fit together") from None
+    return net
 
 
 def centred(margin: np.ndarray) -> Normalize:

@@ -20,7 +20,7 @@ from nlctl.plotting.axes import (
     stacked_axes,
 )
 
-from .labels import number_axes, plain
+from .labels import number_axes, plain, within_reach
 from .runs import clipped_margins
 
 __all__ = ["before_and_after", "bought", "margins_of_both", "tried"]
@@ -77,14 +77,15 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
-    y = history["cost"].to_numpy() if cost else clipped_margins(history["margin"].to_numpy())
+    y = within_reach(history["cost"]) if cost else clipped_margins(history["margin"])
+    runs = within_reach(history["runs"])
     for name, (colour, marker, label) in _CHOSEN.items():
         own = (history["by"] == name).to_numpy()
         if own.any():
-            ax.plot(history["runs"][own], y[own], marker, color=colour, markersize=4, label=label)
+            ax.plot(runs[own], y[own], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)
-        ax.step(history["runs"], best, where="post", color=ORANGE, linewidth=1.4, label="best")
+        ax.step(runs, best, where="post", color=ORANGE, linewidth=1.4, label="best")
     legend_above(ax)
     ax.set(xlabel="runs (1 + 0.7 k for k derivatives)", ylabel="cost" if cost else "least margin")
     return figure
