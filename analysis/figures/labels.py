@@ -36,7 +36,7 @@ def arms(value: np.ndarray, low: object, high: object) -> np.ndarray:
 
 
 def within_reach(values: object) -> np.ndarray:
-    """Return numbers with infinite ones just beyond the finite ones; NaN stays, and is not drawn."""
+    """Return numbers with infinite ones just beyond the finite ones; NaN stays."""
     y = np.asarray(values, dtype=float)
     reach = 1.15 * float(np.max(np.abs(y), initial=0.0, where=np.isfinite(y))) or 1.0
     return np.clip(y, -min(reach, LARGEST), min(reach, LARGEST))
