@@ -8,7 +8,6 @@ from typing import Any
 from ....expressions.graph import COMPARISONS, LOGIC, Expr
 from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
-from .memory import entry_address, load_value, store
 from .text import Body, Value, constant
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
@@ -55,16 +54,14 @@ class Writer:
                 self.names[node] = self.operation(node)
             else:
                 array, row = where
-                self.names[node] = load_value(
-                    self.b, entry_address(self.b, array, row * self.lanes), self.width
-                )
+                self.names[node] = self.b.load(self.b.address(array, row * self.lanes), self.width)
         self.stored(node)
 
     def stored(self, node: Expr) -> None:
         """Write a number where it is to lie."""
         for array, row in self.plan.places.get(node, ()):
             value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
-            store(self.b, value, entry_address(self.b, array, row * self.lanes))
+            self.b.store(value, self.b.address(array, row * self.lanes))
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""
