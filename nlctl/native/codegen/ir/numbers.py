@@ -8,7 +8,7 @@ from typing import Any
 from ....expressions.graph import COMPARISONS, LOGIC, Expr
 from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
-from .text import Body, Value, constant
+from .text import Body, Value
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
@@ -40,7 +40,7 @@ class Writer:
         kinds = Counter(
             a for n in plan.nodes for a in n.args if n.op in ("sin", "cos") and n not in plan.known
         )
-        self.both = {angle for angle, count in kinds.items() if count == 2}
+        self.both = {angle for angle, count in kinds.items() if count == 2 and not b.portable}
 
     def number(self, node: Expr) -> None:
         """Compute or read a number, and write it where it is to lie."""
@@ -76,13 +76,13 @@ class Writer:
         """Return an operation on what has names already."""
         b, args = self.b, [self.names[a] for a in node.args]
         if node.op == "const":
-            return constant(node.data, self.width, "b" if node.kind == "b" else "f")
+            return b.literal(node.data, self.width, "b" if node.kind == "b" else "f")
         if node.op in ARITHMETIC:
             return b.op(ARITHMETIC[node.op], *args, exact=node in self.exact)
         if node.op in COMPARISONS:
             return b.compare(_COMPARE[node.op], *args)
         if node.op == "not":
-            return b.logic("xor", args[0], constant(True, args[0].width, "b"))
+            return b.logic("xor", args[0], b.literal(True, args[0].width, "b"))
         if node.op in LOGIC:
             return b.logic(node.op, *args)
         if node.op == "neg":
@@ -105,7 +105,7 @@ class Writer:
 
     def numbers(self, nodes: tuple[Expr, ...]) -> None:
         """Compute the numbers of a level; those of one member four at a time where that pays."""
-        if self.lanes > 1:
+        if self.lanes > 1 or self.b.portable:
             for node in nodes:
                 self.number(node)
             return

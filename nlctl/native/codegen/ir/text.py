@@ -107,11 +107,10 @@ class Body:
     ----------
     module : Module
     portable : bool
-        Whether every operation rounds in the same way on every processor: nothing is contracted,
-        and what may be rounded once is.
+        Whether every operation rounds in the same way on every processor, and whatever else a
+        function computes: nothing is contracted, what may be rounded once is, and each sine has a
+        polynomial of its own.
     """
-
-    packs = True  # numbers of one member that are taken through a function as one vector
 
     def __init__(self, module: Module, portable: bool = False) -> None:
         self.module, self.portable = module, portable
@@ -137,6 +136,10 @@ class Body:
         name = f"%v{self._count}"
         self.lines.append(f"{name} = {text}")
         return Value(name, width, kind)
+
+    def literal(self, x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
+        """Return a constant, repeated in every element."""
+        return constant(x, width, kind)
 
     # -- elements
 

@@ -1,0 +1,299 @@
+"""A sampled controller of a loop, read as the program that runs on its computer."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..annotations import as_annotated
+from ..arguments import number
+from ..diagrams import initial_state as state_of
+from ..diagrams import leaves, parameter_names
+from ..errors import ParameterError
+from ..names import unknown
+from ..native import Compiled, compile
+from ..native.lower import Lowered
+from ..sampling.system import Sampled, sampled
+from .source import header_text, source_text
+
+_C_WORDS = frozenset(
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "else",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExportedController:
+    """A sampled controller as code.
+
+    Attributes
+    ----------
+    name : str
+        In front of all its names in C.
+    dt, offset : float
+        Sampling time and time of the first sample (s).
+    inputs, outputs, states : tuple of str
+        Labels, in the order of their arrays; the states include the outputs that blocks hold.
+    parameters : mapping of str to float
+        Every number of them by its name, in the order of their array.
+    initial_state : ndarray of shape (states,)
+    takes_time : bool
+        Whether its equations read the time, which ``step`` takes then.
+    lowered : Lowered
+        The plan that all code is written from.
+    sampled_states : tuple of int
+        Which states a sample makes, in the order in which it does.
+    digest : str
+        A key of all this: the same for the same program and numbers.
+
+    Examples
+    --------
+    See `export_controller`.
+    """
+
+    name: str
+    dt: float
+    offset: float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    states: tuple[str, ...]
+    parameters: Mapping[str, float]
+    initial_state: np.ndarray
+    takes_time: bool
+    lowered: Lowered
+    sampled_states: tuple[int, ...]
+    digest: str
+
+    @property
+    def header(self) -> str:
+        """Its header file, C99."""
+        return header_text(self)
+
+    @property
+    def source(self) -> str:
+        """Its source file, C99."""
+        return source_text(self)
+
+
+@as_annotated
+def export_controller(
+    diagram: ct.InterconnectedSystem,
+    block: str,
+    *,
+    dt: float | None = None,
+    method: str | None = None,
+    params: Mapping[str, Any] | None = None,
+    initial_state: Mapping[str, float] | None = None,
+    name: str | None = None,
+) -> ExportedController:
+    """Read a controller of a loop as the program of a computer, to be written as C or object code.
+
+    The program is the one that `nlctl.input_output_response` runs at every sample, operation by
+    operation in the same order, each rounded alike on every processor with IEEE 754 doubles.
+
+    Parameters
+    ----------
+    diagram : control.InterconnectedSystem
+        The loop.
+    block : str
+        Name of its sampled block, or of a diagram in it whose blocks are all sampled together.
+    dt : float, optional
+        Sampling time (s) of one in continuous time, which `nlctl.sampled` samples then.
+    method : str, optional
+        How one in continuous time becomes one in discrete time, as in `nlctl.sampled`.
+    params : mapping, optional
+        Parameters by qualified names, on top of those of the loop; they are constants of the code.
+    initial_state : mapping of str to float, optional
+        Initial states by name; by default those that blocks declare.
+    name : str, optional
+        In front of all names in C; by default that of the block.
+
+    Returns
+    -------
+    ExportedController
+        With ``header`` and ``source``; `object_code` makes object code of it.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such block, it is in continuous time and `dt` is not given, or a name is none
+        in C.
+    CompileError
+        If a target cannot hold it: functions that are called as they are, a search for signals of
+        an algebraic loop, several clocks, a delay or jitter of its clock.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> controller = export_controller(nlctl.paper.example_1(), "controller", dt=0.01, method="euler")
+    >>> "void controller_step(" in controller.source
+    True
+    """
+    part = _sampled_part(_block_of(diagram, block), dt, method)
+    name = _c_name(block.replace(".", "_") if name is None else name)
+    compiled = compile(_alone(part))
+    _check(compiled, block)
+    own = {k: v for k, v in {**dict(diagram.params), **(params or {})}.items() if _is_of(k, part)}
+    for key in params or {}:
+        if key not in own:
+            raise unknown("parameter", key, parameter_names(part), f"of '{block}'")
+    p = compiled.parameter_vector(own)
+    (clock,) = compiled.program.clocks.values()
+    lowered = compiled.lowered
+    if not lowered.holds_for(p[:, None]):
+        raise ParameterError(
+            f"'{block}': integers among the parameters steer its equations: set them in the diagram"
+        )
+    labels = _parameter_labels(compiled)
+    values = {labels.get(i, f"p[{i}]"): float(v) for i, v in enumerate(p)}
+    start = state_of(part, initial_state)
+    return ExportedController(
+        name=name, dt=clock.dt, offset=clock.offset, inputs=tuple(part.input_labels),
+        outputs=tuple(part.output_labels), states=tuple(part.state_labels or ()),
+        parameters=values, initial_state=start, takes_time=_reads_time(lowered), lowered=lowered,
+        sampled_states=compiled.program.sampled,
+        digest=_digest(lowered.text, values, start, (clock.dt, clock.offset)),
+    )  # fmt: skip
+
+
+def _block_of(diagram: Any, path: str) -> Any:
+    """Return the block or inner diagram of a dotted name."""
+    found = diagram
+    for i, part in enumerate(path.split(".")):
+        inside = {s.name: s for s in getattr(found, "syslist", ())}
+        if part not in inside:
+            where = f"of '{found.name}'" if i else "of the loop"
+            raise unknown("block", part, inside, where)
+        found = inside[part]
+    return found
+
+
+def _sampled_part(part: Any, dt: float | None, method: str | None) -> Any:
+    """Return a block whose leaves are all sampled."""
+    is_sampled = [isinstance(leaf.system, Sampled) for leaf in leaves(part)]
+    if all(is_sampled):
+        if dt is not None or method is not None:
+            raise ParameterError(f"'{part.name}' is sampled already: leave out dt and method")
+        return part
+    if any(is_sampled):
+        name = next(
+            leaf.path or leaf.system.name
+            for leaf, known in zip(leaves(part), is_sampled, strict=True)
+            if not known
+        )
+        raise ParameterError(f"block '{name}' of '{part.name}' is not sampled: sample all of it")
+    if dt is None:
+        raise ParameterError(
+            f"'{part.name}' is not sampled: give dt in s (and method='euler' of one in continuous "
+            "time), or put nlctl.sampled(...) of it into the loop"
+        )
+    return sampled(part, number("export_controller", "dt", dt, above=0), method=method)
+
+
+def _alone(part: Any) -> ct.InterconnectedSystem:
+    """Return a diagram of one block, with its inputs and outputs."""
+    inputs, outputs = list(part.input_labels), list(part.output_labels)
+    return ct.interconnect(
+        [part], name=part.name, inputs=inputs, outputs=outputs,
+        inplist=[f"{part.name}.{u}" for u in inputs],
+        outlist=[f"{part.name}.{y}" for y in outputs],
+    )  # fmt: skip
+
+
+def _check(compiled: Compiled, block: str) -> None:
+    """Refuse what a target cannot hold."""
+    from ..errors import CompileError
+
+    for reason in compiled.lowered.opaque.values():
+        raise CompileError(f"'{block}' cannot be exported: a function of it is called ({reason})")
+    if compiled.lowered.solvers:
+        raise CompileError(f"'{block}' cannot be exported: an algebraic loop of it is searched for")
+    clocks = list(compiled.program.clocks.values())
+    if len(clocks) != 1:
+        raise CompileError(
+            f"'{block}' cannot be exported: its blocks have {len(clocks)} clocks; export those of "
+            "each clock"
+        )
+    for what in ("delay", "jitter"):
+        value = getattr(clocks[0], what)
+        if value:
+            raise CompileError(
+                f"'{block}' cannot be exported with a {what} of {value:g} s, which is the "
+                f"computer's and not the program's: set it to 0"
+            )
+
+
+def _is_of(name: str, part: Any) -> bool:
+    return str(name).startswith(f"{part.name}.")
+
+
+def _parameter_labels(compiled: Compiled) -> dict[int, str]:
+    """Return the name of every number of the parameter vector."""
+    found = {}
+    for slots in compiled.program.layout.values():
+        for slot in slots.values():
+            for k, index in enumerate(np.ndindex(slot.shape)):
+                place = "".join(f"[{i}]" for i in index)
+                found[slot.offset + k] = f"{slot.name}{place}"
+    return found
+
+
+def _reads_time(lowered: Lowered) -> bool:
+    """Whether what a sample computes depends on the time."""
+    return any(
+        node.op == "leaf" and node.data[0] == "t"
+        for name in ("sample0", "out")
+        for node in lowered.functions[name].plan.nodes
+    )
+
+
+def _c_name(name: str) -> str:
+    """Return a name, checked to be one in C."""
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _C_WORDS:
+        raise ParameterError(f"'{name}' is not a name in C: give name= of letters, digits and '_'")
+    return name
+
+
+def _digest(text: str, parameters: Mapping[str, float], start: np.ndarray, clock: Any) -> str:
+    content = repr((text, list(parameters.items()), start.tolist(), clock))
+    return hashlib.sha256(content.encode()).hexdigest()[:16]

@@ -1,0 +1,168 @@
+"""Object code of a controller for other machines: LLVM makes it of the IR that was simulated."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import llvmlite.binding as llvm
+
+from ..annotations import as_annotated
+from ..names import unknown
+from ..native.codegen.ir.program import COPY, program_text
+from ..native.machine.finish import PASSES
+from .controller import ExportedController
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """A machine that object code is made for.
+
+    Attributes
+    ----------
+    cpu, features, abi : str
+        As LLVM calls them.
+    meaning : str
+        What has it.
+    """
+
+    cpu: str
+    meaning: str
+    features: str = ""
+    abi: str = ""
+
+
+TARGETS: Mapping[str, Target] = MappingProxyType({
+    "thumbv7em-none-eabihf": Target(cpu="cortex-m7", meaning="Cortex-M7 with doubles"),
+    "armv7a-none-eabihf": Target(cpu="cortex-a7", meaning="Cortex-A, 32 bits"),
+    "aarch64-none-elf": Target(cpu="", meaning="ARM, 64 bits"),
+    "riscv32-none-elf": Target(
+        cpu="", features="+m,+a,+f,+d", abi="ilp32d", meaning="RISC-V, 32 bits, with doubles"
+    ),
+    "riscv64-none-elf": Target(
+        cpu="", features="+m,+a,+f,+d", abi="lp64d", meaning="RISC-V, 64 bits, with doubles"
+    ),
+    "x86_64-none-elf": Target(cpu="x86-64", meaning="x86 with SSE2"),
+})  # fmt: skip
+"""Machines by LLVM's name of them."""
+
+
+@as_annotated
+def object_code(controller: ExportedController, target: str) -> bytes:
+    """Return object code with the functions of the header, an ELF file to be linked.
+
+    Parameters
+    ----------
+    controller : ExportedController
+        As `export_controller` returns it.
+    target : str
+        One of `TARGETS`.
+
+    Returns
+    -------
+    bytes
+        Content of an object file. Of libraries it calls ``memcpy``, ``memset``, and of math.h what
+        the processor has no instruction for.
+
+    Raises
+    ------
+    ParameterError
+        If the target is unknown.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> made = nlctl.export.export_controller(nlctl.paper.example_1(), "controller", dt=0.01, method="euler")
+    >>> object_code(made, "thumbv7em-none-eabihf")[:4]
+    b'\\x7fELF'
+    """
+    if target not in TARGETS:
+        raise unknown("target", target, TARGETS, "of object code")
+    machine = _machine(target)
+    module = llvm.parse_assembly(module_text(controller))
+    module.triple, module.data_layout = target, str(machine.target_data)
+    module.verify()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
+    passes = llvm.create_new_module_pass_manager()
+    for name in PASSES:
+        getattr(passes, f"add_{name}_pass")()
+    passes.run(module, builder)
+    return machine.emit_object(module)
+
+
+def _machine(target: str) -> Any:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    made, which = llvm.Target.from_triple(target), TARGETS[target]
+    return made.create_target_machine(
+        cpu=which.cpu, features=which.features, opt=2, abiname=which.abi
+    )
+
+
+def module_text(controller: ExportedController) -> str:
+    """Return the IR: the functions of the plan, and those of the header around them."""
+    plan = controller.lowered
+    functions = {name: plan.functions[name] for name in ("prepare", "sample0", "out")}
+    text = program_text(functions, 1, plan.exact, portable=functions)
+    text = text.replace("preserve_allcc ", "")  # x86 alone has it
+    text = re.sub(r"^define void @(prepare|sample0|out)\(", r"define internal void @\1(", text,
+                  flags=re.MULTILINE)  # fmt: skip
+    if COPY not in text:
+        text = f"{COPY}\n{text}"
+    return text + _around(controller)
+
+
+def _around(controller: ExportedController) -> str:
+    """Return the IR of reset and step, as the C source has them."""
+    name, places = controller.name, controller.sampled_states
+    n, states = max(len(places), 1), max(len(controller.states), 1)
+    rows, count = controller.lowered.size, len(controller.initial_state)
+    start = ", ".join(f"double {_bits(v)}" for v in controller.initial_state)
+    t = "double %t, " if controller.takes_time else ""
+    time = "double %t" if controller.takes_time else "double 0.0"
+    taken = "".join(
+        f"  %s{k} = getelementptr double, ptr %s, i64 {k}\n"
+        f"  %v{k} = load double, ptr %s{k}, align 8\n"
+        f"  %x{k} = getelementptr double, ptr %self, i64 {i}\n"
+        f"  store double %v{k}, ptr %x{k}, align 8\n"
+        for k, i in enumerate(places)
+    )
+    copied = (
+        f"  call void @llvm.memcpy.p0.p0.i64(ptr %self, ptr @initial, i64 {8 * count}, i1 0)\n"
+        if count else ""
+    )  # fmt: skip
+    values = ", ".join(f"double {_bits(v)}" for v in controller.parameters.values())
+    numbers = f"[{values}]" if values else "zeroinitializer"
+    return f"""
+declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)
+@{name}_parameters = constant [{max(len(controller.parameters), 1)} x double] {numbers}, align 8
+@initial = private constant [{max(count, 1)} x double] {
+        f"[{start}]" if start else "zeroinitializer"
+    }, align 8
+
+define void @{name}_reset(ptr %self, ptr %parameters) nounwind {{
+  call void @llvm.memset.p0.i64(ptr %self, i8 0, i64 {8 * (states + rows)}, i1 0)
+{copied}  %c = getelementptr double, ptr %self, i64 {states}
+  call void @prepare(ptr %parameters, ptr %c)
+  ret void
+}}
+
+define void @{name}_step(ptr %self, {t}ptr %inputs, ptr %outputs) nounwind {{
+  %s = alloca [{n} x double], align 8
+  %now = alloca double, align 8
+  store {time}, ptr %now, align 8
+  %c = getelementptr double, ptr %self, i64 {states}
+  call void @sample0(ptr %now, ptr %self, ptr %inputs, ptr %c, ptr %s)
+{taken}  call void @out(ptr %now, ptr %self, ptr %inputs, ptr %c, ptr %outputs)
+  ret void
+}}
+"""
+
+
+def _bits(x: float) -> str:
+    from ..native.codegen.ir.text import float_text
+
+    return float_text(float(x))
