@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,55 +9,17 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from .. import native
 from ..annotations import as_annotated
 from ..arguments import number
 from ..diagrams import initial_state as state_of
 from ..diagrams import leaves, parameter_names
-from ..errors import ParameterError
+from ..errors import CompileError, ParameterError
 from ..names import unknown
-from ..native import Compiled, compile
 from ..native.lower import Lowered
 from ..sampling.system import Sampled, sampled
-from .source import header_text, source_text
-
-_C_WORDS = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-    ]
-)
+from .source import controller_header, controller_source
+from .words import c_name, check_written_out, digest, parameter_values
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,12 +67,12 @@ class ExportedController:
     @property
     def header(self) -> str:
         """Its header file, C99."""
-        return header_text(self)
+        return controller_header(self)
 
     @property
     def source(self) -> str:
         """Its source file, C99."""
-        return source_text(self)
+        return controller_source(self)
 
 
 @as_annotated
@@ -128,8 +88,10 @@ def export_controller(
 ) -> ExportedController:
     """Read a controller of a loop as the program of a computer, to be written as C or object code.
 
-    The program is the one that `nlctl.input_output_response` runs at every sample, operation by
-    operation in the same order, each rounded alike on every processor with IEEE 754 doubles.
+    The program is the one that `nlctl.input_output_response` runs at every sample: operation by
+    operation in the same order, each rounded alike on every processor with IEEE 754 doubles.  Only
+    functions of the C library that nlctl does not write out (log, pow, atan and others; sin and
+    cos of angles beyond 1e6) are as good as the library of the target.
 
     Parameters
     ----------
@@ -138,11 +100,11 @@ def export_controller(
     block : str
         Name of its sampled block, or of a diagram in it whose blocks are all sampled together.
     dt : float, optional
-        Sampling time (s) of one in continuous time, which `nlctl.sampled` samples then.
+        Sampling time (s) of one that is not sampled, which `nlctl.sampled` samples then.
     method : str, optional
         How one in continuous time becomes one in discrete time, as in `nlctl.sampled`.
     params : mapping, optional
-        Parameters by qualified names, on top of those of the loop; they are constants of the code.
+        Parameters by qualified names, on top of those of the loop; ``reset`` takes them in C.
     initial_state : mapping of str to float, optional
         Initial states by name; by default those that blocks declare.
     name : str, optional
@@ -156,71 +118,64 @@ def export_controller(
     Raises
     ------
     ParameterError
-        If there is no such block, it is in continuous time and `dt` is not given, or a name is none
-        in C.
+        If there is no such block, it is not sampled and `dt` is not given, or a name is none in C.
     CompileError
-        If a target cannot hold it: functions that are called as they are, a search for signals of
-        an algebraic loop, several clocks, a delay or jitter of its clock.
+        If a target cannot hold it: functions that are called, a search for signals of an algebraic
+        loop, several clocks, a delay or jitter of its clock.
 
     Examples
     --------
     >>> import nlctl
-    >>> controller = export_controller(nlctl.paper.example_1(), "controller", dt=0.01, method="euler")
+    >>> loop = nlctl.paper.example_1()
+    >>> controller = export_controller(loop, "controller", dt=0.01, method="euler")
     >>> "void controller_step(" in controller.source
     True
     """
     part = _sampled_part(_block_of(diagram, block), dt, method)
-    name = _c_name(block.replace(".", "_") if name is None else name)
-    compiled = compile(_alone(part))
-    _check(compiled, block)
-    own = {k: v for k, v in {**dict(diagram.params), **(params or {})}.items() if _is_of(k, part)}
-    for key in params or {}:
-        if key not in own:
-            raise unknown("parameter", key, parameter_names(part), f"of '{block}'")
-    p = compiled.parameter_vector(own)
-    (clock,) = compiled.program.clocks.values()
+    alone = _alone(part)
+    compiled = native.compile(alone)
+    check_written_out(compiled, block)
+    clock = _clock_of(compiled, block)
+    p = compiled.parameter_vector(_parameters_of(part, block, diagram, params or {}))
     lowered = compiled.lowered
     if not lowered.holds_for(p[:, None]):
         raise ParameterError(
             f"'{block}': integers among the parameters steer its equations: set them in the diagram"
         )
-    labels = _parameter_labels(compiled)
-    values = {labels.get(i, f"p[{i}]"): float(v) for i, v in enumerate(p)}
-    start = state_of(part, initial_state)
+    values, start = parameter_values(compiled, p), state_of(alone, initial_state)
     return ExportedController(
-        name=name, dt=clock.dt, offset=clock.offset, inputs=tuple(part.input_labels),
-        outputs=tuple(part.output_labels), states=tuple(part.state_labels or ()),
-        parameters=values, initial_state=start, takes_time=_reads_time(lowered), lowered=lowered,
+        name=c_name(block.replace(".", "_") if name is None else name), dt=clock.dt,
+        offset=clock.offset, inputs=tuple(part.input_labels), outputs=tuple(part.output_labels),
+        states=tuple(part.state_labels or ()), parameters=values, initial_state=start,
+        takes_time=_reads_time(lowered), lowered=lowered,
         sampled_states=compiled.program.sampled,
-        digest=_digest(lowered.text, values, start, (clock.dt, clock.offset)),
+        digest=digest(lowered.text, values, start, (clock.dt, clock.offset)),
     )  # fmt: skip
 
 
 def _block_of(diagram: Any, path: str) -> Any:
     """Return the block or inner diagram of a dotted name."""
-    found = diagram
+    inner = diagram
     for i, part in enumerate(path.split(".")):
-        inside = {s.name: s for s in getattr(found, "syslist", ())}
+        inside = {s.name: s for s in getattr(inner, "syslist", ())}
         if part not in inside:
-            where = f"of '{found.name}'" if i else "of the loop"
+            where = f"of '{inner.name}'" if i else "of the loop"
             raise unknown("block", part, inside, where)
-        found = inside[part]
-    return found
+        inner = inside[part]
+    return inner
 
 
 def _sampled_part(part: Any, dt: float | None, method: str | None) -> Any:
     """Return a block whose leaves are all sampled."""
-    is_sampled = [isinstance(leaf.system, Sampled) for leaf in leaves(part)]
-    if all(is_sampled):
+    is_sampled = {
+        leaf.path or leaf.system.name: isinstance(leaf.system, Sampled) for leaf in leaves(part)
+    }
+    if all(is_sampled.values()):
         if dt is not None or method is not None:
             raise ParameterError(f"'{part.name}' is sampled already: leave out dt and method")
         return part
-    if any(is_sampled):
-        name = next(
-            leaf.path or leaf.system.name
-            for leaf, known in zip(leaves(part), is_sampled, strict=True)
-            if not known
-        )
+    if any(is_sampled.values()):
+        name = next(name for name, yes in is_sampled.items() if not yes)
         raise ParameterError(f"block '{name}' of '{part.name}' is not sampled: sample all of it")
     if dt is None:
         raise ParameterError(
@@ -240,14 +195,8 @@ def _alone(part: Any) -> ct.InterconnectedSystem:
     )  # fmt: skip
 
 
-def _check(compiled: Compiled, block: str) -> None:
-    """Refuse what a target cannot hold."""
-    from ..errors import CompileError
-
-    for reason in compiled.lowered.opaque.values():
-        raise CompileError(f"'{block}' cannot be exported: a function of it is called ({reason})")
-    if compiled.lowered.solvers:
-        raise CompileError(f"'{block}' cannot be exported: an algebraic loop of it is searched for")
+def _clock_of(compiled: native.Compiled, block: str) -> Any:
+    """Return the one clock of a controller; delay and jitter are the computer's."""
     clocks = list(compiled.program.clocks.values())
     if len(clocks) != 1:
         raise CompileError(
@@ -259,23 +208,21 @@ def _check(compiled: Compiled, block: str) -> None:
         if value:
             raise CompileError(
                 f"'{block}' cannot be exported with a {what} of {value:g} s, which is the "
-                f"computer's and not the program's: set it to 0"
+                "computer's and not the program's: set it to 0"
             )
+    return clocks[0]
 
 
-def _is_of(name: str, part: Any) -> bool:
-    return str(name).startswith(f"{part.name}.")
-
-
-def _parameter_labels(compiled: Compiled) -> dict[int, str]:
-    """Return the name of every number of the parameter vector."""
-    found = {}
-    for slots in compiled.program.layout.values():
-        for slot in slots.values():
-            for k, index in enumerate(np.ndindex(slot.shape)):
-                place = "".join(f"[{i}]" for i in index)
-                found[slot.offset + k] = f"{slot.name}{place}"
-    return found
+def _parameters_of(
+    part: Any, block: str, diagram: Any, params: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the parameters of a loop and those given, as far as they are the block's."""
+    inside = f"{part.name}."
+    for key in params:
+        if not str(key).startswith(inside):
+            raise unknown("parameter", key, parameter_names(part), f"of '{block}'")
+    both = {**dict(diagram.params), **params}
+    return {key: value for key, value in both.items() if str(key).startswith(inside)}
 
 
 def _reads_time(lowered: Lowered) -> bool:
@@ -285,15 +232,3 @@ def _reads_time(lowered: Lowered) -> bool:
         for name in ("sample0", "out")
         for node in lowered.functions[name].plan.nodes
     )
-
-
-def _c_name(name: str) -> str:
-    """Return a name, checked to be one in C."""
-    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _C_WORDS:
-        raise ParameterError(f"'{name}' is not a name in C: give name= of letters, digits and '_'")
-    return name
-
-
-def _digest(text: str, parameters: Mapping[str, float], start: np.ndarray, clock: Any) -> str:
-    content = repr((text, list(parameters.items()), start.tolist(), clock))
-    return hashlib.sha256(content.encode()).hexdigest()[:16]

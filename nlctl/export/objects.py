@@ -11,6 +11,7 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from ..annotations import as_annotated
+from ..errors import CompileError
 from ..names import unknown
 from ..native.codegen.ir.program import COPY, program_text
 from ..native.machine.finish import PASSES
@@ -71,12 +72,15 @@ def object_code(controller: ExportedController, target: str) -> bytes:
     ------
     ParameterError
         If the target is unknown.
+    CompileError
+        If this version of LLVM writes other attributes than known.
 
     Examples
     --------
     >>> import nlctl
-    >>> made = nlctl.export.export_controller(nlctl.paper.example_1(), "controller", dt=0.01, method="euler")
-    >>> object_code(made, "thumbv7em-none-eabihf")[:4]
+    >>> loop = nlctl.paper.example_1()
+    >>> controller = export_controller(loop, "controller", dt=0.01, method="euler")
+    >>> object_code(controller, "thumbv7em-none-eabihf")[:4]
     b'\\x7fELF'
     """
     if target not in TARGETS:
@@ -90,7 +94,7 @@ def object_code(controller: ExportedController, target: str) -> bytes:
     for name in PASSES:
         getattr(passes, f"add_{name}_pass")()
     passes.run(module, builder)
-    return machine.emit_object(module)
+    return _with_float_abi(machine.emit_object(module), target)
 
 
 def _machine(target: str) -> Any:
@@ -100,6 +104,20 @@ def _machine(target: str) -> Any:
     return made.create_target_machine(
         cpu=which.cpu, features=which.features, opt=2, abiname=which.abi
     )
+
+
+def _with_float_abi(code: bytes, target: str) -> bytes:
+    """Say in ARM's attributes that doubles are passed in registers, which linkers compare.
+
+    LLVM does so and writes it for its own option alone, which llvmlite has not: the place of the
+    version of the attributes' standard is taken for it, filled with what is there already.
+    """
+    if not target.endswith("eabihf"):
+        return code
+    version, instead = b"\x43" + b"2.09\0", b"\x1c\x01" + b"\x0e\x00" * 2
+    if code.count(version) != 1:
+        raise CompileError(f"the attributes of object code for {target} are not those known")
+    return code.replace(version, instead)
 
 
 def module_text(controller: ExportedController) -> str:

@@ -185,7 +185,7 @@ class CBody:
     def called(
         self, name: str, make: Callable[..., tuple[Value, ...]], args: list[Value], count: int
     ) -> tuple[Value, ...]:
-        """Call a function of one or two results; of two the second is written to its last argument."""
+        """Call a function; a second result is written to its last argument."""
         full = f"nlctl_{name}"
         if full not in self.module.functions:
             self.module.functions[full] = ""  # before those that it calls
