@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from nlctl.errors import ParameterError
-from nlctl.export import TARGETS, export_controller, export_equations, object_code
+from nlctl.export import TARGETS, c_files, export_controller, export_equations, object_code
 from nlctl.host.files import replace_file
 from nlctl.names import unknown
 
@@ -32,6 +32,7 @@ def write_export(
 
     if target != "c" and target not in TARGETS:
         raise unknown("target", target, ["c", *TARGETS], "of export")
+    content: dict[str, str | bytes] = {}
     diagram = named_loop(loop)
     params, start = assignments(diagram, settings)
     if block is None:
@@ -41,15 +42,14 @@ def write_export(
                 "--dt and --method"
             )
         equations = export_equations(diagram, params=params, initial_state=start, name=name)
-        content = {f"{equations.name}.h": equations.header, f"{equations.name}.c": equations.source}
+        content |= c_files(equations)
     else:
         controller = export_controller(
             diagram, block, dt=dt, method=method, params=params, initial_state=start, name=name
         )
-        content = {f"{controller.name}.h": controller.header}
-        if target == "c":
-            content[f"{controller.name}.c"] = controller.source
-        else:
+        content |= c_files(controller)
+        if target != "c":
+            del content[f"{controller.name}.c"]
             content[f"{controller.name}.o"] = object_code(controller, target)
     out.mkdir(parents=True, exist_ok=True)
     return [_written(out / file, text) for file, text in content.items()]

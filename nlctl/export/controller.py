@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from .. import native
 from ..annotations import as_annotated
@@ -18,61 +16,8 @@ from ..errors import CompileError, ParameterError
 from ..names import unknown
 from ..native.lower import Lowered
 from ..sampling.system import Sampled, sampled
-from .source import controller_header, controller_source
+from .records import ExportedController
 from .words import c_name, check_written_out, digest, parameter_values
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ExportedController:
-    """A sampled controller as code.
-
-    Attributes
-    ----------
-    name : str
-        In front of all its names in C.
-    dt, offset : float
-        Sampling time and time of the first sample (s).
-    inputs, outputs, states : tuple of str
-        Labels, in the order of their arrays; the states include the outputs that blocks hold.
-    parameters : mapping of str to float
-        Every number of them by its name, in the order of their array.
-    initial_state : ndarray of shape (states,)
-    takes_time : bool
-        Whether its equations read the time, which ``step`` takes then.
-    lowered : Lowered
-        The plan that all code is written from.
-    sampled_states : tuple of int
-        Which states a sample makes, in the order in which it does.
-    digest : str
-        A key of all this: the same for the same program and numbers.
-
-    Examples
-    --------
-    See `export_controller`.
-    """
-
-    name: str
-    dt: float
-    offset: float
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    states: tuple[str, ...]
-    parameters: Mapping[str, float]
-    initial_state: np.ndarray
-    takes_time: bool
-    lowered: Lowered
-    sampled_states: tuple[int, ...]
-    digest: str
-
-    @property
-    def header(self) -> str:
-        """Its header file, C99."""
-        return controller_header(self)
-
-    @property
-    def source(self) -> str:
-        """Its source file, C99."""
-        return controller_source(self)
 
 
 @as_annotated
@@ -113,12 +58,14 @@ def export_controller(
     Returns
     -------
     ExportedController
-        With ``header`` and ``source``; `object_code` makes object code of it.
+        For `c_files` and `object_code`.
 
     Raises
     ------
+    UnknownNameError
+        If there is no such block, or no such parameter in it.
     ParameterError
-        If there is no such block, it is not sampled and `dt` is not given, or a name is none in C.
+        If it is not sampled and `dt` is not given, or a name is none in C.
     CompileError
         If a target cannot hold it: functions that are called, a search for signals of an algebraic
         loop, several clocks, a delay or jitter of its clock.
@@ -128,8 +75,8 @@ def export_controller(
     >>> import nlctl
     >>> loop = nlctl.paper.example_1()
     >>> controller = export_controller(loop, "controller", dt=0.01, method="euler")
-    >>> "void controller_step(" in controller.source
-    True
+    >>> controller.inputs
+    ('x1', 'x2', 'yd', 'yd1', 'yd2')
     """
     part = _sampled_part(_block_of(diagram, block), dt, method)
     alone = _alone(part)

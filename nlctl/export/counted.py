@@ -13,15 +13,10 @@ _TURNS = re.compile(r"for \(int k = 0; k < (\d+)")
 _FREE = ("nlctl_bits", "nlctl_real", "sizeof")
 
 
-def operations(before: str, step: str) -> Counter[str]:
-    """Return how often the functions of a text do what, with those that they call.
+def counted_operations(before: str, step: str) -> Counter[str]:
+    """Return how often the functions of `step` do what, with those in `before` that they call.
 
-    Parameters
-    ----------
-    before : str
-        Functions that may be called, each after those that it calls.
-    step : str
-        The functions that are counted.  Of a choice both sides are counted: the worst case.
+    Of a choice both sides are counted: the worst case.
     """
     known: dict[str, Counter[str]] = {}
     for name, body in _FUNCTION.findall(before):

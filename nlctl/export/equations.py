@@ -3,68 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
-import numpy as np
 
 from .. import native
 from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
 from ..errors import CompileError
-from ..native.lower import Lowered
-from .source import equations_header, equations_source
+from .records import ExportedEquations
 from .words import c_name, check_written_out, digest, parameter_values
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ExportedEquations:
-    """The equations of a diagram as code, for an integrator of one's own.
-
-    Attributes
-    ----------
-    name : str
-        In front of all its names in C.
-    inputs, outputs, states : tuple of str
-        Labels, in the order of their arrays.
-    memory : tuple of str
-        States that jump after each accepted step, to what ``rates`` writes to `m`.
-    conditions : int
-        Numbers in `g`: where one changes its sign, steps should end.
-    parameters : mapping of str to float
-        Every number of them by its name, in the order of their array.
-    initial_state : ndarray of shape (states,)
-    lowered : Lowered
-        The plan that the code is written from.
-    digest : str
-        A key of all this: the same for the same program and numbers.
-
-    Examples
-    --------
-    See `export_equations`.
-    """
-
-    name: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    states: tuple[str, ...]
-    memory: tuple[str, ...]
-    conditions: int
-    parameters: Mapping[str, float]
-    initial_state: np.ndarray
-    lowered: Lowered
-    digest: str
-
-    @property
-    def header(self) -> str:
-        """Its header file, C99."""
-        return equations_header(self)
-
-    @property
-    def source(self) -> str:
-        """Its source file, C99."""
-        return equations_source(self)
 
 
 @as_annotated
@@ -80,6 +28,7 @@ def export_equations(
     Parameters
     ----------
     diagram : control.InterconnectedSystem
+        In continuous time.
     params : mapping, optional
         Parameters by qualified names, on top of those of the diagram.
     initial_state : mapping of str to float, optional
@@ -90,7 +39,7 @@ def export_equations(
     Returns
     -------
     ExportedEquations
-        With ``header`` and ``source``.
+        For `c_files`.
 
     Raises
     ------
@@ -104,8 +53,8 @@ def export_equations(
     --------
     >>> import nlctl
     >>> equations = export_equations(nlctl.paper.example_1(), name="example_1")
-    >>> "void example_1_rates(" in equations.source
-    True
+    >>> equations.states[:2]
+    ('plant_x1', 'plant_x2')
     """
     compiled = native.compile(diagram)
     what = str(diagram.name)

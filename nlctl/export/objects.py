@@ -14,8 +14,9 @@ from ..annotations import as_annotated
 from ..errors import CompileError
 from ..names import unknown
 from ..native.codegen.ir.program import COPY, program_text
+from ..native.codegen.ir.text import float_text
 from ..native.machine.finish import PASSES
-from .controller import ExportedController
+from .records import ExportedController
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +71,7 @@ def object_code(controller: ExportedController, target: str) -> bytes:
 
     Raises
     ------
-    ParameterError
+    UnknownNameError
         If the target is unknown.
     CompileError
         If this version of LLVM writes other attributes than known.
@@ -79,8 +80,8 @@ def object_code(controller: ExportedController, target: str) -> bytes:
     --------
     >>> import nlctl
     >>> loop = nlctl.paper.example_1()
-    >>> controller = export_controller(loop, "controller", dt=0.01, method="euler")
-    >>> object_code(controller, "thumbv7em-none-eabihf")[:4]
+    >>> law = nlctl.export.export_controller(loop, "controller", dt=0.01, method="euler")
+    >>> object_code(law, "thumbv7em-none-eabihf")[:4]
     b'\\x7fELF'
     """
     if target not in TARGETS:
@@ -136,11 +137,10 @@ def module_text(controller: ExportedController) -> str:
 def _around(controller: ExportedController) -> str:
     """Return the IR of reset and step, as the C source has them."""
     name, places = controller.name, controller.sampled_states
-    n, states = max(len(places), 1), max(len(controller.states), 1)
-    rows, count = controller.lowered.size, len(controller.initial_state)
-    start = ", ".join(f"double {_bits(v)}" for v in controller.initial_state)
-    t = "double %t, " if controller.takes_time else ""
-    time = "double %t" if controller.takes_time else "double 0.0"
+    states, rows = max(len(controller.states), 1), controller.lowered.size
+    t, time = ("double %t, ", "%t") if controller.takes_time else ("", "0.0")
+    start, count = [float_text(float(v)) for v in controller.initial_state], len(controller.states)
+    values = [float_text(v) for v in controller.parameters.values()]
     taken = "".join(
         f"  %s{k} = getelementptr double, ptr %s, i64 {k}\n"
         f"  %v{k} = load double, ptr %s{k}, align 8\n"
@@ -148,30 +148,23 @@ def _around(controller: ExportedController) -> str:
         f"  store double %v{k}, ptr %x{k}, align 8\n"
         for k, i in enumerate(places)
     )
-    copied = (
-        f"  call void @llvm.memcpy.p0.p0.i64(ptr %self, ptr @initial, i64 {8 * count}, i1 0)\n"
-        if count else ""
-    )  # fmt: skip
-    values = ", ".join(f"double {_bits(v)}" for v in controller.parameters.values())
-    numbers = f"[{values}]" if values else "zeroinitializer"
     return f"""
 declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)
-@{name}_parameters = constant [{max(len(controller.parameters), 1)} x double] {numbers}, align 8
-@initial = private constant [{max(count, 1)} x double] {
-        f"[{start}]" if start else "zeroinitializer"
-    }, align 8
+@{name}_parameters = constant {_array(values)}, align 8
+@initial = private constant {_array(start)}, align 8
 
 define void @{name}_reset(ptr %self, ptr %parameters) nounwind {{
   call void @llvm.memset.p0.i64(ptr %self, i8 0, i64 {8 * (states + rows)}, i1 0)
-{copied}  %c = getelementptr double, ptr %self, i64 {states}
+  call void @llvm.memcpy.p0.p0.i64(ptr %self, ptr @initial, i64 {8 * count}, i1 0)
+  %c = getelementptr double, ptr %self, i64 {states}
   call void @prepare(ptr %parameters, ptr %c)
   ret void
 }}
 
 define void @{name}_step(ptr %self, {t}ptr %inputs, ptr %outputs) nounwind {{
-  %s = alloca [{n} x double], align 8
+  %s = alloca [{max(len(places), 1)} x double], align 8
   %now = alloca double, align 8
-  store {time}, ptr %now, align 8
+  store double {time}, ptr %now, align 8
   %c = getelementptr double, ptr %self, i64 {states}
   call void @sample0(ptr %now, ptr %self, ptr %inputs, ptr %c, ptr %s)
 {taken}  call void @out(ptr %now, ptr %self, ptr %inputs, ptr %c, ptr %outputs)
@@ -180,7 +173,7 @@ define void @{name}_step(ptr %self, {t}ptr %inputs, ptr %outputs) nounwind {{
 """
 
 
-def _bits(x: float) -> str:
-    from ..native.codegen.ir.text import float_text
-
-    return float_text(float(x))
+def _array(values: list[str]) -> str:
+    """Return an array of numbers; one zero where there are none."""
+    inside = ", ".join(f"double {value}" for value in values or [float_text(0.0)])
+    return f"[{max(len(values), 1)} x double] [{inside}]"

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Mapping, Sequence
 
 from .._version import __version__
-from ..native.codegen.c.body import CModule, float_text
+from ..annotations import as_annotated
+from ..native.codegen.c.body import CModule, c_number
 from ..native.codegen.c.program import function_text
-from .counted import in_words, operations
+from ..wording import counted
+from .counted import counted_operations, in_words
+from .records import ExportedController, ExportedEquations
 from .words import comment, enumeration
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy as np
-
-    from ..native.lower import Lowered
-    from .controller import ExportedController
-    from .equations import ExportedEquations
 
 _INCLUDED = """\
 #include <float.h>
@@ -40,36 +33,49 @@ _INCLUDED = """\
 """
 
 
-class Exported(Protocol):
-    """What controllers and equations have in common."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def inputs(self) -> tuple[str, ...]: ...
-    @property
-    def outputs(self) -> tuple[str, ...]: ...
-    @property
-    def states(self) -> tuple[str, ...]: ...
-    @property
-    def parameters(self) -> Mapping[str, float]: ...
-    @property
-    def initial_state(self) -> np.ndarray: ...
-    @property
-    def lowered(self) -> Lowered: ...
-    @property
-    def digest(self) -> str: ...
+Exported = ExportedController | ExportedEquations
 
 
-def controller_header(controller: ExportedController) -> str:
+@as_annotated
+def c_files(exported: Exported) -> dict[str, str]:
+    """Return header and source, C99 without warnings, by the names of their files.
+
+    Parameters
+    ----------
+    exported : ExportedController or ExportedEquations
+        As `export_controller` and `export_equations` return them.
+
+    Returns
+    -------
+    dict of str to str
+        ``NAME.h`` and ``NAME.c``.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> files = c_files(nlctl.export.export_equations(nlctl.paper.example_1(), name="loop"))
+    >>> "void loop_rates(" in files["loop.c"]
+    True
+    """
+    is_controller = isinstance(exported, ExportedController)
+    header, source = (
+        (_controller_header(exported), _controller_source(exported))
+        if is_controller
+        else (_equations_header(exported), _equations_source(exported))
+    )
+    return {f"{exported.name}.h": header, f"{exported.name}.c": source}
+
+
+def _controller_header(controller: ExportedController) -> str:
     """Return the header: sizes, indices, the state, two functions."""
     name, t = controller.name, "double t, " if controller.takes_time else ""
     words = "  t: time of the sample (s)." if t else ""
-    dt, offset = float_text(controller.dt), float_text(controller.offset)
+    dt, offset = c_number(controller.dt), c_number(controller.offset)
     return _header(
         controller,
-        f"{len(controller.inputs)} inputs, {len(controller.outputs)} outputs, every {dt} s from "
-        f"{offset} s on.",
+        f"{counted(len(controller.inputs), 'input')}, "
+        f"{counted(len(controller.outputs), 'output')}, "
+        f"every {dt} s from {offset} s on.",
         f"""\
 #define {name.upper()}_DT {dt} /* s */
 
@@ -87,7 +93,7 @@ void {name}_step({name}_state *self, {t}const double inputs[], double outputs[])
     )
 
 
-def controller_source(controller: ExportedController) -> str:
+def _controller_source(controller: ExportedController) -> str:
     """Return the source: what the plan says, and the functions of the header around it."""
     name = controller.name
     t = "double t, " if controller.takes_time else ""
@@ -120,21 +126,22 @@ void {name}_step({name}_state *self, {t}const double inputs[], double outputs[])
     )
 
 
-def equations_header(equations: ExportedEquations) -> str:
+def _equations_header(equations: ExportedEquations) -> str:
     """Return the header: sizes, indices, initial states, three functions."""
     name, size = equations.name, equations.lowered.size
     memory = ", ".join(map(comment, equations.memory)) or "none"
     return _header(
         equations,
-        f"{len(equations.states)} states, {len(equations.inputs)} inputs, "
-        f"{len(equations.outputs)} outputs, in continuous time.",
+        f"{counted(len(equations.states), 'state')}, {counted(len(equations.inputs), 'input')}, "
+        f"{counted(len(equations.outputs), 'output')}, in continuous time.",
         f"""\
 #define {name.upper()}_ROOM {size}
 #define {name.upper()}_CONDITIONS {equations.conditions}
 #define {name.upper()}_MEMORY {len(equations.memory)}
 extern const double {name}_initial[{max(len(equations.states), 1)}];
 
-/* Compute what depends on parameters alone, such as {name}_parameters; c has {size} numbers. */
+/* What depends on parameters p alone, such as {name}_parameters.
+   c has {name.upper()}_ROOM places. */
 void {name}_prepare(const double p[], double c[]);
 
 /* Rates dx of states x.  Where one of g changes its sign a step should end; after each accepted
@@ -148,7 +155,7 @@ void {name}_outputs(double t, const double x[], const double u[], double c[], do
     )
 
 
-def equations_source(equations: ExportedEquations) -> str:
+def _equations_source(equations: ExportedEquations) -> str:
     """Return the source."""
     name = equations.name
     return _source(
@@ -208,9 +215,9 @@ def _source(
         function_text(module, name, exported.lowered.functions[plan], labels)
         for name, plan in plans.items()
     ]
-    counts = operations(module.text(), "\n".join(texts[1:]))
+    counts = counted_operations(module.text(), "\n".join(texts[1:]))
     values = ",\n".join(
-        f"  {float_text(value)} /* {comment(label)} */"
+        f"  {c_number(value)} /* {comment(label)} */"
         for label, value in exported.parameters.items()
     )
     name = exported.name
@@ -244,7 +251,7 @@ def _labels(exported: Exported) -> dict[str, str]:
 
 
 def _start(exported: Exported) -> str:
-    return ", ".join(map(float_text, exported.initial_state)) or "0.0"
+    return ", ".join(map(c_number, exported.initial_state)) or "0.0"
 
 
 def _taken(places: Sequence[int]) -> str:

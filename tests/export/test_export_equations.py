@@ -11,13 +11,13 @@ from extras import needed_program
 
 import nlctl
 from nlctl.errors import CompileError
-from nlctl.export import export_equations
+from nlctl.export import c_files, export_equations
 
 
 def shared(folder, equations):
     """Compile equations to a library that can be called."""
-    (folder / f"{equations.name}.h").write_text(equations.header)
-    (folder / f"{equations.name}.c").write_text(equations.source)
+    for file, text in c_files(equations).items():
+        (folder / file).write_text(text)
     command = [needed_program(("gcc", "clang")), *STRICT, "-O2", "-shared", "-fPIC",
                f"{equations.name}.c", "-lm", "-o", "library.so"]  # fmt: skip
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
@@ -72,7 +72,7 @@ def test_conditions_and_memories_are_counted():
         equations = export_equations(loop, name="loop")
         assert equations.conditions == conditions
         assert len(equations.memory) == len(memory)
-        assert f"#define LOOP_CONDITIONS {conditions}" in equations.header
+        assert f"#define LOOP_CONDITIONS {conditions}" in c_files(equations)["loop.h"]
 
 
 REFUSED = {

@@ -10,6 +10,7 @@ import pytest
 from extras import needed_program
 
 import nlctl
+from nlctl.export import c_files
 
 HERE = Path(__file__).parent.parent / "export"
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror"]
@@ -42,8 +43,8 @@ def recorded(parts, name, dt, steps, initial_state=None):
 def written(folder, controller):
     """Write a controller's files and those that run it; return the compiler's definitions."""
     name = controller.name
-    (folder / f"{name}.h").write_text(controller.header)
-    (folder / f"{name}.c").write_text(controller.source)
+    for file, text in c_files(controller).items():
+        (folder / file).write_text(text)
     for path in (HERE / "harness.c", *(HERE / "chip").iterdir()):
         shutil.copy(path, folder)
     time = "inputs[INPUTS], " if controller.takes_time else ""

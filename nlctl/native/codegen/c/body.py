@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 
-from ..ir.text import Value
+from ..ir.text import Operand, Value
 
 _TYPES = {"f": "double", "b": "int", "i": "uint64_t"}
 _SIGNS = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/"}
@@ -47,10 +47,10 @@ class CModule:
 
     def text(self) -> str:
         """Return all of it."""
-        tables = [
-            f"static const double {name}[{len(values)}] = {{{', '.join(map(float_text, values))}}};"
-            for values, name in self.tables.items()
-        ]
+        tables = []
+        for values, name in self.tables.items():
+            numbers = ", ".join(map(c_number, values))
+            tables.append(f"static const double {name}[{len(values)}] = {{{numbers}}};")
         found = "\n".join([*tables, *self.functions.values()])
         used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in found]
         return "\n".join([*used, found])
@@ -60,16 +60,13 @@ def _called(line: str) -> str:
     return line.split("(")[0].split()[-1]
 
 
-def float_text(x: float) -> str:
+def c_number(x: float) -> str:
     """Return a float that a C compiler reads bit by bit."""
     if math.isnan(x):
         return "NAN"
     if math.isinf(x):
         return "INFINITY" if x > 0 else "-INFINITY"
     return repr(float(x))
-
-
-Operand = Value | float
 
 
 class CBody:
@@ -112,7 +109,7 @@ class CBody:
     def literal(self, x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
         """Return a constant."""
         if kind == "f":
-            return Value(float_text(float(x)), 0)
+            return Value(c_number(float(x)), 0)
         return Value(str(int(x)) if kind == "b" else f"UINT64_C({int(x) % 2**64})", 0, kind)
 
     def wide(self, v: Operand, width: int) -> Value:

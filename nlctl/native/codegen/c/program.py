@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, cast
 
 from ....expressions.graph import Expr
 from ..ir.numbers import Writer, one_line
 from ..plan import Function, LoopOfLevel
 from .body import CBody, CModule
 
-_TURN = (4, 2, 1)  # elements that machine code adds up side by side
+if TYPE_CHECKING:
+    from ..ir.text import Body
+
+_TURN = (4, 2, 1)  # elements that machine code adds up at a time
 
 
 def function_text(module: CModule, name: str, function: Function, labels: Mapping[str, str]) -> str:
-    """Return the text of a function of arrays of numbers; the last arrays are written.
-
-    Parameters
-    ----------
-    module : CModule
-        Gets what the function calls.
-    name : str
-    function : Function
-    labels : mapping
-        What an entry is called, such as ``"x[3]"``.
-    """
+    """Return the text of a function of arrays; `labels` say what entries such as "x[3]" are."""
     b = CBody(module, labels)
     if function.copied:
         source, target = function.arguments[:2]
         b.write(f"memcpy({target}, {source}, {function.copied} * sizeof(double));")
-    writer = Writer(b, function.plan, 1, frozenset())
+    writer = Writer(cast("Body", b), function.plan, 1, frozenset())  # it has the same methods
     for level in function.plan.levels:
         writer.numbers(level.numbers)
         for loop in level.loops:
