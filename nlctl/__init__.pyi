@@ -1,4 +1,4 @@
-from . import actuators, controllers, faults, functions, native, paper, plants, references
+from . import actuators, controllers, export, faults, functions, native, paper, plants, references
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -239,6 +239,7 @@ __all__ = [
     "dynamic_surface_control",
     "ensemble_response",
     "equation",
+    "export",
     "faults",
     "fit",
     "functions",

@@ -206,6 +206,42 @@ def list_(
 
 
 @app.command()
+def export(
+    loop: LoopArgument,
+    block: Annotated[
+        str | None,
+        typer.Option(help="A controller of the loop; by default all equations of the loop."),
+    ] = None,
+    target: Annotated[
+        str,
+        typer.Option(help="c: C99; or LLVM's name of a machine, such as thumbv7em-none-eabihf."),
+    ] = "c",
+    dt: Annotated[
+        float | None, typer.Option(help="Sampling time in s of a block that is not sampled.")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(help="How it becomes one in discrete time: euler, ...")
+    ] = None,
+    set_: Set = None,
+    name: Annotated[
+        str | None, typer.Option(help="In front of all names in C; by default the block's.")
+    ] = None,
+    out: Annotated[Path, typer.Option("-o", "--out", help="Folder of the files.")] = Path("."),
+) -> None:
+    """Write a controller as C99 or object code: the program that the simulation runs.
+
+    Without --block all equations of the loop are written, for an integrator of your own.
+    """
+    from .exporting import write_export
+
+    files = write_export(
+        loop, block, target, dt=dt, method=method, settings=set_ or [], name=name, out=out
+    )
+    for path in files:
+        say(path)
+
+
+@app.command()
 def diagram(
     loop: LoopArgument,
     out: Annotated[Path, typer.Option("-o", "--out", help="File: .svg, .png, .pdf.")],

@@ -97,7 +97,18 @@ class Lowered:
     @cached_property
     def text(self) -> str:
         """The LLVM IR of its functions."""
-        return program_text(self.functions, self.lanes, self.exact, self.solvers.values())
+        return program_text(
+            self.functions, self.lanes, self.exact, self.solvers.values(), self.portable
+        )
+
+    @property
+    def portable(self) -> frozenset[str]:
+        """Functions that round alike on every processor: a computer's program is what runs there.
+
+        What samples compute, and what they read of parameters.
+        """
+        samples = {name for name in self.functions if name.startswith("sample")}
+        return frozenset(samples | {"prepare"} if samples else ())
 
     def holds_for(self, p: Any) -> bool:
         """Whether the program holds for parameters `p`, an array with a row per number."""

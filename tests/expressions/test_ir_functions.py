@@ -15,7 +15,6 @@ from nlctl.errors import CompileError
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.expressions.graph import numpy_function
 from nlctl.native.codegen.ir import functions as ir
-from nlctl.native.codegen.ir.memory import entry_address, load_value, store
 from nlctl.native.codegen.ir.text import Body, Module
 from nlctl.native.machine.finish import finished
 
@@ -98,12 +97,12 @@ def kernel(name, width=WIDTH, inlined=False):
     module = Module(inlined=inlined)
     b = Body(module)
     one, _, both = name.partition(" of ")
-    args = [load_value(b, f"%{array}", width if width > 1 else 0) for array in "xz"]
+    args = [b.load(f"%{array}", width if width > 1 else 0) for array in "xz"]
     if both:
         result = ir.sin_cos(b, args[0], {"sin", "cos"})[one]
     else:
         result = ir.applied(b, one, *args[: FUNCTIONS[one].count])
-    store(b, result, entry_address(b, "y", 0))
+    b.store(result, b.address("y", 0))
     text = f"define void @f(ptr %x, ptr %z, ptr %y) {{\nentry:\n{b.text()}  ret void\n}}\n"
     code = finished(module.text() + text, ["f"], {})
     call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(code.addresses["f"])

@@ -26,7 +26,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.export", "nlctl.__main__"],
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",
@@ -47,6 +47,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     "nlctl.native": [
         ["cache", "codegen", "purity", "rounding", "sliding"],  # know no diagram
         ["codegen.ir"],
+        ["codegen.c"],
         ["diagram"],
         ["declared", "opaque"],
         ["equations"],

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 from ...expressions.continuity import is_an_extreme
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
-from ..codegen.ir.memory import entry_address, load_value, store
 from ..codegen.ir.numbers import one_line
 from ..codegen.ir.text import Body, Module, Value
 from .arithmetic import (
@@ -178,7 +177,7 @@ class EnclosureWriter:
     def side(self, array: str, row: int) -> Ends:
         """Read an interval."""
         low, high = (
-            load_value(self.b, entry_address(self.b, array, (2 * row + k) * self.lanes), self.lanes)
+            self.b.load(self.b.address(array, (2 * row + k) * self.lanes), self.lanes)
             for k in (0, 1)
         )
         return Ends(low=low, high=high)
@@ -187,7 +186,7 @@ class EnclosureWriter:
         """Write values to consecutive rows."""
         for k, value in enumerate(values):
             wide = self.b.wide(value, self.lanes)
-            store(self.b, wide, entry_address(self.b, array, (row + k) * self.lanes))
+            self.b.store(wide, self.b.address(array, (row + k) * self.lanes))
 
     def may_jump(self, expr: Expr) -> Value | None:
         """Return where an expression may jump; None if nowhere."""
@@ -227,7 +226,7 @@ def _judge(
     box = [w.side("x", i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
-    inner, found = (entry_address(b, "o", at * lanes) for at in (rows.inner, rows.values))
+    inner, found = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
     b.write(f"call void @values(ptr {inner}, ptr {found})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
@@ -240,9 +239,7 @@ def _judge(
 
 
 def _read(w: EnclosureWriter, row: int) -> Ends:
-    low, high = (
-        load_value(w.b, entry_address(w.b, "o", (row + k) * w.lanes), w.lanes) for k in (0, 1)
-    )
+    low, high = (w.b.load(w.b.address("o", (row + k) * w.lanes), w.lanes) for k in (0, 1))
     return Ends(low=low, high=high)
 
 

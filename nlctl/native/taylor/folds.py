@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..codegen.ir.memory import load_value, store
 from ..codegen.ir.text import Body, Module, Value, constant
 from .recurrences import IS_FIRST_ROW, ORDER_ROW, RECIPROCAL_ROW, ROOM, Fold
 
@@ -66,7 +65,7 @@ def _orders_text(layout: SeriesLayout) -> str:
         name: b.new(f"getelementptr double, ptr %c, i64 {row * lanes}").text
         for name, row in layout.at.items()
     }
-    highest = b.new(f"fptosi {load_value(b, place['order'], 0)} to i64").text
+    highest = b.new(f"fptosi {b.load(place['order'], 0)} to i64").text
     b.write(f"call void @first(ptr %t, ptr %x, ptr %u, ptr %c, ptr {place['o']}, ptr %k)")
     b.write("br label %orders")
     b.begin("orders")
@@ -109,7 +108,7 @@ def _write_weights(b: Body, place: str, order: str, lanes: int) -> None:
     }
     for row, weight in weights.items():
         where = b.new(f"getelementptr double, ptr {place}, i64 {row * lanes}").text
-        store(b, b.wide(weight, lanes) if lanes > 1 else weight, where)
+        b.store(b.wide(weight, lanes) if lanes > 1 else weight, where)
 
 
 def _sums_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
@@ -166,7 +165,7 @@ def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
         key = (pointer, at, step)
         if key not in known:
             where = b.new(f"getelementptr double, ptr {pointer}, i64 {at}").text
-            one = load_value(b, where, width if step else 0)
+            one = b.load(where, width if step else 0)
             known[key] = one if step else b.wide(one, width)
         return known[key]
 
@@ -192,4 +191,4 @@ def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
     ]
     for s, result in zip(sums, results, strict=True):
         where = b.new(f"getelementptr double, ptr %{s.array}, i64 {s.target}").text
-        store(b, result, where)
+        b.store(result, where)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..codegen.ir.memory import load_value, store
 from ..codegen.ir.text import Body, Module, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
 from .folds import WIDE, SeriesLayout
@@ -52,7 +51,7 @@ class _Function:
     def setting(self, name: str) -> Value:
         """Read a setting from `c`."""
         where = self.place("c", str(self.at[name] * self.lanes))
-        return load_value(self.b, where, 0)
+        return self.b.load(where, 0)
 
     def highest(self) -> str:
         """Return the highest order."""
@@ -70,7 +69,7 @@ class _Function:
         return self.place("k", self.b.new(f"mul i64 {order}, {self.size}").text)
 
     def read(self, array: str, at: str, width: int) -> Value:
-        return load_value(self.b, self.place(array, at), width)
+        return self.b.load(self.place(array, at), width)
 
     # -- loops
 
@@ -120,7 +119,7 @@ class _Function:
         b, loop, after, width = self.b, self.b.label("orders"), self.b.label("value"), h.width
         top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
         read = self.magnitude if magnitudes else lambda value: value
-        start = [read(load_value(b, top, width))] + [constant(0.0, width)] * slope
+        start = [read(b.load(top, width))] + [constant(0.0, width)] * slope
         before = b.block
         b.write(f"br label %{loop}")
         b.begin(loop)
@@ -128,7 +127,7 @@ class _Function:
         b.lines += [""] * (2 + len(start))
         entries = [Value(f"%p{i}.{loop}", width) for i in range(len(start))]
         below = b.new(f"getelementptr double, ptr %c.{loop}, i64 {-self.size}").text
-        found = [b.add(b.mul(entries[0], h), read(load_value(b, below, width)))]
+        found = [b.add(b.mul(entries[0], h), read(b.load(below, width)))]
         if slope:
             found.append(b.add(b.mul(entries[1], h), entries[0]))
         left = b.new(f"add i64 %left.{loop}, -1").text
@@ -184,7 +183,7 @@ class _Function:
     def write_largest(self, values: Sequence[Value]) -> None:
         """Write the largest of each member."""
         for i, value in enumerate(values):
-            store(self.b, value, self.place("largest", str(i * self.lanes)))
+            self.b.store(value, self.place("largest", str(i * self.lanes)))
 
     def tolerances(self, count: int) -> tuple[Value, Value]:
         """Read rtol and atol."""
@@ -215,7 +214,7 @@ class _Function:
             found = []
             for order, before in zip(orders, largest, strict=True):
                 where = b.new(f"getelementptr double, ptr {order}, i64 {at}").text
-                part = b.mul(self.magnitude(load_value(b, where, width)), scale)
+                part = b.mul(self.magnitude(b.load(where, width)), scale)
                 found.append(self.larger(before, part))
             return found
 
@@ -228,7 +227,7 @@ class _Function:
         def write(at: str, _: Sequence[Value]) -> list[Value]:
             found = self.polynomial(highest, at, h, slope=True)
             for array, value in zip(("x", "slope"), found, strict=True):
-                store(self.b, value, self.place(array, at))
+                self.b.store(value, self.place(array, at))
             return []
 
         self.rows(n, 0, write)
@@ -236,7 +235,7 @@ class _Function:
     def steps(self, count: int) -> Value:
         """Read h."""
         width = self.width(count)
-        h = load_value(self.b, "%h", self.lanes if self.lanes > 1 else 0)
+        h = self.b.load("%h", self.lanes if self.lanes > 1 else 0)
         return self.b.wide(h, width) if width else h
 
     def judge(self, n: int, switching: int, compared: Sequence[int]) -> None:
@@ -256,7 +255,7 @@ class _Function:
             missed = b.mul(self.magnitude(b.mul(h, b.sub(dx, slope))), scale)
             missed = b.add(missed, b.mul(x_new, 0.0))
             where = b.new(f"getelementptr double, ptr {last}, i64 {at}").text
-            term = b.mul(self.magnitude(b.mul(power, load_value(b, where, width))), scale)
+            term = b.mul(self.magnitude(b.mul(power, b.load(where, width))), scale)
             parts = zip(largest, (missed, term), strict=True)
             return [self.larger(before, part) for before, part in parts]
 
@@ -277,7 +276,7 @@ class _Function:
             first = self.magnitude(self.read("k", here, width))
             orders = [b.new(f"add i64 {highest}, {-i}").text for i in range(2)]
             last, other = (
-                self.magnitude(load_value(b, b.new(
+                self.magnitude(b.load(b.new(
                     f"getelementptr double, ptr {self.coefficients(order)}, i64 {here}"
                 ).text, width))
                 for order in orders
@@ -300,7 +299,7 @@ class _Function:
 
         def write(at: str, _: Sequence[Value]) -> list[Value]:
             here = self.b.new(f"add i64 {at}, {n * self.lanes}").text
-            store(self.b, self.polynomial(highest, here, h, slope=False)[0], self.place("g", at))
+            self.b.store(self.polynomial(highest, here, h, slope=False)[0], self.place("g", at))
             return []
 
         self.rows(count, 0, write)

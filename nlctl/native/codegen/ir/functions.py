@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 
 from ....errors import CompileError
 from ....expressions.functions import FUNCTIONS
-from .text import RARELY, Body, Value, llvm_type
+from .text import Body, Value
 
 _LOG2_E, LN2 = 1.4426950408889634, (0.6931471805599453, 2.3190468138462996e-17)
 TWO_OVER_PI, HALF_PI = 0.6366197723675814, (
@@ -87,34 +87,7 @@ Results = tuple[Value, ...]
 
 def _call(b: Body, name: str, make: Callable[..., Results], *args: Value) -> Results:
     """Call a function of this module; it is written when it is first needed."""
-    values = b.same(*args)
-    width, count = values[0].width, 2 if make is _sin_and_cos else 1
-    kind = llvm_type(width)
-    kind = f"{{{kind}, {kind}}}" if count == 2 else kind
-    full = f"@nlctl.{name}.{width or 1}"
-    if full not in b.module.functions:
-        b.module.functions[full] = ""  # before those that it calls
-        b.module.functions[full] = _defined(b, full, kind, make, values)
-    found = b.new(f"call {kind} {full}({', '.join(map(str, values))})", width)
-    if count == 1:
-        return (found,)
-    return tuple(b.new(f"extractvalue {kind} {found.text}, {i}", width) for i in range(count))
-
-
-def _defined(b: Body, full: str, kind: str, make: Callable[..., Results], values: list[Value]):
-    """Return the text of a function."""
-    inner = Body(b.module)
-    args = [Value(f"%x{i}", v.width, v.kind) for i, v in enumerate(values)]
-    results = make(inner, *args)
-    last = str(results[0])
-    if len(results) > 1:
-        last = f"{kind} poison"
-        for i, v in enumerate(results):
-            last = f"{kind} {inner.new(f'insertvalue {last}, {v}, {i}').text}"
-    inner.write(f"ret {last}")
-    how = "alwaysinline" if b.module.inlined else "noinline"
-    given = ", ".join(map(str, args))
-    return f"define internal {kind} {full}({given}) {how} nounwind {{\nentry:\n{inner.text()}}}\n"
+    return b.called(name, make, b.same(*args), 2 if make is _sin_and_cos else 1)
 
 
 def _polynomial(b: Body, coefficients: Sequence[float], x: Value) -> Value:
@@ -151,11 +124,7 @@ def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
 
     Where the result may be small it is made in two steps, so that it underflows gradually.
     """
-    bits = b.bits(m)
-    more = b.integer(
-        "and", b.new(f"sext {small} to {llvm_type(y.width, 'i')}", y.width, "i"), _STEP
-    )
-    bits = b.new(f"add {bits}, {more.text}", y.width, "i")
+    bits = b.logic("add", b.bits(m), b.integer("and", b.mask(small), _STEP))
     y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
     return b.mul(y, b.select(small, 2.0**-_STEP, 1.0), exact=True)
 
@@ -206,17 +175,13 @@ def _sin_and_cos(b: Body, x: Value) -> Results:
     sine = b.muladd(b.mul(r, z), _polynomial(b, SIN, z), r)
     cosine = b.muladd(b.mul(z, z), _polynomial(b, COS, z), b.muladd(z, -0.5, 1.0))
     bits = b.bits(m)
-    odd = b.new(f"icmp slt {b.integer('shl', bits, 63)}, {_zero(x.width).text}", x.width, "b")
+    odd = b.is_negative(b.integer("shl", bits, 63))
     sign = -(2**63)
     in_sine = b.integer("and", b.integer("shl", bits, 62), sign)
     in_cosine = b.integer("and", b.integer("shl", b.integer("add", bits, 1), 62), sign)
     s = b.real(b.logic("xor", b.bits(b.select(odd, cosine, sine)), in_sine))
     c = b.real(b.logic("xor", b.bits(b.select(odd, sine, cosine)), in_cosine))
     return _exact_if_far(b, x, {"sin": s, "cos": c})
-
-
-def _zero(width: int) -> Value:
-    return Value("zeroinitializer" if width else "0", width, "i")
 
 
 def _sin(b: Body, x: Value) -> Results:
@@ -242,31 +207,7 @@ def _half_turn(b: Body, x: Value, m: Value, shift: float, sign: Value) -> Value:
 
 def _exact_if_far(b: Body, x: Value, near: dict[str, Value]) -> Results:
     """Return what is near, but the C library's values for the elements that are too large."""
-    far = b.any(b.compare("ogt", b.intrinsic("fabs", x), LARGEST_ANGLE))
-    here, rare, done = b.block, b.label("far"), b.label("near")
-    b.write(f"br {far}, label %{rare}, label %{done}, {RARELY}")
-    b.begin(rare)
-    exact = [_far(b, name, x, y) for name, y in near.items()]
-    b.write(f"br label %{done}")
-    b.begin(done)
-    return tuple(
-        b.new(f"phi {y.type} [{y.text}, %{here}], [{e.text}, %{rare}]", y.width)
-        for y, e in zip(near.values(), exact, strict=True)
-    )
-
-
-def _far(b: Body, name: str, x: Value, y: Value) -> Value:
-    """Call a function that is seldom called: it leaves all registers as they were."""
-    full, kind = f"@nlctl.far.{name}.{x.width or 1}", llvm_type(x.width)
-    if full not in b.module.functions:
-        inner, (given, known) = Body(b.module), (Value("%x", x.width), Value("%y", x.width))
-        is_far = inner.compare("ogt", inner.intrinsic("fabs", given), LARGEST_ANGLE)
-        found = inner.select(is_far, inner.each(name, given), known)
-        b.module.functions[full] = (
-            f"define internal preserve_allcc {kind} {full}({given}, {known}) "
-            f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {found}\n}}\n"
-        )
-    return b.new(f"call preserve_allcc {kind} {full}({x}, {y})", x.width)
+    return b.unless_larger(x, LARGEST_ANGLE, near)
 
 
 # -- choices ---------------------------------------------------------------------------------------

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
-from .memory import entry_address, load_value, store
 from .numbers import Writer, one_line
 from .text import Value, constant, float_text
 
@@ -103,8 +102,8 @@ class _Loop:
         for each in self.loop.stores:
             self._reads((each.expr,), index, at)
             array, row, step = each.array, each.row, self.lanes
-            where = entry_address(self.b, array, (row + at) * step, index, step)
-            store(self.b, self.b.wide(w.names[each.expr], self.chunk), where)
+            where = self.b.address(array, (row + at) * step, index, step)
+            self.b.store(self.b.wide(w.names[each.expr], self.chunk), where)
         w.names, w.pairs = outer, pairs
 
     def _kept(self, term: Value, skipped: int) -> Value:
@@ -127,13 +126,11 @@ class _Loop:
         array, row, step = self.w.plan.elements(vector)
         if self.lanes > 1:
             first = (row + step * at) * self.lanes
-            return load_value(
-                b, entry_address(b, array, first, index, step * self.lanes), self.chunk
-            )
+            return b.load(b.address(array, first, index, step * self.lanes), self.chunk)
         if step == 1:
-            return load_value(b, entry_address(b, array, row + at, index), self.chunk)
+            return b.load(b.address(array, row + at, index), self.chunk)
         parts = [
-            load_value(b, entry_address(b, array, row + step * (at + k), index, step), 0)
+            b.load(b.address(array, row + step * (at + k), index, step), 0)
             for k in range(self.chunk)
         ]
         return b.gathered(parts, self.chunk)
@@ -148,5 +145,5 @@ class _Loop:
         moved = b.new(f"add i64 {index}, {at}").text
         where = b.new(f"getelementptr double, ptr {b.module.table(vector.data)}, i64 {moved}").text
         if self.lanes > 1:
-            return b.wide(load_value(b, where, 0), self.chunk)
-        return load_value(b, where, self.chunk)
+            return b.wide(b.load(where, 0), self.chunk)
+        return b.load(where, self.chunk)

@@ -8,8 +8,7 @@ from typing import Any
 from ....expressions.graph import COMPARISONS, LOGIC, Expr
 from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
-from .memory import entry_address, load_value, store
-from .text import Body, Value, constant
+from .text import Body, Value
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
@@ -41,7 +40,7 @@ class Writer:
         kinds = Counter(
             a for n in plan.nodes for a in n.args if n.op in ("sin", "cos") and n not in plan.known
         )
-        self.both = {angle for angle, count in kinds.items() if count == 2}
+        self.both = {angle for angle, count in kinds.items() if count == 2 and not b.portable}
 
     def number(self, node: Expr) -> None:
         """Compute or read a number, and write it where it is to lie."""
@@ -55,16 +54,14 @@ class Writer:
                 self.names[node] = self.operation(node)
             else:
                 array, row = where
-                self.names[node] = load_value(
-                    self.b, entry_address(self.b, array, row * self.lanes), self.width
-                )
+                self.names[node] = self.b.load(self.b.address(array, row * self.lanes), self.width)
         self.stored(node)
 
     def stored(self, node: Expr) -> None:
         """Write a number where it is to lie."""
         for array, row in self.plan.places.get(node, ()):
             value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
-            store(self.b, value, entry_address(self.b, array, row * self.lanes))
+            self.b.store(value, self.b.address(array, row * self.lanes))
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""
@@ -79,13 +76,13 @@ class Writer:
         """Return an operation on what has names already."""
         b, args = self.b, [self.names[a] for a in node.args]
         if node.op == "const":
-            return constant(node.data, self.width, "b" if node.kind == "b" else "f")
+            return b.literal(node.data, self.width, "b" if node.kind == "b" else "f")
         if node.op in ARITHMETIC:
             return b.op(ARITHMETIC[node.op], *args, exact=node in self.exact)
         if node.op in COMPARISONS:
             return b.compare(_COMPARE[node.op], *args)
         if node.op == "not":
-            return b.logic("xor", args[0], constant(True, args[0].width, "b"))
+            return b.logic("xor", args[0], b.literal(True, args[0].width, "b"))
         if node.op in LOGIC:
             return b.logic(node.op, *args)
         if node.op == "neg":
@@ -108,7 +105,7 @@ class Writer:
 
     def numbers(self, nodes: tuple[Expr, ...]) -> None:
         """Compute the numbers of a level; those of one member four at a time where that pays."""
-        if self.lanes > 1:
+        if self.lanes > 1 or self.b.portable:
             for node in nodes:
                 self.number(node)
             return

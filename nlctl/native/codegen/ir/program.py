@@ -27,10 +27,14 @@ def program_text(
     lanes: int,
     exact: Collection[Expr],
     solvers: Iterable[Solver] = (),
+    portable: Collection[str] = (),
 ) -> str:
-    """Return the IR of some functions."""
+    """Return the IR of some functions; of the portable ones every operation rounds alike."""
     module = Module(inlined=lanes == 1)
-    texts = [_function(module, name, f, lanes, exact) for name, f in functions.items()]
+    texts = [
+        _function(module, name, f, lanes, exact, portable=name in portable)
+        for name, f in functions.items()
+    ]
     for solver in solvers:
         module.declared[COPY] = None
         step = f"{solver.name}.step"
@@ -41,9 +45,9 @@ def program_text(
 
 def _function(
     module: Module, name: str, function: Function, lanes: int, exact: Collection[Expr],
-    linkage: str = "",
+    linkage: str = "", portable: bool = False,
 ) -> str:  # fmt: skip
-    b = Body(module)
+    b = Body(module, portable)
     if function.copied:
         module.declared[COPY] = None
         source, target = function.arguments[:2]

@@ -8,8 +8,9 @@ instruction would take ten times as long as all the rest.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 _KINDS = {"f": "double", "b": "i1", "i": "i64"}
 RARELY = "!prof !0"  # the first way of a branch is all but never taken
@@ -100,11 +101,19 @@ class Body:
     """The instructions of one function, and what writes the next one.
 
     Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
-    Where ``exact`` is given it is not.  A float beside a vector is meant in every element.
+    Where ``exact`` is given it is not.  A float next to a vector is meant in every element.
+
+    Parameters
+    ----------
+    module : Module
+    portable : bool
+        Whether every operation rounds in the same way on every processor, and whatever else a
+        function computes: nothing is contracted, what may be rounded once is, and each sine has a
+        polynomial of its own.
     """
 
-    def __init__(self, module: Module) -> None:
-        self.module = module
+    def __init__(self, module: Module, portable: bool = False) -> None:
+        self.module, self.portable = module, portable
         self.lines: list[str] = []
         self.block = "entry"
         self._count = self._labels = 0
@@ -127,6 +136,10 @@ class Body:
         name = f"%v{self._count}"
         self.lines.append(f"{name} = {text}")
         return Value(name, width, kind)
+
+    def literal(self, x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
+        """Return a constant, repeated in every element."""
+        return constant(x, width, kind)
 
     # -- elements
 
@@ -169,7 +182,8 @@ class Body:
     def op(self, name: str, a: Operand, b: Operand, *, exact: bool = False) -> Value:
         """Return ``fadd``, ``fsub``, ``fmul`` or ``fdiv`` of two values."""
         x, y = self.same(a, b)
-        return self.new(f"{name} {'' if exact else 'contract '}{x}, {y.text}", x.width)
+        how = "" if exact or self.portable else "contract "
+        return self.new(f"{name} {how}{x}, {y.text}", x.width)
 
     def add(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
         return self.op("fadd", a, b, exact=exact)
@@ -188,8 +202,8 @@ class Body:
         return self.intrinsic("fma", a, b, c)
 
     def muladd(self, a: Operand, b: Operand, c: Operand) -> Value:
-        """Return a b + c, rounded once where that is fast."""
-        return self.intrinsic("fmuladd", a, b, c)
+        """Return a b + c, rounded once where that is fast, or everywhere."""
+        return self.intrinsic("fma" if self.portable else "fmuladd", a, b, c)
 
     def intrinsic(self, name: str, *values: Operand) -> Value:
         """Call one of LLVM's own functions of floats."""
@@ -233,6 +247,15 @@ class Body:
         """Return an operation on integers and a constant one."""
         return self.new(f"{name} {a}, {constant(b, a.width, 'i').text}", a.width, "i")
 
+    def mask(self, c: Value) -> Value:
+        """Return all bits where a condition holds, none elsewhere."""
+        return self.new(f"sext {c} to {llvm_type(c.width, 'i')}", c.width, "i")
+
+    def is_negative(self, a: Value) -> Value:
+        """Return whether integers are below 0."""
+        zero = "zeroinitializer" if a.width else "0"
+        return self.new(f"icmp slt {a}, {zero}", a.width, "b")
+
     def bits(self, a: Value) -> Value:
         return self.new(f"bitcast {a} to {llvm_type(a.width, 'i')}", a.width, "i")
 
@@ -245,6 +268,94 @@ class Body:
             return c
         bits = self.new(f"bitcast {c} to i{c.width}")
         return self.new(f"icmp ne i{c.width} {bits.text}, 0", 0, "b")
+
+    # -- functions of the module
+
+    def called(
+        self, name: str, make: Callable[..., tuple[Value, ...]], args: list[Value], count: int
+    ) -> tuple[Value, ...]:
+        """Call a function with some results, which `make` writes when it is first needed."""
+        width, full = args[0].width, self._full(name, args[0].width)
+        kind = llvm_type(width)
+        kind = f"{{{kind}, {kind}}}" if count == 2 else kind
+        if full not in self.module.functions:
+            self.module.functions[full] = ""  # before those that it calls
+            self.module.functions[full] = self._defined(full, kind, make, args)
+        found = self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
+        if count == 1:
+            return (found,)
+        return tuple(
+            self.new(f"extractvalue {kind} {found.text}, {i}", width) for i in range(count)
+        )
+
+    def _full(self, name: str, width: int) -> str:
+        return f"@nlctl.{name}.{width or 1}{'.portable' if self.portable else ''}"
+
+    def _defined(self, full: str, kind: str, make: Callable[..., Any], args: list[Value]) -> str:
+        """Return the text of a function."""
+        inner = Body(self.module, self.portable)
+        given = [Value(f"%x{i}", v.width, v.kind) for i, v in enumerate(args)]
+        results = make(inner, *given)
+        last = str(results[0])
+        if len(results) > 1:
+            last = f"{kind} poison"
+            for i, v in enumerate(results):
+                last = f"{kind} {inner.new(f'insertvalue {last}, {v}, {i}').text}"
+        inner.write(f"ret {last}")
+        how = "alwaysinline" if self.module.inlined else "noinline"
+        taken = ", ".join(map(str, given))
+        return (
+            f"define internal {kind} {full}({taken}) {how} nounwind {{\nentry:\n{inner.text()}}}\n"
+        )
+
+    def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
+        """Return values, but those of the C library where |x| is larger than a limit, as seldom."""
+        far = self.any(self.compare("ogt", self.intrinsic("fabs", x), limit))
+        here, rare, done = self.block, self.label("far"), self.label("near")
+        self.write(f"br {far}, label %{rare}, label %{done}, {RARELY}")
+        self.begin(rare)
+        exact = [self._seldom(name, x, limit, y) for name, y in near.items()]
+        self.write(f"br label %{done}")
+        self.begin(done)
+        return tuple(
+            self.new(f"phi {y.type} [{y.text}, %{here}], [{e.text}, %{rare}]", y.width)
+            for y, e in zip(near.values(), exact, strict=True)
+        )
+
+    def _seldom(self, name: str, x: Value, limit: float, y: Value) -> Value:
+        """Call a function that is seldom called: it leaves all registers as they were."""
+        full, kind = f"@nlctl.far.{name}.{x.width or 1}", llvm_type(x.width)
+        if full not in self.module.functions:
+            inner, (given, known) = Body(self.module), (Value("%x", x.width), Value("%y", x.width))
+            is_far = inner.compare("ogt", inner.intrinsic("fabs", given), limit)
+            found = inner.select(is_far, inner.each(name, given), known)
+            self.module.functions[full] = (
+                f"define internal preserve_allcc {kind} {full}({given}, {known}) "
+                f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {found}\n}}\n"
+            )
+        return self.new(f"call preserve_allcc {kind} {full}({x}, {y})", x.width)
+
+    # -- memory
+
+    def address(self, array: str, at: int, index: str | None = None, step: int = 1) -> str:
+        """Return the address of entry `at` of an array, or of ``index * step + at``."""
+        if index is None:
+            return (
+                self.new(f"getelementptr double, ptr %{array}, i64 {at}").text
+                if at
+                else (f"%{array}")
+            )
+        scaled = self.new(f"mul i64 {index}, {step}").text if step != 1 else index
+        moved = self.new(f"add i64 {scaled}, {at}").text if at else scaled
+        return self.new(f"getelementptr double, ptr %{array}, i64 {moved}").text
+
+    def load(self, where: str, width: int) -> Value:
+        """Return the number, or as many as a vector has, at an address."""
+        return self.new(f"load {llvm_type(width)}, ptr {where}, align 8", width)
+
+    def store(self, value: Value, where: str) -> None:
+        """Write a number or vector to an address."""
+        self.write(f"store {value}, ptr {where}, align 8")
 
     # -- control
 

@@ -1,0 +1,61 @@
+"""``nlctl export``: a controller, or all equations of a loop, as code for other machines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from nlctl.errors import ParameterError
+from nlctl.export import TARGETS, c_files, export_controller, export_equations, object_code
+from nlctl.host.files import replace_file
+from nlctl.names import unknown
+
+__all__ = ["write_export"]
+
+
+def write_export(
+    loop: str,
+    block: str | None,
+    target: str,
+    *,
+    dt: float | None,
+    method: str | None,
+    settings: Sequence[str],
+    name: str | None,
+    out: Path,
+) -> list[Path]:
+    """Write what a loop's name stands for; return the files.
+
+    All content is made before the first file is written.
+    """
+    from .loops import assignments, named_loop
+
+    if target != "c" and target not in TARGETS:
+        raise unknown("target", target, ["c", *TARGETS], "of export")
+    content: dict[str, str | bytes] = {}
+    diagram = named_loop(loop)
+    params, start = assignments(diagram, settings)
+    if block is None:
+        if dt is not None or method is not None or target != "c":
+            raise ParameterError(
+                "export of a whole loop is C in continuous time: name a --block for object code, "
+                "--dt and --method"
+            )
+        equations = export_equations(diagram, params=params, initial_state=start, name=name)
+        content |= c_files(equations)
+    else:
+        controller = export_controller(
+            diagram, block, dt=dt, method=method, params=params, initial_state=start, name=name
+        )
+        content |= c_files(controller)
+        if target != "c":
+            del content[f"{controller.name}.c"]
+            content[f"{controller.name}.o"] = object_code(controller, target)
+    out.mkdir(parents=True, exist_ok=True)
+    return [_written(out / file, text) for file, text in content.items()]
+
+
+def _written(path: Path, content: str | bytes) -> Path:
+    """Write a file in one step."""
+    data = content.encode() if isinstance(content, str) else content
+    return replace_file(path, lambda file: file.write(data))

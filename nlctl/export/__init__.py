@@ -1,0 +1,18 @@
+"""Controllers and equations as code for other machines: C99 that is read, object code to link."""
+
+from .controller import export_controller
+from .equations import export_equations
+from .objects import TARGETS, Target, object_code
+from .records import ExportedController, ExportedEquations
+from .source import c_files
+
+__all__ = [
+    "TARGETS",
+    "ExportedController",
+    "ExportedEquations",
+    "Target",
+    "c_files",
+    "export_controller",
+    "export_equations",
+    "object_code",
+]

@@ -1,0 +1,74 @@
+"""Names and numbers of a program in C: labels as comments and as indices."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import CompileError, ParameterError
+from ..native import Compiled
+
+_RESERVED = re.compile(
+    "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|"
+    "inline|int|long|register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|"
+    "union|unsigned|void|volatile|while"
+)
+
+
+def c_name(name: str) -> str:
+    """Return a name, checked to be one in C."""
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or _RESERVED.fullmatch(name):
+        raise ParameterError(f"'{name}' is not a name in C: give name= of letters, digits and '_'")
+    return name
+
+
+def comment(text: str) -> str:
+    """Return a text that ends no comment and is ASCII."""
+    return text.encode("ascii", "replace").decode().replace("*/", "* /").replace("/*", "/ *")
+
+
+def enumeration(prefix: str, labels: Iterable[str], *, begins: bool = False) -> str:
+    """Return the indices of an array as names; of labels of arrays, where these begin."""
+    places = dict(enumerate(labels))
+    count = len(places)
+    if begins:
+        places = {
+            i: re.sub(r"(\[0\])+$", "", label)
+            for i, label in places.items()
+            if not re.search(r"\[\d*[1-9]\d*\]", label)
+        }
+    names = [f"{prefix}_{re.sub(r'[^A-Za-z0-9]+', '_', v).strip('_')}" for v in places.values()]
+    if len(set(names)) < len(names):  # such as a.b and a_b
+        names = [f"{name}_{i}" for i, name in zip(places, names, strict=True)]
+    lines = [f"  {name} = {i}," for i, name in zip(places, names, strict=True)]
+    return "\n".join(["enum {", *lines, f"  {prefix}S = {count}", "};"])
+
+
+def parameter_values(compiled: Compiled, p: np.ndarray) -> dict[str, float]:
+    """Return every number of the parameter vector by its name."""
+    names = {}
+    for slots in compiled.program.layout.values():
+        for slot in slots.values():
+            for k, index in enumerate(np.ndindex(slot.shape)):
+                names[slot.offset + k] = slot.name + "".join(f"[{i}]" for i in index)
+    return {names.get(i, f"p[{i}]"): float(value) for i, value in enumerate(p)}
+
+
+def check_written_out(compiled: Compiled, what: str) -> None:
+    """Refuse functions that are called, and algebraic loops that are searched."""
+    for reason in compiled.lowered.opaque.values():
+        raise CompileError(f"'{what}' cannot be exported: a function of it is called ({reason})")
+    if compiled.lowered.solvers:
+        raise CompileError(
+            f"'{what}' cannot be exported: it has an algebraic loop, whose signals are searched for"
+        )
+
+
+def digest(text: str, parameters: Mapping[str, float], start: np.ndarray, more: Any = ()) -> str:
+    """Return a key of a program and its numbers."""
+    content = repr((text, list(parameters.items()), start.tolist(), more))
+    return hashlib.sha256(content.encode()).hexdigest()[:16]

@@ -1,0 +1,95 @@
+"""Equations in C: the rates and outputs of the diagram, and where it switches."""
+
+import ctypes
+import subprocess
+
+import control as ct
+import numpy as np
+import pytest
+from exported import STRICT
+from extras import needed_program
+
+import nlctl
+from nlctl.errors import CompileError
+from nlctl.export import c_files, export_equations
+
+
+def shared(folder, equations):
+    """Compile equations to a library that can be called."""
+    for file, text in c_files(equations).items():
+        (folder / file).write_text(text)
+    command = [needed_program(("gcc", "clang")), *STRICT, "-O2", "-shared", "-fPIC",
+               f"{equations.name}.c", "-lm", "-o", "library.so"]  # fmt: skip
+    subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    return ctypes.CDLL(str(folder / "library.so"))
+
+
+def evaluated(folder, equations, points):
+    """Return rates and outputs at some points (t, x, u)."""
+    library, name, low = shared(folder, equations), equations.name, equations.lowered
+    parameters = np.array([*equations.parameters.values()])
+    c, dx, y = np.zeros(low.size), np.zeros(low.rows["x"]), np.zeros(low.rows["y"] + 1)
+    g, m = np.zeros(low.rows["g"] + 1), np.zeros(low.rows["m"] + 1)
+
+    def pointer(array):
+        return ctypes.c_void_p(array.ctypes.data)
+
+    library[f"{name}_prepare"](pointer(parameters), pointer(c))
+    found = []
+    for t, x, u in points:
+        now = ctypes.c_double(t)
+        library[f"{name}_rates"](now, *map(pointer, (x, u, c, dx, g, m)))
+        library[f"{name}_outputs"](now, *map(pointer, (x, u, c, y)))
+        found.append((dx.copy(), y[: len(equations.outputs)].copy()))
+    return found
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("example", ["example_1", "example_2"])
+def test_rates_and_outputs_are_those_of_python_control(tmp_path, example):
+    loop = getattr(nlctl.paper, example)()
+    equations = export_equations(loop, name=example)
+    rng = np.random.default_rng(3)
+    points = [
+        (float(t), nlctl.initial_state(loop) + 0.3 * rng.normal(size=loop.nstates),
+         np.zeros(max(loop.ninputs or 0, 1)))
+        for t in rng.uniform(0, 20, 50)
+    ]  # fmt: skip
+    for (t, x, u), (dx, y) in zip(points, evaluated(tmp_path, equations, points), strict=True):
+        u = u[: loop.ninputs or 0]
+        expected = loop.dynamics(t, x, u)
+        np.testing.assert_allclose(dx, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
+        np.testing.assert_allclose(y, loop.output(t, x, u), rtol=1e-12, atol=1e-12)
+
+
+def test_conditions_and_memories_are_counted():
+    """A dead zone has two kinks, a play remembers one state."""
+    plant = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="plant")
+    for actuator, conditions, memory in ((nlctl.DeadZone(), 2, ()), (nlctl.Backlash(), 2, ("v",))):
+        loop = nlctl.interconnect(
+            [nlctl.block(actuator, "actuator"), plant], inputs="u", outputs="y"
+        )
+        equations = export_equations(loop, name="loop")
+        assert equations.conditions == conditions
+        assert len(equations.memory) == len(memory)
+        assert f"#define LOOP_CONDITIONS {conditions}" in c_files(equations)["loop.h"]
+
+
+REFUSED = {
+    "sampled blocks": lambda: nlctl.sampled(
+        ct.ss([], [], [], -1.0, 0.1, inputs="y", outputs="u", name="law")
+    ),
+    "transport delays": lambda: nlctl.block(
+        nlctl.TransportDelay(delay=0.1), "law", inputs="y", outputs="u"
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_three_functions_cannot_say_is_refused(what):
+    plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
+    loop = nlctl.interconnect(
+        [plant, REFUSED[what]()], inputs=[], inplist=[], outputs="y", name="l"
+    )
+    with pytest.raises(CompileError, match=what):
+        export_equations(loop)
