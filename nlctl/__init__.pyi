@@ -1,4 +1,4 @@
-from . import actuators, controllers, faults, functions, native, paper, plants, references
+from . import actuators, controllers, faults, functions, native, paper, plants, references, sources
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -123,6 +123,7 @@ from .sensitivities import (
     tune,
 )
 from .sliding import IdealRelay
+from .sources import Chirp, Pulse, PulseTrain, Ramp, Sine, Square, Step, TimeTable
 
 __all__ = [
     "PID",
@@ -142,6 +143,7 @@ __all__ = [
     "BoucWen",
     "CacheWarning",
     "ChatteringError",
+    "Chirp",
     "Clock",
     "CompileError",
     "Compiled",
@@ -196,8 +198,11 @@ __all__ = [
     "Preisach",
     "PrescribedPerformance",
     "ProjectedWeights",
+    "Pulse",
+    "PulseTrain",
     "PureFeedback",
     "Quantiser",
+    "Ramp",
     "RateLimiter",
     "ReferenceModel",
     "Relay",
@@ -207,14 +212,18 @@ __all__ = [
     "Saturation",
     "SecondOrderLag",
     "SensitivityResponse",
+    "Sine",
     "SlidingModeLaw",
     "Spec",
+    "Square",
     "StatePredictor",
+    "Step",
     "StickSlip",
     "Stop",
     "Stribeck",
     "SumOfSines",
     "SuperTwistingLaw",
+    "TimeTable",
     "TransportDelay",
     "TriggeredHold",
     "Tuned",
@@ -264,6 +273,7 @@ __all__ = [
     "sampled",
     "sensitivity_response",
     "sliding_mode",
+    "sources",
     "state_names",
     "tune",
     "typeset",

@@ -22,7 +22,8 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
         "nlctl.responses",
     ]
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
-    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
+    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.sources", "nlctl.controllers"]
+    + ["nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],
     ["nlctl.native"],
