@@ -31,6 +31,7 @@ from .actuators import (
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
+    PID2,
     AdaptiveDeadZoneInverse,
     AdaptiveWeights,
     AffineRegressor,
@@ -74,6 +75,7 @@ from .controllers import (
     mrac,
     replaced,
     sliding_mode,
+    standard_pid,
 )
 from .delays import TransportDelay
 from .describing import LimitCycle, describing_function, describing_function_plot, limit_cycles
@@ -127,6 +129,7 @@ from .sources import Chirp, Pulse, PulseTrain, Ramp, Sine, Square, Step, TimeTab
 
 __all__ = [
     "PID",
+    "PID2",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AffineRegressor",
@@ -274,6 +277,7 @@ __all__ = [
     "sensitivity_response",
     "sliding_mode",
     "sources",
+    "standard_pid",
     "state_names",
     "tune",
     "typeset",
