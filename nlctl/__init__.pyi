@@ -1,4 +1,15 @@
-from . import actuators, controllers, faults, functions, native, paper, plants, references, sources
+from . import (
+    actuators,
+    controllers,
+    faults,
+    functions,
+    native,
+    observers,
+    paper,
+    plants,
+    references,
+    sources,
+)
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -108,6 +119,7 @@ from .native import (
     linearize,
     typeset,
 )
+from .observers import ExtendedKalmanFilter, HighGainObserver, LuenbergerObserver, luenberger
 from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
@@ -165,6 +177,7 @@ __all__ = [
     "EModifiedWeights",
     "EngineWarning",
     "Ensemble",
+    "ExtendedKalmanFilter",
     "ExtremumSeeking",
     "Fault",
     "FilteredError",
@@ -179,6 +192,7 @@ __all__ = [
     "GaussianBasis",
     "GeneralisedPrandtlIshlinskii",
     "Genesio",
+    "HighGainObserver",
     "HistoryStack",
     "IdealRelay",
     "InexactWarning",
@@ -188,6 +202,7 @@ __all__ = [
     "LimitCycle",
     "LinearRegressor",
     "LuGre",
+    "LuenbergerObserver",
     "MetricGradient",
     "ModelError",
     "ModelReferenceLaw",
@@ -262,9 +277,11 @@ __all__ = [
     "latin_hypercube_centres",
     "limit_cycles",
     "linearize",
+    "luenberger",
     "metric_gradient",
     "mrac",
     "native",
+    "observers",
     "paper",
     "param",
     "parameters",

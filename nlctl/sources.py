@@ -69,7 +69,7 @@ class Step:
         """The value on either side of the step."""
         if t >= p.t_step:
             return (p.offset + p.height,)
-        return (p.offset + 0.0 * t,)
+        return (p.offset,)
 
 
 @record
@@ -184,7 +184,7 @@ class Square:
             return (p.offset,)
         if since_period(t, p.t_start, p.period) < p.duty * p.period:
             return (p.offset + p.amplitude,)
-        return (p.offset - p.amplitude + 0.0 * t,)
+        return (p.offset - p.amplitude,)
 
 
 @record
@@ -226,7 +226,7 @@ class Pulse:
         """High within the pulse."""
         if p.t_start <= t < p.t_start + p.width:
             return (p.offset + p.height,)
-        return (p.offset + 0.0 * t,)
+        return (p.offset,)
 
 
 @record
@@ -273,7 +273,7 @@ class PulseTrain:
         """High at the beginning of each period."""
         if t >= p.t_start and since_period(t, p.t_start, p.period) < p.width:
             return (p.offset + p.height,)
-        return (p.offset + 0.0 * t,)
+        return (p.offset,)
 
 
 @record
@@ -419,4 +419,4 @@ class TimeTable:
             return (p.values[-1],)
         here = (p.times[:-1] <= t) & (t < p.times[1:])
         pieces = p.values[:-1] + p.slopes * (t - p.times[:-1])
-        return (np.sum(np.where(here, pieces, 0.0)) + 0.0 * t,)
+        return (np.sum(np.where(here, pieces, 0.0)),)

@@ -26,6 +26,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     + ["nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],
+    ["nlctl.observers"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.__main__"],
     [
@@ -84,6 +85,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["library"],
         ["staged", "stage"],
         ["derivatives", "trace"],
+        ["jacobian_source"],
     ],
     "nlctl.analysis.lyapunov": [
         ["bounds", "convex"],
