@@ -19,26 +19,10 @@ _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 
 
 def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
-    """Make the Jacobian of a function by its first argument.
+    """Make the Jacobian of ``function(x, ...)`` by x, of n numbers; others have these sizes.
 
-    Parameters
-    ----------
-    function : callable
-        ``function(x, ...)`` of arrays, which returns numbers.
-    n : int
-        Size of `x`, at most 8.
-    *others : int
-        Sizes of the other arguments.
-
-    Returns
-    -------
-    callable
-        With the same arguments; it returns an array of shape (results, n).
-
-    Raises
-    ------
-    Untraceable
-        If the function cannot be read, or has no derivative.
+    It takes the same arguments and returns an array of shape (results, n).  What cannot be read,
+    or has no derivative, is `Untraceable`.
     """
     graph, names = Graph(), "abcdefgh"[: 1 + len(others)]
 

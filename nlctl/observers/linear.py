@@ -11,6 +11,7 @@ from ..arguments import of_type
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
+from ..wording import counted
 from .signals import estimate_names, set_names
 
 __all__ = ["LuenbergerObserver", "luenberger"]
@@ -70,8 +71,9 @@ class LuenbergerObserver:
             if shape != wanted[key]:
                 rows, columns = wanted[key]
                 raise ParameterError(
-                    f"LuenbergerObserver needs {key} of shape {rows} x {columns} for {n} states, "
-                    f"inputs {m} and outputs {k}, got {shape[0]} x {shape[1]}"
+                    f"LuenbergerObserver needs {key} of shape {rows} x {columns} for "
+                    f"{counted(n, 'state')}, {counted(m, 'input')} and {counted(k, 'output')}, got "
+                    f"{shape[0]} x {shape[1]}"
                 )
         set_names(self, "known", m)
         set_names(self, "measured", k)
@@ -154,11 +156,12 @@ def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
     wanted = np.sort_complex(np.atleast_1d(poles))
     if wanted.size != plant.nstates:
         raise ParameterError(
-            f"luenberger needs {plant.nstates} poles for '{plant.name}', got {wanted.size}"
+            f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got {wanted.size}"
         )
     equal = np.unique(wanted).size < wanted.size and plant.noutputs == 1
     try:
-        gain = np.asarray((ct.acker if equal else ct.place)(plant.A.T, plant.C.T, wanted)).T
+        dual = (ct.acker if equal else ct.place)(plant.A.T, plant.C.T, wanted)
+        gain = np.reshape(dual, (plant.noutputs, plant.nstates)).T
         found = np.sort_complex(np.linalg.eigvals(plant.A - gain @ plant.C))
         off = np.max(np.abs(np.poly(found) - np.poly(wanted)))
     except (ValueError, np.linalg.LinAlgError) as error:
