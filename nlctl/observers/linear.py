@@ -156,7 +156,8 @@ def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
     wanted = np.sort_complex(np.atleast_1d(poles))
     if wanted.size != plant.nstates:
         raise ParameterError(
-            f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got {wanted.size}"
+            f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got "
+            f"{wanted.size}"
         )
     equal = np.unique(wanted).size < wanted.size and plant.noutputs == 1
     try:
