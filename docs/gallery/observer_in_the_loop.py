@@ -3,8 +3,8 @@ Observers in the loop
 =====================
 
 A pendulum is held upright by its angle alone. The high-gain observer is fast and peaks: the error of the speed has a
-maximum of :math:`e^{-1} / \varepsilon` times that of the angle. The Luenberger observer of the linearised pendulum and the
-extended Kalman filter begin calmly.
+maximum of :math:`e^{-1} / \varepsilon` times that of the angle. ``LuenbergerObserver``, of the linearised pendulum, and
+``ExtendedKalmanFilter`` begin more calmly.
 """
 
 import control as ct

@@ -38,8 +38,8 @@ for kind in ("none", "clamping", "back-calculation"):
     axes[1, 1].plot(t, u)
 axes[0, 0].set(ylabel="y", title="no limit")
 axes[0, 1].set(title="u at most 3.2")
-axes[1, 0].set(xlabel="t (s)", ylabel="u", ylim=(-2, 12))
-axes[1, 1].set(xlabel="t (s)", ylim=(-2, 12))
+axes[1, 0].set(xlabel="t (s)", ylabel="u", ylim=(-0.5, 5))
+axes[1, 1].set(xlabel="t (s)", ylim=(-0.5, 5))
 axes[0, 0].legend(fontsize="small")
 axes[0, 1].legend(fontsize="small")
 

@@ -290,7 +290,7 @@ def standard_pid(
     T_t : float, optional
         Tracking time (s); by default sqrt(T_i T_d), and T_i without a derivative (Åström,
         Hägglund, PID Controllers, 2nd ed. 1995, section 3.5).
-    **others : object, optional
+    **others : object
         Other fields of `PID2`: `b`, `c`, `u_max`, `signals` and so on.
 
     Returns
