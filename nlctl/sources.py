@@ -206,7 +206,7 @@ class Pulse:
     >>> integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
     >>> pulse = nlctl.Pulse(height=5.0, t_start=60.0, width=1e-3)
     >>> loop = nlctl.interconnect({"pulse": pulse, "integrator": integrator}, outputs=["y"])
-    >>> print(nlctl.input_output_response(loop, [0, 100]).outputs[-1].round(9))
+    >>> print(nlctl.input_output_response(loop, [0, 100]).outputs[0, -1].round(9))
     0.005
     """
 

@@ -86,6 +86,20 @@ class TestNothingIsSteppedOver:
         np.testing.assert_allclose(found, edges[edges < 10], atol=1e-12)
         assert not run.statistics.opaque
 
+    def test_points_of_a_table_are_solved_before_the_run(self):
+        """Two of them 10 us apart in 1000 s, and all of a table that repeats."""
+        integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
+        times = np.array([0.0, 100.3, 700.1, 700.10001, 1000.0])
+        for periodic, until in ((False, 1000.0), (True, 2500.0)):
+            table = nlctl.TimeTable(times=times, values=(1, 2, 3, 4, 1), periodic=periodic)
+            loop = nlctl.interconnect({"table": table, "integrator": integrator}, outputs=["y"])
+            run = nlctl.input_output_response(loop, [0.0, until])
+            every = np.unique(np.add.outer((0.0, 1000.0, 2000.0), times).ravel())
+            inside = every[(every > 0.0) & (every < until)]
+            found = np.unique(run.events["time"].to_numpy())
+            off = [np.abs(found - each).min() for each in inside]
+            assert max(off) < 1e-9
+
 
 class TestStepRampSine:
     @given(st.floats(-5, 5), st.floats(-5, 5))
