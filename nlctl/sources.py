@@ -145,13 +145,15 @@ class Sine:
 class Square:
     """Square wave: offset + amplitude in the first part of each period, then offset - amplitude.
 
-        ref = offset + amplitude   for (t - t_start) mod period < duty period,
-              offset - amplitude   for the rest of the period,
-              offset               before t_start
+        ref = offset               before t_start
+              offset + amplitude   for tau mod period < duty period
+              offset - amplitude   for the rest of the period
 
-    With duty = 1/2 its Fourier series from t_start on is
+    with tau = t - t_start.  With duty = 1/2 its Fourier series from t_start on is
 
-        ref = offset + 4 amplitude / pi sum_k sin((2k - 1) 2 pi (t - t_start) / period) / (2k - 1)
+        ref = offset + 4 amplitude / pi sum_n sin(n omega tau) / n
+
+    over n = 1, 3, 5, ..., where omega = 2 pi / period.
 
     Parameters
     ----------
@@ -233,8 +235,8 @@ class Pulse:
 class PulseTrain:
     """Rectangular pulses, one at the beginning of each period.
 
-        ref = offset + height   for t >= t_start and (t - t_start) mod period < width,
-              offset            otherwise
+        ref = offset + height   for 0 <= tau and tau mod period < width
+              offset            otherwise,   tau = t - t_start
 
     Parameters
     ----------
@@ -349,10 +351,10 @@ class Chirp:
 class TimeTable:
     """A table of data over time: straight lines from one point to the next, or held values.
 
-        ref = values[k] + (values[k+1] - values[k]) (t - times[k]) / (times[k+1] - times[k])
-        ref = values[k]                                      (hold)
+        ref = values[k] + slope_k (t - times[k])
+        ref = values[k]                              (hold)
 
-    for times[k] <= t < times[k+1].  Before the first time and behind the last one it stays at its
+    for times[k] <= t < times[k+1], with the slope to the next point.  Before the first time and behind the last one it stays at its
     first and last value; with `periodic` it begins again at the last time, at which the period
     ends.  What is too long for a table is an input of the run.
 

@@ -135,10 +135,11 @@ _ANTI_WINDUP = {"back-calculation": led_back, "clamping": clamped, "none": wound
 class PID2:
     """PID controller of (ref, y) in two degrees of freedom, or of an error e.
 
-        w  = k_p (b ref - y) + I + k_d D,   u = min(max(w, u_min), u_max),   e = ref - y
+        w  = k_p (b ref - y) + I + k_d D
+        u  = min(max(w, u_min), u_max),   e = ref - y
         I' = k_i e + a,   z' = D = (c ref - y - z) / T_f
-        a  = (u - w) / T_t                                          (back-calculation)
-        a  = (u - w) / T_t, at most what stops I                    (clamping)
+        a  = (u - w) / T_t                   (back-calculation)
+        a  = the same, until it stops I      (clamping)
 
     As a transfer function D is s / (T_f s + 1) of c ref - y.  The weights b and c of the set point
     leave the response to loads alone: b = c = 0 is I-PD, b = c = 1 is of the error (Åström,
