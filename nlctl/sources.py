@@ -354,9 +354,9 @@ class TimeTable:
         ref = values[k] + slope_k (t - times[k])
         ref = values[k]                              (hold)
 
-    for times[k] <= t < times[k+1], with the slope to the next point.  Before the first time and behind the last one it stays at its
-    first and last value; with `periodic` it begins again at the last time, at which the period
-    ends.  What is too long for a table is an input of the run.
+    for times[k] <= t < times[k+1], with the slope to the next point.  Before the first time and
+    behind the last one it stays at its first and last value; with `periodic` it begins again at
+    the last time, at which the period ends.  At most 4096 points; more are an input of the run.
 
     Parameters
     ----------
