@@ -14,7 +14,16 @@ from typing import Any
 
 from nlctl import errors
 
-_GROUPS = ("plants", "actuators", "sliding", "delays", "references", "controllers")
+_GROUPS = (
+    "plants",
+    "actuators",
+    "sliding",
+    "delays",
+    "references",
+    "sources",
+    "controllers",
+    "observers",
+)
 _OF_FUNCTIONS = (*_GROUPS, "sampling", "faults")
 
 

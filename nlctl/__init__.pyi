@@ -1,4 +1,16 @@
-from . import actuators, controllers, export, faults, functions, native, paper, plants, references
+from . import (
+    actuators,
+    controllers,
+    export,
+    faults,
+    functions,
+    native,
+    observers,
+    paper,
+    plants,
+    references,
+    sources,
+)
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -31,6 +43,7 @@ from .actuators import (
 from .blocks import Block, Spec, block
 from .controllers import (
     PID,
+    PID2,
     AdaptiveDeadZoneInverse,
     AdaptiveWeights,
     AffineRegressor,
@@ -74,6 +87,7 @@ from .controllers import (
     mrac,
     replaced,
     sliding_mode,
+    standard_pid,
 )
 from .delays import TransportDelay
 from .describing import LimitCycle, describing_function, describing_function_plot, limit_cycles
@@ -106,6 +120,7 @@ from .native import (
     linearize,
     typeset,
 )
+from .observers import ExtendedKalmanFilter, HighGainObserver, LuenbergerObserver, luenberger
 from .params import param, record
 from .plants import ForcedDuffing, Genesio, PureFeedback, WingRock
 from .references import BandLimitedNoise, FilteredStep, FunctionReference, SumOfSines
@@ -123,9 +138,11 @@ from .sensitivities import (
     tune,
 )
 from .sliding import IdealRelay
+from .sources import Chirp, Pulse, PulseTrain, Ramp, Sine, Square, Step, TimeTable
 
 __all__ = [
     "PID",
+    "PID2",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AffineRegressor",
@@ -142,6 +159,7 @@ __all__ = [
     "BoucWen",
     "CacheWarning",
     "ChatteringError",
+    "Chirp",
     "Clock",
     "CompileError",
     "Compiled",
@@ -160,6 +178,7 @@ __all__ = [
     "EModifiedWeights",
     "EngineWarning",
     "Ensemble",
+    "ExtendedKalmanFilter",
     "ExtremumSeeking",
     "Fault",
     "FilteredError",
@@ -174,6 +193,7 @@ __all__ = [
     "GaussianBasis",
     "GeneralisedPrandtlIshlinskii",
     "Genesio",
+    "HighGainObserver",
     "HistoryStack",
     "IdealRelay",
     "InexactWarning",
@@ -183,6 +203,7 @@ __all__ = [
     "LimitCycle",
     "LinearRegressor",
     "LuGre",
+    "LuenbergerObserver",
     "MetricGradient",
     "ModelError",
     "ModelReferenceLaw",
@@ -196,8 +217,11 @@ __all__ = [
     "Preisach",
     "PrescribedPerformance",
     "ProjectedWeights",
+    "Pulse",
+    "PulseTrain",
     "PureFeedback",
     "Quantiser",
+    "Ramp",
     "RateLimiter",
     "ReferenceModel",
     "Relay",
@@ -207,14 +231,18 @@ __all__ = [
     "Saturation",
     "SecondOrderLag",
     "SensitivityResponse",
+    "Sine",
     "SlidingModeLaw",
     "Spec",
+    "Square",
     "StatePredictor",
+    "Step",
     "StickSlip",
     "Stop",
     "Stribeck",
     "SumOfSines",
     "SuperTwistingLaw",
+    "TimeTable",
     "TransportDelay",
     "TriggeredHold",
     "Tuned",
@@ -251,9 +279,11 @@ __all__ = [
     "latin_hypercube_centres",
     "limit_cycles",
     "linearize",
+    "luenberger",
     "metric_gradient",
     "mrac",
     "native",
+    "observers",
     "paper",
     "param",
     "parameters",
@@ -265,6 +295,8 @@ __all__ = [
     "sampled",
     "sensitivity_response",
     "sliding_mode",
+    "sources",
+    "standard_pid",
     "state_names",
     "tune",
     "typeset",

@@ -28,7 +28,7 @@ from .mrac import (
 )
 from .nussbaum import NussbaumLaw
 from .performance import FunnelControl, PrescribedPerformance
-from .pid import PID
+from .pid import PID, PID2, standard_pid
 from .rbf import (
     AdaptiveWeights,
     GaussianBasis,
@@ -42,6 +42,7 @@ from .sliding_modes import SlidingModeLaw, SuperTwistingLaw, sliding_mode
 
 __all__ = [
     "PID",
+    "PID2",
     "AdaptiveDeadZoneInverse",
     "AdaptiveWeights",
     "AffineRegressor",
@@ -86,4 +87,5 @@ __all__ = [
     "mrac",
     "replaced",
     "sliding_mode",
+    "standard_pid",
 ]

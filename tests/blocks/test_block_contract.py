@@ -33,6 +33,9 @@ NEEDED = {
     "PureFeedback": {"order": 3, "f": force, "d": disturbance},
     "FunctionReference": {"order": 2, "function": ramp},
     "Zero": {"outputs": ("W_psi", "W_norm")},
+    "Pulse": {"width": 0.65},  # it ends before the second of TIMES
+    "PulseTrain": {"width": 0.65},
+    "Square": {"duty": 0.65},
     "HistoryStack": {"nodes": 3, "novelty": 1.5},  # points at random are that far apart
 }
 

@@ -22,9 +22,11 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
         "nlctl.responses",
     ]
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
-    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
+    ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.sources", "nlctl.controllers"]
+    + ["nlctl.faults"],
     ["nlctl.paper"],
     ["nlctl.expressions"],
+    ["nlctl.observers"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.export", "nlctl.__main__"],
     [
@@ -84,6 +86,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["library"],
         ["staged", "stage"],
         ["derivatives", "trace"],
+        ["jacobian_source"],
     ],
     "nlctl.analysis.lyapunov": [
         ["bounds", "convex"],

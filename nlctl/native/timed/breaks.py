@@ -8,7 +8,7 @@ import numpy as np
 
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr
-from .lines import Lines, NotLines, as_lines, switches
+from .lines import Lines, NotLines, as_lines, levels_met, switches
 
 _GRID = 8192  # places at which a condition is looked at that is not made of lines
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
@@ -34,12 +34,15 @@ def break_points(
         (found,) = evaluate_expressions([expr], {"p": p[:, None]})
         return np.squeeze(found)
 
-    numbers = [c for c in conditions if c.size is None and all(a.size is None for a in c.args)]
-    lines = as_lines([arg for c in numbers for arg in c.args], constant, span)
+    args = [arg for c in conditions for arg in c.args if arg.size is None]
+    lines = as_lines(args, constant, span)
     found = [np.zeros(0)]
     for condition in conditions:
-        places = _known(condition, lines)
-        for indicator in _indicators(condition):
+        places, indicators = _known(condition, lines), _indicators(condition)
+        if places is None:
+            places = levels_met(condition, lines, constant)
+            indicators = indicators if places is None else [_count_of(condition)]
+        for indicator in indicators:
             if places is None:
                 found.append(_sought(indicator, values, span, fastest))
             else:
@@ -56,6 +59,11 @@ def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
         return np.unique(switches(condition, lines))
     except NotLines:
         return None
+
+
+def _count_of(condition: Expr) -> Callable[[Values, np.ndarray], np.ndarray]:
+    """Return how many elements of a condition hold."""
+    return lambda values, t: np.sum(values([condition], t)[0], axis=0, dtype=float)
 
 
 def _indicators(condition: Expr) -> list[Callable[[Values, np.ndarray], np.ndarray]]:

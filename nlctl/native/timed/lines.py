@@ -114,6 +114,25 @@ def switches(node: Expr, found: Mapping[Expr, Lines]) -> np.ndarray:
     return (args[1] if node.op == "copysign" else args[0]).roots()
 
 
+def levels_met(
+    node: Expr, found: Mapping[Expr, Lines], constants: Callable[[Expr], np.ndarray]
+) -> np.ndarray | None:
+    """Return when lines meet the levels of a table that they are compared with (s), or None."""
+    line, table = node.args if len(node.args) == 2 else (node, node)
+    line, table = (table, line) if table in found else (line, table)
+    if node.op not in ("lt", "le", "gt", "ge") or line not in found or table.varies:
+        return None
+    levels, own = np.unique(constants(table)), found[line]
+    if levels.size * own.starts.size > _MOST:
+        return None
+    return np.unique(np.concatenate([_shifted(own, level).roots() for level in levels]))
+
+
+def _shifted(line: Lines, level: float) -> Lines:
+    """Return a line above a level."""
+    return Lines(starts=line.starts, values=line.values - level, slopes=line.slopes, end=line.end)
+
+
 def _line(value: float, slope: float, span: tuple[float, float]) -> Lines:
     start = np.array([span[0]])
     return Lines(starts=start, values=np.array([value]), slopes=np.array([slope]), end=span[1])

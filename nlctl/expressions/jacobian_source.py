@@ -1,0 +1,89 @@
+"""The Jacobian of a plain function as another plain function, in NumPy: exact, and readable."""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .arrays import leaf_vector
+from .derivatives import tangents
+from .functions import FUNCTIONS
+from .graph import COMPARISONS, LOGIC, NUMPY, SMALL, Expr, Graph, Untraceable, needed
+from .trace import trace
+
+_SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+
+
+def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
+    """Make the Jacobian of ``function(x, ...)`` by x, of n numbers; others have these sizes.
+
+    It takes the same arguments and returns an array of shape (results, n).  What cannot be read,
+    or has no derivative, is `Untraceable`.
+    """
+    graph, names = Graph(), "abcdefgh"[: 1 + len(others)]
+
+    def arguments() -> tuple[Any, ...]:
+        sizes = zip(names, (n, *others), strict=True)
+        return tuple(leaf_vector(graph, name, 0, (size,)) for name, size in sizes)
+
+    if max(n, *others, 0) > SMALL:
+        raise Untraceable(f"arguments of more than {SMALL} numbers")
+    with np.errstate(all="ignore"):
+        results = [e for e, _ in trace(graph, function, arguments).pieces()]
+    columns = [tangents(graph, results, _unit(graph, j)) for j in range(n)]
+    rows = [[column[i] for column in columns] for i in range(len(results))]
+    return _compiled(_source(rows, names))
+
+
+def _unit(graph: Graph, j: int) -> Callable[[Expr], Expr | None]:
+    """Return the derivative of what is read by element j of the first argument."""
+    return lambda leaf: graph.const(1.0) if leaf.data[:2] == ("a", j) else None
+
+
+def _source(rows: list[list[Expr | None]], names: str) -> str:
+    """Return the code of a function of these arguments that returns the expressions."""
+    nodes = needed([e for row in rows for e in row if e is not None])
+    told: dict[Expr, str] = {}
+    lines = [f"def jacobian({', '.join(names)}):"]
+    for node in nodes:
+        told[node] = _written(node, [told[arg] for arg in node.args])
+        if node.op not in ("const", "leaf"):
+            lines.append(f"    e{node.index} = {told[node]}")
+            told[node] = f"e{node.index}"
+    body = ", ".join(
+        "[" + ", ".join("0.0" if e is None else told[e] for e in row) + "]" for row in rows
+    )
+    return "\n".join([*lines, f"    return np.array([{body}])", ""])
+
+
+def _written(node: Expr, parts: list[str]) -> str:
+    """Return one expression in NumPy's words."""
+    if node.size is not None:
+        raise Untraceable("it computes with vectors of more than eight numbers")
+    if node.op == "const":
+        return {"nan": "np.nan", "inf": "np.inf", "-inf": "(-np.inf)"}.get(
+            text := repr(node.data), f"({text})"
+        )
+    if node.op == "leaf":
+        return f"{node.data[0]}[{node.data[1]}]"
+    if node.op in _SIGNS and "b" not in [arg.kind for arg in node.args]:
+        return f" {_SIGNS[node.op]} ".join(parts)
+    name = NUMPY.get(node.op, node.op)
+    if node.op not in {**FUNCTIONS, **COMPARISONS, **LOGIC} and name not in ("negative", "where"):
+        raise Untraceable(f"it computes {node.op}")
+    if not hasattr(np, name):
+        raise Untraceable(f"NumPy has no {name}")
+    return f"np.{name}({', '.join(parts)})"
+
+
+def _compiled(source: str) -> Callable:
+    """Return the function of a source text, which stays readable for who asks for its source."""
+    file = f"<nlctl jacobian {hashlib.sha256(source.encode()).hexdigest()[:16]}>"
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
+    names: dict[str, Any] = {"np": np, "__name__": __name__}
+    exec(compile(source, file, "exec"), names)  # of this module's own making
+    return names["jacobian"]

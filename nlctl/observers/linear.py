@@ -1,0 +1,177 @@
+"""Luenberger's observer of a linear plant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ..arguments import of_type
+from ..equations import equation
+from ..errors import ParameterError
+from ..params import param, record
+from ..wording import counted
+from .signals import estimate_names, set_names
+
+__all__ = ["LuenbergerObserver", "luenberger"]
+
+_NEAR = 1e-6  # of the largest pole: how far those that were placed may lie from those wanted
+
+
+@record
+class LuenbergerObserver:
+    """Luenberger observer of a linear plant x' = A x + B u, y = C x + D u.
+
+        x_hat' = A x_hat + B u + L (y - C x_hat - D u)
+
+    The error x - x_hat obeys (x - x_hat)' = (A - L C)(x - x_hat), whatever u is.  `luenberger`
+    makes one of a plant and poles.  With the gain of `control.lqe` it is the steady Kalman filter.
+
+    Parameters
+    ----------
+    known, measured : tuple of str, optional
+        Names of the plant's inputs and outputs, in the order of the columns of B and the rows of
+        C.
+
+    Examples
+    --------
+    A double integrator, with both poles of the error at -1:
+
+    >>> observer = nlctl.block(nlctl.LuenbergerObserver(L=((2.0,), (1.0,))), "observer")
+    >>> print(observer.dynamics(0, [0.0, 0.0], [0.0, 1.0]))  # x_hat = 0 while y = 1
+    [2. 1.]
+    """
+
+    known: tuple[str, ...] = ("u",)
+    measured: tuple[str, ...] = ("y",)
+    A: tuple[tuple[float, ...], ...] = param(
+        ((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant"
+    )
+    B: tuple[tuple[float, ...], ...] = param(
+        ((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant"
+    )
+    C: tuple[tuple[float, ...], ...] = param(
+        ((1.0, 0.0),), unit="1", meaning="matrix C of the plant"
+    )
+    D: tuple[tuple[float, ...], ...] = param(((0.0,),), unit="1", meaning="matrix D of the plant")
+    L: tuple[tuple[float, ...], ...] = param(
+        ((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer"
+    )
+
+    feedthrough = False
+    vector = True
+
+    def check(self) -> None:
+        """Matrices that fit each other, and a name for each signal."""
+        shapes = {key: np.shape(getattr(self, key)) for key in "ABCDL"}
+        n, m, k = shapes["A"][0], shapes["B"][1], shapes["C"][0]
+        wanted = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m), "L": (n, k)}
+        for key, shape in shapes.items():
+            if shape != wanted[key]:
+                rows, columns = wanted[key]
+                raise ParameterError(
+                    f"LuenbergerObserver needs {key} of shape {rows} x {columns} for "
+                    f"{counted(n, 'state')}, {counted(m, 'input')} and {counted(k, 'output')}, got "
+                    f"{shape[0]} x {shape[1]}"
+                )
+        set_names(self, "known", m)
+        set_names(self, "measured", k)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the plant's inputs and outputs."""
+        return (*self.known, *self.measured)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names x1_hat, ..., xn_hat."""
+        return estimate_names(len(self.A))
+
+    outputs = states
+
+    @staticmethod
+    @equation
+    def update(t, x, u, p):
+        """The plant's equation, corrected by what its output is off."""
+        m = p.B.shape[1]
+        known, y = u[:m], u[m:]
+        return p.A @ x + p.B @ known + p.L @ (y - p.C @ x - p.D @ known)
+
+    @staticmethod
+    @equation
+    def output(t, x, u, p):
+        """The estimates."""
+        return x.copy()
+
+
+def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> LuenbergerObserver:
+    """Make a Luenberger observer of a linear plant, by its poles or its gain.
+
+    Parameters
+    ----------
+    plant : control.StateSpace
+        In continuous time, with an input; the observer takes its signals by their names.
+    poles : array_like of shape (n,), optional
+        Eigenvalues of A - L C (1/s), complex ones with their conjugates.
+    L : array_like of shape (n, k), optional
+        The gain in the place of poles, from `control.lqe` for example.
+
+    Returns
+    -------
+    LuenbergerObserver
+        Its gain is that of `control.place`, or of `control.acker` where poles are equal.
+
+    Raises
+    ------
+    ParameterError
+        If the plant is not one in continuous time with an input, there are not as many poles as
+        states, both or neither of `poles` and `L` are given, or the plant is not observable.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> plant = ct.ss([[0, 1], [-1, 0]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y")
+    >>> observer = nlctl.luenberger(plant, poles=[-2, -3])
+    >>> print(observer.inputs, np.round(observer.L, 9).ravel())
+    ('v', 'y') [5. 5.]
+    """
+    of_type("luenberger", "plant", plant, ct.StateSpace)
+    if not plant.isctime() or not plant.ninputs or not plant.nstates:
+        raise ParameterError(
+            f"luenberger needs a plant in continuous time with a state and an input, got "
+            f"'{plant.name}' with dt = {plant.dt}, {plant.nstates} and {plant.ninputs} of them"
+        )
+    if (poles is None) == (L is None):
+        raise ParameterError("luenberger needs either poles or L, got both or neither")
+    gain = _placed(plant, poles) if L is None else np.reshape(L, (plant.nstates, plant.noutputs))
+    return LuenbergerObserver(
+        known=tuple(plant.input_labels), measured=tuple(plant.output_labels),
+        A=plant.A, B=plant.B, C=plant.C, D=plant.D, L=gain,
+    )  # fmt: skip
+
+
+def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
+    """Return the gain that gives the error these poles."""
+    wanted = np.sort_complex(np.atleast_1d(poles))
+    if wanted.size != plant.nstates:
+        raise ParameterError(
+            f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got "
+            f"{wanted.size}"
+        )
+    equal = np.unique(wanted).size < wanted.size and plant.noutputs == 1
+    try:
+        dual = (ct.acker if equal else ct.place)(plant.A.T, plant.C.T, wanted)
+        gain = np.reshape(dual, (plant.noutputs, plant.nstates)).T
+        found = np.sort_complex(np.linalg.eigvals(plant.A - gain @ plant.C))
+        off = np.max(np.abs(np.poly(found) - np.poly(wanted)))
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise ParameterError(
+            f"luenberger cannot place {poles} for '{plant.name}': {error}"
+        ) from None
+    if not off <= _NEAR * np.max(np.abs(np.poly(wanted))):
+        raise ParameterError(
+            f"luenberger needs an observable plant, got '{plant.name}': with the gain that was "
+            f"found the error has the poles {np.round(found, 6)}, not {wanted}"
+        )
+    return gain

@@ -1,0 +1,24 @@
+"""Names of an observer's signals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..errors import ParameterError
+
+
+def estimate_names(count: int) -> tuple[str, ...]:
+    """Return ("x1_hat", ..., "xn_hat")."""
+    return tuple(f"x{i}_hat" for i in range(1, count + 1))
+
+
+def set_names(spec: Any, key: str, count: int | None, at_least: int = 1) -> None:
+    """Make a field of a record a tuple of names; refuse what is none, and another number."""
+    who, given = type(spec).__name__, getattr(spec, key)
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if not all(isinstance(each, str) and each for each in names) or len(set(names)) < len(names):
+        raise ParameterError(f"{who} needs different names in {key}, got {names}")
+    if len(names) < at_least or count not in (None, len(names)):
+        wanted = f"{count}" if count is not None else f"at least {at_least}"
+        raise ParameterError(f"{who} needs {wanted} in {key}, got {len(names)}: {names}")
+    object.__setattr__(spec, key, names)
