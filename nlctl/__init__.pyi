@@ -101,9 +101,12 @@ from .native import (
     Compiled,
     CompileError,
     Ensemble,
+    Stepper,
+    StepperState,
     compile,  # noqa: A004
     ensemble_response,
     linearize,
+    stepper,
     typeset,
 )
 from .params import param, record
@@ -210,6 +213,8 @@ __all__ = [
     "SlidingModeLaw",
     "Spec",
     "StatePredictor",
+    "Stepper",
+    "StepperState",
     "StickSlip",
     "Stop",
     "Stribeck",
@@ -265,6 +270,7 @@ __all__ = [
     "sensitivity_response",
     "sliding_mode",
     "state_names",
+    "stepper",
     "tune",
     "typeset",
     "with_faults",

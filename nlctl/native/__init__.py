@@ -26,6 +26,7 @@ from .linearized import linearize
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
 from .settings import Settings
+from .stepping import Stepper, StepperState, stepper
 from .typesetting import BlockEquations, typeset
 
 __all__ = [
@@ -40,11 +41,14 @@ __all__ = [
     "Settings",
     "Statistics",
     "Status",
+    "Stepper",
+    "StepperState",
     "Tableau",
     "compile",
     "compile_ahead",
     "ensemble_response",
     "linearize",
+    "stepper",
     "typeset",
     "uninterrupted",
 ]

@@ -65,6 +65,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["ahead", "integrate.results", "tubes"],
         ["integrate.driver", "own_errors"],
         ["ensemble", "response"],
+        ["stepping"],
     ],
     "nlctl.expressions": [
         ["graph"],
