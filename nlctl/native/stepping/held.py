@@ -40,6 +40,7 @@ class HeldRun:
 
     def __init__(self, compiled: Compiled, dt: float, settings: Settings) -> None:
         self.compiled, self.dt, self.settings = compiled, dt, settings
+        self._functions = integrators()
         self.k, self.start = 0, 0.0
         self.states = np.zeros(0)
         self.p = np.zeros(0)
@@ -79,7 +80,10 @@ class HeldRun:
             span = self.start, self.dt
             self.window = following(self.compiled, self.window, span, self.p, self.settings)
         i = self.window.place(self.k)
-        self.window.run.task.inputs[:, i] = self.window.run.task.inputs[:, i + 1] = u
+        task, past = self.window.run.task, self.window.run.work.past
+        task.inputs[:, i] = task.inputs[:, i + 1] = u
+        if self.k and past.fresh.size and np.any(u != self.inputs):
+            np.minimum(past.fresh, 1, out=past.fresh)  # a kink: where the last step ended
         with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
             run = self._moved()
             self._keep(run)
@@ -89,8 +93,7 @@ class HeldRun:
                 float(self.window.times[i + 1]), run.work.samples[i + 1, :, 0], u, i + 1
             )
         self.states, self.inputs, self.k = states, u, self.k + 1
-        finite = np.isfinite(outputs).all() and np.isfinite(states).all()
-        return outputs if finite else None
+        return outputs if np.isfinite(outputs).all() else None
 
     def _moved(self) -> Run:
         """Return the run at the end of its next step, made as the steps of any run are."""
@@ -100,6 +103,12 @@ class HeldRun:
         run = until(self.window, self.k)
         lanes["status"], lanes["noted"], lanes["resumes"] = RUNNING, 0, 0
         run.work.taylor.expanded[:] = 0  # that was without the inputs that follow
+        rhs, _ = run.machine.entries
+        point, along = (0, 0) if run.along is None else run.along.entries
+        self._functions["advance"](rhs, point, along, run.task, run.work, ROUNDS)
+        if lanes["status"][0] == OK:  # as nearly all steps end
+            run.machine.check(run.task.p)
+            return run
         run = self._turned(go_on(run, ROUNDS))
         while run.lanes["status"][0] == RUNNING:
             run = self._turned(watched(run, self.paces))
@@ -113,15 +122,14 @@ class HeldRun:
     def _keep(self, run: Run) -> None:
         """Make a run that has gone on that of the window, also where it has got new arrays."""
         window = self.window
-        task = run.task
-        if task.times is not window.times:
-            task = task._replace(times=window.times)
-        if run.work is window.run.work:
-            self.window = replace(window, run=replace(run, task=task))
+        if run is window.run:
             return
-        self.window = replace(
-            packed_window(replace(run, task=task), window.first, window.times), reach=window.reach
-        )
+        run = replace(run, task=run.task._replace(times=window.times))
+        if run.work is window.run.work:
+            self.window = replace(window, run=run)
+            return
+        packed = packed_window(run, window.first, window.times)
+        self.window = replace(packed, reach=window.reach)
 
     def _outputs(
         self, t: float, x: np.ndarray, u: np.ndarray, place: int
@@ -132,7 +140,7 @@ class HeldRun:
         task.inputs[:] = u[:, None]
         work.samples[:, :, 0] = x
         work.past.shown[:] = run.work.past.shown[place]
-        integrators()["outputs"](*run.machine.entries, task, work)
+        self._functions["outputs"](*run.machine.entries, task, work)
         run.machine.check(task.p)
         return work.y[0, : task.outputs, 0].copy(), work.samples[0, :, 0].copy()
 
@@ -175,14 +183,11 @@ class HeldRun:
 
     def ended(self) -> Trajectory:
         """Return the step in which the run has ended, as a run."""
-        i = self.window.place(self.k)
-        run = until(self.window, self.k)
+        run, begin = self.window.run, self.time
         outputs = np.full((run.task.times.size, run.task.outputs, 1), np.nan)
-        found = replace(made(run, outputs, 0), happened=happened(self.compiled, run))
-        states = np.column_stack([self.states, run.work.x[:, 0]])
+        found = replace(made(run, outputs, 0), happened=self.events())
         return replace(
-            found, time=self.window.times[i : i + 2], states=states,
-            inputs=found.inputs[:, i : i + 2],
+            found, time=np.array([begin, begin + self.dt]),
+            states=np.column_stack([self.states, run.work.x[:, 0]]),
+            inputs=np.repeat(found.inputs[:, -1:], 2, axis=1),
         )  # fmt: skip
-
-

@@ -12,15 +12,18 @@ from typing import Any
 import numpy as np
 
 from ...delays.variation import Variation
+from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
 from ..histories import variations
 from ..integrate.driver import prepared
 from ..integrate.memory import type_of, with_fields
+from ..integrate.workspace import Task
 from ..run import Run
 from ..settings import Settings
 from .memory import in_one_piece
 
 STEPS = 500  # of a window
+_TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,10 +127,11 @@ def in_full(window: Window) -> Run:
 
 
 def _ending_at(window: Window, last: int) -> Run:
-    """Return the run of a window with so many times."""
+    """Return the run of a window with so many times: in place, all else of the task stays."""
     task = window.run.task
-    row = list(type_of(type(task)).formats).index("times")
-    task.table[row, 1] = last  # in place: all else of the task stays
+    task.table[_TIMES, 1] = last
+    if not is_jit_disabled():
+        return window.run
     return replace(window.run, task=task._replace(times=window.times[:last]))
 
 
