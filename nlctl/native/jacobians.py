@@ -94,6 +94,19 @@ def _tangent(reading: Reading) -> Tangent:
             "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "
             "nlctl.sampled(gain, dt, delay=...), which is exact"
         )
+    return _differentiated(reading)
+
+
+def open_tangent(reading: Reading) -> Tangent:
+    """Return the same where the transport delays are cut: what leaves them are further inputs.
+
+    Behind the outputs follows what arrives at them.
+    """
+    return _differentiated(reading) if reading.schedule.lines else tangent(reading)
+
+
+def _differentiated(reading: Reading) -> Tangent:
+    found = reading.equations
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     parts = needed([expr for name in names for expr, _ in found.pieces(name)])
@@ -149,6 +162,13 @@ def jacobian(
             )
     u = np.append(_inputs(system, u0), np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
+    return evaluated(reading, made, columns, directions)
+
+
+def evaluated(
+    reading: Reading, made: Tangent, columns: Mapping[str, Any], directions: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return derivatives along directions at a point, given as t, x, u and p."""
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
     searches = searches_of(reading.equations)
