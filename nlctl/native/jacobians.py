@@ -231,7 +231,7 @@ def linear_system(
             f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
             "give the diagram an input"
         )
-    _tell_of_differences(reading)
+    tell_of_differences(reading)
     directions = np.eye(n + given + length(reading.program.layout), n + m)
     found = jacobian(reading, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt
@@ -249,7 +249,7 @@ def linear_system(
     )  # fmt: skip
 
 
-def _tell_of_differences(reading: Reading) -> None:
+def tell_of_differences(reading: Reading) -> None:
     """Warn of derivatives that are not exact."""
     names = ("dx", "y", *(r for r in reading.equations.results if r.startswith("sample")))
     why = inexact(reading, names)
@@ -316,7 +316,7 @@ def parameter_jacobian(
     """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
     system = reading.system
     places = float_parameters(reading)
-    _tell_of_differences(reading)
+    tell_of_differences(reading)
     reading.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + reading.schedule.ninputs
     directions = np.zeros((start + length(reading.program.layout), len(parameters)))

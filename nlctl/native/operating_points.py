@@ -106,7 +106,7 @@ class OperatingPointError(UsageError):
     >>> never = ct.nlsys(lambda t, x, u, params: x**2 + 1, inputs=0, states=1, name="never")
     >>> try:
     ...     nlctl.find_operating_point(never)
-    ... except nlctl.native.OperatingPointError as error:
+    ... except nlctl.OperatingPointError as error:
     ...     print(error.residual)
     1.0
     """
@@ -200,7 +200,7 @@ def find_operating_point(
     Notes
     -----
     What leaves a `nlctl.TransportDelay` is what it is given, where all is constant.  The memory of
-    a play or a relay stays wherever it is: such a point is not isolated.
+    a play or a relay stays where it is: such a point is not isolated, or lies at a kink.
 
     Examples
     --------
@@ -303,12 +303,14 @@ def _with_short_names(named: dict[str, Any], aliases: Mapping[str, Any]) -> dict
 
 def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
     """Return what is free and what is fixed, as python-control has it."""
-    system, every = cut.compiled.system, slice(None)
+    system = cut.compiled.system
     fixed = ("input_indices", "output_indices", "state_indices", "deriv_indices")
     plain, y = all(named[name] is None for name in fixed), named["outputs"]
     names = state_names(system)
     iu = _places("input", named["input_indices"], system.input_labels, plain and y is None)
-    iy = _places("output", named["output_indices"], system.output_labels, not plain or y is not None)
+    iy = _places(
+        "output", named["output_indices"], system.output_labels, not plain or y is not None
+    )
     ix = _places("state", named["state_indices"], names, False)
     idx = _places("state", named["deriv_indices"], names, True)
     if iy.size and y is None:
@@ -316,7 +318,7 @@ def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
             f"{_WHO} needs outputs= for the outputs that are fixed; output_indices=[] fixes none"
         )
     return _Asked(
-        x=state_array(system, named["initial_state"])[every],
+        x=state_array(system, named["initial_state"]),
         u=cut.inputs(_WHO, "inputs", named["inputs"]),
         y=_vector("outputs", y, cut.noutputs), dx=_vector("derivs", named["derivs"], cut.n),
         states=np.setdiff1d(np.arange(cut.n), ix), inputs=np.setdiff1d(np.arange(cut.m), iu),
@@ -397,7 +399,9 @@ def _search(cut: CutDiagram, asked: _Asked, method: str | None, shown: bool) -> 
         result = _solved(residual, slope, z, method)
     z = _sharpened(residual, slope, np.asarray(result.x, dtype=float))
     x, u, w = residual.parts(z)  # type: ignore[attr-defined]
-    values = np.linalg.svd(slope(z), compute_uv=False) if z.size else np.zeros(0)
+    J = slope(z) if z.size else np.zeros((0, 0))
+    known = np.isfinite(J).all()
+    values = np.linalg.svd(J, compute_uv=False) if known and z.size else np.zeros(0)
     kind = {
         "result": result,
         "residual": float(np.abs(residual(z)).max(initial=0.0)),
@@ -422,8 +426,11 @@ def _solved(residual: Any, slope: Any, z: np.ndarray, method: str | None) -> Opt
             return found
         if method is not None:
             return found
-    with np.errstate(all="ignore"):
-        return least_squares(residual, z, jac=slope, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    try:
+        with np.errstate(all="ignore"):
+            return least_squares(residual, z, jac=slope, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    except (ValueError, np.linalg.LinAlgError) as error:  # it came to where nothing is finite
+        return OptimizeResult(x=z, success=False, message=str(error))
 
 
 def _sharpened(residual: Any, slope: Any, z: np.ndarray) -> np.ndarray:

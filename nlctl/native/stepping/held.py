@@ -168,9 +168,7 @@ class HeldRun:
         shown = work.past.shown[i : i + 2, :, 0].T
         given = task.inputs[:, i : i + 2]
         rates = np.zeros((self.compiled.schedule.rates, 2))
-        _, first = self._outputs(
-            float(self.window.times[i]), work.samples[i, :, 0], self.inputs, i
-        )
+        _, first = self._outputs(float(self.window.times[i]), work.samples[i, :, 0], self.inputs, i)
         trial = Trial(
             time=self.window.times[i : i + 2], states=np.column_stack([first, self.states]),
             inputs=np.concatenate([given, shown, rates]), p=self.p, params=params, width=1,

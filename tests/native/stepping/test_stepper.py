@@ -213,7 +213,6 @@ def test_an_episode_does_not_remember_the_one_before():
         np.testing.assert_array_equal(each, same)
 
 
-
 @nlctl.record
 class Bouncing:
     """A ball above a floor that is pushed upwards."""
