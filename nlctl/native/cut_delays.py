@@ -15,7 +15,7 @@ from ..params import as_numbers
 from ..wording import counted
 from .compiled import Compiled
 from .diagram.parameters import length
-from .jacobians import Tangent, evaluated, open_tangent
+from .jacobians import Tangent, differentiated_at, open_tangent
 
 _STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
 
@@ -52,7 +52,7 @@ class CutDiagram:
                     f"parameter of {value}, which is {self.p[place]:g} now: compile again with "
                     "params={...}"
                 )
-        self._rates, self._out = compiled.native
+        self._rates, self._shown = compiled.native
         rows = compiled.lowered.rows
         self._dx, self._g, self._m = (np.empty(k) for k in (self.n, rows["g"], rows["m"]))
         self._y = np.empty(self.noutputs + self.lines)
@@ -77,7 +77,7 @@ class CutDiagram:
         state = np.array(x, dtype=float)
         with np.errstate(all="ignore"):  # NaN is seen by who asks
             self._rates(self.t, state, given, self.p, self._dx, self._g, self._m)
-            self._out(self.t, state, given, self.p, self._y)
+            self._shown(self.t, state, given, self.p, self._y)
         return self._dx.copy(), self._y[: self.noutputs].copy(), self._y[self.noutputs :].copy()
 
     def conditions(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ class CutDiagram:
         given = np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
         columns = {"t": [self.t], "x": x, "u": given, "p": self.p}
         with np.errstate(all="ignore"):
-            found = evaluated(self.compiled, self.tangent, columns, np.eye(total, width))
+            found = differentiated_at(self.compiled, self.tangent, columns, np.eye(total, width))
         outputs = found["y"]
         return Derivatives(found["dx"], outputs[: self.noutputs], outputs[self.noutputs :])
 

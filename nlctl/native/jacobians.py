@@ -86,7 +86,6 @@ def tangent(reading: Reading) -> Tangent:
 
 
 def _tangent(reading: Reading) -> Tangent:
-    found = reading.equations
     if reading.schedule.lines:
         delays = ", ".join(f"'{b.name}'" for b in supplied_blocks(reading.system, PAST))
         raise CompileError(
@@ -162,10 +161,10 @@ def jacobian(
             )
     u = np.append(_inputs(system, u0), np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
-    return evaluated(reading, made, columns, directions)
+    return differentiated_at(reading, made, columns, directions)
 
 
-def evaluated(
+def differentiated_at(
     reading: Reading, made: Tangent, columns: Mapping[str, Any], directions: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return derivatives along directions at a point, given as t, x, u and p."""

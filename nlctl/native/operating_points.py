@@ -306,11 +306,10 @@ def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
     system = cut.compiled.system
     fixed = ("input_indices", "output_indices", "state_indices", "deriv_indices")
     plain, y = all(named[name] is None for name in fixed), named["outputs"]
+    all_outputs = not plain or y is not None
     names = state_names(system)
     iu = _places("input", named["input_indices"], system.input_labels, plain and y is None)
-    iy = _places(
-        "output", named["output_indices"], system.output_labels, not plain or y is not None
-    )
+    iy = _places("output", named["output_indices"], system.output_labels, all_outputs)
     ix = _places("state", named["state_indices"], names, False)
     idx = _places("state", named["deriv_indices"], names, True)
     if iy.size and y is None:

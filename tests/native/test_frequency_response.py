@@ -135,7 +135,7 @@ def test_a_pole_on_the_axis_is_infinite_there_and_nowhere_else():
 
 def test_what_has_no_frequency_response_is_refused_by_name():
     hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="e", outputs="v", name="hold"))
-    with pytest.raises(nlctl.UsageError, match="frequency_response.*'hold'"):
+    with pytest.raises(nlctl.UsageError, match=r"frequency_response.*'hold'"):
         nlctl.frequency_response(closed(hold, plant(), error()), W)
     with pytest.raises(nlctl.CompileError, match="'wire_v' varies"):
         nlctl.frequency_response(closed(delay(1.0, varying=np.sin), plant(), error()), W)

@@ -16,12 +16,12 @@ from ..happened import happened
 from ..histories import arriving_first
 from ..integrate.driver import ROUNDS, begin, differentiated, go_on, watched
 from ..integrate.results import Trajectory, made
-from ..integrate.state import OK, RUNNING, Status
+from ..integrate.state import OK, RUNNING
 from ..integrators import integrators
 from ..run import Run
 from ..settings import Settings
 from ..taylor.turns import turned, with_turns
-from .window import STEPS, Window, first_window, following, in_full, packed_window, until
+from .window import HELD_STEPS, Window, first_window, following, in_full, packed_window, until
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +76,7 @@ class HeldRun:
 
     def advance(self, u: np.ndarray) -> np.ndarray | None:
         """Go on for a step; return the outputs at its end, None if the run has ended before."""
-        if self.k >= self.window.first + STEPS:
+        if self.k >= self.window.first + HELD_STEPS:
             span = self.start, self.dt
             self.window = following(self.compiled, self.window, span, self.p, self.settings)
         i = self.window.place(self.k)

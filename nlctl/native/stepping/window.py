@@ -22,7 +22,7 @@ from ..run import Run
 from ..settings import Settings
 from .memory import in_one_piece
 
-STEPS = 500  # of a window
+HELD_STEPS = 500  # of a window
 _TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
 
 
@@ -39,7 +39,7 @@ class Window:
         For the outputs at the end of a step.
     first : int
         Number of the first of these steps.
-    times : ndarray of shape (2 STEPS,) or (2 STEPS + 1,)
+    times : ndarray of shape (2 HELD_STEPS,) or (2 HELD_STEPS + 1,)
         What the task's times are in full (s).
     reach : ndarray of shape (cells,)
         What the task has of the cells of these times: until when a step may lead (s).
@@ -57,10 +57,10 @@ class Window:
         return 2 * (k - self.first) + (self.first > 0)
 
 
-def grid(start: float, dt: float, first: int) -> np.ndarray:
+def held_grid(start: float, dt: float, first: int) -> np.ndarray:
     """Return the times of a window: each step's begin, and the float before its end."""
-    steps = start + dt * np.arange(first, first + STEPS + 1)
-    times = np.empty(2 * STEPS + 1)
+    steps = start + dt * np.arange(first, first + HELD_STEPS + 1)
+    times = np.empty(2 * HELD_STEPS + 1)
     times[::2], times[1::2] = steps, np.nextafter(steps[1:], -np.inf)
     times = times[:-1]  # where a step begins there is no end
     return times if first == 0 else np.append(np.nextafter(steps[0], -np.inf), times)
@@ -74,7 +74,7 @@ def first_window(
     settings: Settings,
 ) -> Window:
     """Return the window in which a run begins at ``span[0]`` with steps of ``span[1]``."""
-    times = grid(*span, 0)
+    times = held_grid(*span, 0)
     run = _laid(compiled, times, x0, p, settings)
     return packed_window(run, 0, times)
 
@@ -149,8 +149,8 @@ def following(
     compiled: Compiled, window: Window, span: tuple[float, float], p: np.ndarray, settings: Settings
 ) -> Window:
     """Return the window of the steps that follow, with what is known then of functions of t."""
-    first = window.first + STEPS
-    times, work = grid(*span, first), window.run.work
+    first = window.first + HELD_STEPS
+    times, work = held_grid(*span, first), window.run.work
     fresh = _laid(compiled, times, work.x[:, 0], p, settings)
     old, new = window.run.task, fresh.task
     task = with_fields(new, stiff=old.stiff, taylor=old.taylor, pair=old.pair)
