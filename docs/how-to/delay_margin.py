@@ -27,7 +27,7 @@ law = ct.tf([1, 0.25], [1, 0], inputs="error", outputs="demand", name="law")
 #
 # The tank is full to 4 m where the inflow is 2: the controller's integrator has to be there.
 parts = {"pipe": pipe, "tank": tank, "law": law}
-chain = nlctl.interconnect(parts, inputs=["error"], outputs=["level"])
+chain = nlctl.interconnect(parts, inputs=["error"], outputs=["level"], name="open loop")
 point = nlctl.find_operating_point(
     chain, {"tank.level": 1.0, "law.x[0]": 1.0}, 0.0, 4.0, input_indices=["error"]
 )

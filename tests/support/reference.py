@@ -69,8 +69,8 @@ def methods():
     """The public methods of classes of the reference.
 
     What `nlctl.Spec` describes is left out, what a block's own equations call, without types, and
-    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.  A stepper is no block:
-    its `reset` is its own.
+    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.  A `Stepper` is no
+    block, and its `reset` is its own.
     """
     heads = [head.partition(" : ")[0] for head, _ in entries(nlctl.Spec, "Attributes")]
     contract = {name for head in heads for name in head.split(", ")}

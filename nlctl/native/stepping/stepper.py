@@ -89,7 +89,7 @@ class Stepper:
     >>> for _ in range(10):
     ...     y = tank.step(2.0 * (1.0 - y))
     >>> print(tank.time, y.round(4))
-    1.0 [0.6586]
+    1.0 [0.6609]
     """
 
     def __init__(self, compiled: Compiled, dt: float, settings: Settings, form: Any) -> None:
