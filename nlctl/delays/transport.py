@@ -38,8 +38,8 @@ class TransportDelay:
 
     A run knows its signals from its first time t_0 on; earlier they are `before`, or what
     `history` says.  The delay breaks algebraic loops.  It has no finite state:
-    `nlctl.frequency_response` keeps it exactly, and to linearize, put `control.pade` in its place; a
-    run cannot be resumed from its last state alone, and `nlctl.stepper` keeps the past.
+    `nlctl.frequency_response` keeps it exactly, and to linearize, put `control.pade` in its place;
+    a run cannot be resumed from its last state alone, and `nlctl.stepper` keeps the past.
 
     Parameters
     ----------

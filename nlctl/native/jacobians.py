@@ -91,8 +91,8 @@ def _tangent(reading: Reading) -> Tangent:
         raise CompileError(
             f"'{reading.system.name}' has the transport delays {delays}, and so no finite state: "
             "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "
-            "nlctl.sampled(gain, dt, delay=...), which is exact; nlctl.frequency_response keeps them "
-            "as they are"
+            "nlctl.sampled(gain, dt, delay=...), which is exact; nlctl.frequency_response keeps "
+            "them as they are"
         )
     return _differentiated(reading)
 

@@ -336,7 +336,7 @@ def _places(kind: str, given: Any, names: Sequence[str], every: bool) -> np.ndar
 
 def _place(kind: str, each: Any, names: Sequence[str]) -> int:
     if isinstance(each, str):
-        return list(names).index(find_name(kind, each, names))
+        return list(names).index(find_name(kind, each, dict.fromkeys(names)))
     if isinstance(each, bool) or not isinstance(each, int | np.integer):
         raise ParameterError(f"{_WHO} needs places or names of each {kind}, got {each!r}")
     if not 0 <= each < len(names):

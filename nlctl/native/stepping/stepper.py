@@ -252,9 +252,10 @@ class Stepper:
         StepperState
             It does not change when the run goes on.
         """
-        run = self._run
+        run, states = self._run, self._run.states.copy()
+        states.flags.writeable = False
         return StepperState(
-            time=run.time, states=run.states.copy(), params=self._params, failed=self._failed,
+            time=run.time, states=states, params=self._params, failed=self._failed,
             kept=run.keep(), owner=run,
         )  # fmt: skip
 
@@ -372,8 +373,9 @@ def stepper(
     Notes
     -----
     n steps are one run over n `dt` with ``hold="zoh"``, with the same numbers: memories, clocks,
-    delays, events and the steps of the integrator go on as if nobody had looked.  Where the
-    equations have functions of t alone, or there is no input, they are the same to the tolerances.
+    delays, events and the steps of the integrator go on as if nobody had looked.  Where it matters
+    to the integrator how long the whole run is, they are the same to the tolerances: with functions
+    of t alone, with event functions in steps below 1e-7 of the run, and without any input.
 
     A stepper is for one thread; several of one `Compiled` share its machine code.
 
