@@ -37,8 +37,9 @@ class TransportDelay:
     in the order in which they were sent: what a run sees of it is checked before the run.
 
     A run knows its signals from its first time t_0 on; earlier they are `before`, or what
-    `history` says.  The delay breaks algebraic loops.  It has no finite state: to linearize, put
-    `control.pade` in its place; a run cannot be resumed from its last state alone.
+    `history` says.  The delay breaks algebraic loops.  It has no finite state:
+    `nlctl.frequency_response` keeps it exactly, and to linearize, put `control.pade` in its place;
+    a run cannot be resumed from its last state alone, and `nlctl.stepper` keeps the past.
 
     Parameters
     ----------

@@ -19,13 +19,21 @@ from .compiled import Compiled, compile  # noqa: A004 (what it does)
 from .diagram.schedule import AlgebraicLoopError
 from .ensemble import ensemble_response
 from .ensemble_result import Ensemble
+from .frequency import frequency_response
 from .integrate.methods.tableau import Tableau
 from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
 from .machine.store import CacheWarning
+from .operating_points import (
+    OperatingPoint,
+    OperatingPointError,
+    find_operating_point,
+    find_operating_points,
+)
 from .response import Response, uninterrupted
 from .settings import Settings
+from .stepping import Stepper, StepperState, stepper
 from .typesetting import BlockEquations, typeset
 
 __all__ = [
@@ -36,15 +44,23 @@ __all__ = [
     "CompileError",
     "Compiled",
     "Ensemble",
+    "OperatingPoint",
+    "OperatingPointError",
     "Response",
     "Settings",
     "Statistics",
     "Status",
+    "Stepper",
+    "StepperState",
     "Tableau",
     "compile",
     "compile_ahead",
     "ensemble_response",
+    "find_operating_point",
+    "find_operating_points",
+    "frequency_response",
     "linearize",
+    "stepper",
     "typeset",
     "uninterrupted",
 ]

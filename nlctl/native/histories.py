@@ -82,6 +82,15 @@ def with_past(reading: Reading, task: Any, work: Any, p: np.ndarray) -> Any:
     return work
 
 
+def arriving_first(reading: Reading, task: Any) -> np.ndarray:
+    """Return what leaves the delays where a run begins, shape (lines,)."""
+    begin, nodes = float(task.times[0]), reading.schedule.nodes
+    specs = [nodes[line.block or 0].system.current_spec for line in reading.schedule.lines]
+    sent = begin - task.lines.delays[:, 0] - np.array([spec.varied(begin) for spec in specs])
+    before = _before(reading)
+    return np.array([before(t, sent)[row] for row, t in enumerate(sent)])
+
+
 def with_room(task: Any, work: Any) -> Any:
     """Return the workspace with places for more steps, where there are none.
 

@@ -86,14 +86,27 @@ def tangent(reading: Reading) -> Tangent:
 
 
 def _tangent(reading: Reading) -> Tangent:
-    found = reading.equations
     if reading.schedule.lines:
         delays = ", ".join(f"'{b.name}'" for b in supplied_blocks(reading.system, PAST))
         raise CompileError(
             f"'{reading.system.name}' has the transport delays {delays}, and so no finite state: "
             "put ct.ss(ct.tf(*ct.pade(delay, n))) in the place of each, beside sampled blocks "
-            "nlctl.sampled(gain, dt, delay=...), which is exact"
+            "nlctl.sampled(gain, dt, delay=...), which is exact; nlctl.frequency_response keeps "
+            "them as they are"
         )
+    return _differentiated(reading)
+
+
+def open_tangent(reading: Reading) -> Tangent:
+    """Return the same where the transport delays are cut: what leaves them are further inputs.
+
+    Behind the outputs follows what arrives at them.
+    """
+    return _differentiated(reading) if reading.schedule.lines else tangent(reading)
+
+
+def _differentiated(reading: Reading) -> Tangent:
+    found = reading.equations
     names = ("dx", "y", *(name for name in found.results if name.startswith("sample")))
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     parts = needed([expr for name in names for expr, _ in found.pieces(name)])
@@ -149,6 +162,13 @@ def jacobian(
             )
     u = np.append(_inputs(system, u0), np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
+    return differentiated_at(reading, made, columns, directions)
+
+
+def differentiated_at(
+    reading: Reading, made: Tangent, columns: Mapping[str, Any], directions: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return derivatives along directions at a point, given as t, x, u and p."""
     arrays = {name: np.asarray(v, dtype=float)[:, None] for name, v in columns.items()}
     arrays[DIRECTION] = directions
     searches = searches_of(reading.equations)
@@ -211,7 +231,7 @@ def linear_system(
             f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
             "give the diagram an input"
         )
-    _tell_of_differences(reading)
+    tell_of_differences(reading)
     directions = np.eye(n + given + length(reading.program.layout), n + m)
     found = jacobian(reading, x0, u0, t, params, directions)
     rates, outputs, dt = found["dx"], found["y"], system.dt
@@ -229,7 +249,7 @@ def linear_system(
     )  # fmt: skip
 
 
-def _tell_of_differences(reading: Reading) -> None:
+def tell_of_differences(reading: Reading) -> None:
     """Warn of derivatives that are not exact."""
     names = ("dx", "y", *(r for r in reading.equations.results if r.startswith("sample")))
     why = inexact(reading, names)
@@ -296,7 +316,7 @@ def parameter_jacobian(
     """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
     system = reading.system
     places = float_parameters(reading)
-    _tell_of_differences(reading)
+    tell_of_differences(reading)
     reading.parameter_vector(params)  # blocks have the run's parameters then
     start = (system.nstates or 0) + reading.schedule.ninputs
     directions = np.zeros((start + length(reading.program.layout), len(parameters)))

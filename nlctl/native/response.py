@@ -59,7 +59,7 @@ def respond(
         # whoever takes it for an error continues
         raise KeyboardInterrupt(_message(compiled, run, p, params))
     ended = run.status is Status.ENDED
-    failed = _error(compiled, made, p, params)
+    failed = failure(compiled, made, p, params)
     if failed is not None and not ignore_errors:
         raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
         raise raised or failed
@@ -71,7 +71,7 @@ def respond(
     return _response(compiled, made, shown, (params, form, message))
 
 
-def _error(
+def failure(
     compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
 ) -> DivergedError | None:
     """Return why a run has not reached its last time, if it has not."""

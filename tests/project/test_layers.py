@@ -60,7 +60,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["enclosures", "jacobians"],
         ["describe"],
         ["compiled"],
-        ["ensemble_result", "integrate", "linearized", "members"],
+        ["cut_delays", "ensemble_result", "integrate", "linearized", "members"],
         ["along", "audit", "happened", "histories", "integrators", "laid", "settings"],
         ["chattering", "known", "ship"],
         ["run"],
@@ -68,6 +68,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["ahead", "integrate.results", "tubes"],
         ["integrate.driver", "own_errors"],
         ["ensemble", "response"],
+        ["stepping", "operating_points", "frequency"],
     ],
     "nlctl.expressions": [
         ["graph"],

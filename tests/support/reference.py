@@ -69,7 +69,8 @@ def methods():
     """The public methods of classes of the reference.
 
     What `nlctl.Spec` describes is left out, what a block's own equations call, without types, and
-    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.
+    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.  A `Stepper` is no
+    block, and its `reset` is its own.
     """
     heads = [head.partition(" : ")[0] for head, _ in entries(nlctl.Spec, "Attributes")]
     contract = {name for head in heads for name in head.split(", ")}
@@ -79,7 +80,11 @@ def methods():
             continue
         for key, method in vars(made).items():
             method = getattr(method, "__func__", method)  # of a class method, say
-            if key.startswith("_") or key in contract or getattr(method, "__name__", "") != key:
+            if (
+                key.startswith("_")
+                or (key in contract and made is not nlctl.Stepper)
+                or getattr(method, "__name__", "") != key
+            ):
                 continue
             if inspect.isfunction(method) and method.__annotations__ and inspect.getdoc(method):
                 yield f"{home}.{name}.{key}", method

@@ -1,0 +1,120 @@
+"""A diagram whose transport delays are cut, for what is constant, and for what is small around it.
+
+What leaves a delay is an input, and what arrives there an output.  Where all is constant both are
+equal, and of small sines the one is the other times exp(-s tau).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import CompileError, ParameterError, UsageError
+from ..params import as_numbers
+from ..wording import counted
+from .compiled import Compiled
+from .diagram.parameters import length
+from .jacobians import Tangent, differentiated_at, open_tangent
+
+_STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
+
+
+class Derivatives(NamedTuple):
+    """How rates, outputs and what arrives at delays change with states, inputs and what leaves."""
+
+    rates: np.ndarray  # (nstates, nstates + ninputs + lines)
+    outputs: np.ndarray  # (noutputs, the same)
+    arriving: np.ndarray  # (lines, the same)
+
+
+class CutDiagram:
+    """A compiled diagram with parameters, at a time, with its delays cut."""
+
+    def __init__(self, who: str, compiled: Compiled, t: float, params: Any) -> None:
+        system, read = compiled.system, compiled.schedule
+        named = [node.path for node in read.nodes if node.sampled]
+        if named:
+            raise UsageError(
+                f"{who} needs a diagram without sampled blocks, and '{system.name}' has "
+                f"'{named[0]}': give its continuous part, or use nlctl.linearize, which has the "
+                "map over the common period of the clocks"
+            )
+        self.compiled, self.t = compiled, t
+        self.n, self.m = system.nstates or 0, system.ninputs or 0
+        self.lines, self.noutputs = len(read.lines), system.noutputs or 0
+        self.p = compiled.parameter_vector(params)
+        self.tangent: Tangent = open_tangent(compiled)
+        for place, value in self.tangent.assumed.items():
+            if self.p[place] != value:
+                raise UsageError(
+                    f"the equations of '{system.name}' were differentiated for an integer "
+                    f"parameter of {value}, which is {self.p[place]:g} now: compile again with "
+                    "params={...}"
+                )
+        self._rates, self._shown = compiled.native
+        rows = compiled.lowered.rows
+        self._dx, self._g, self._m = (np.empty(k) for k in (self.n, rows["g"], rows["m"]))
+        self._y = np.empty(self.noutputs + self.lines)
+
+    def delays(self, who: str) -> np.ndarray:
+        """Return the delays (s), shape (lines,); refuse one that varies."""
+        found = []
+        for line in self.compiled.schedule.lines:
+            node = self.compiled.schedule.nodes[line.block or 0]
+            if node.system.current_spec.varying is not None:
+                raise CompileError(
+                    f"{who} needs constant delays, and that of block '{node.path}' varies: a sine "
+                    "does not leave it as a sine"
+                )
+            layout = self.compiled.program.layout[line.block or 0]
+            found.append(self.p[layout["delay"].offset])
+        return np.array(found, dtype=float)
+
+    def values(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> Any:
+        """Return rates, outputs and what arrives, with `w` leaving the delays."""
+        given = np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
+        state = np.array(x, dtype=float)
+        with np.errstate(all="ignore"):  # NaN is seen by who asks
+            self._rates(self.t, state, given, self.p, self._dx, self._g, self._m)
+            self._shown(self.t, state, given, self.p, self._y)
+        return self._dx.copy(), self._y[: self.noutputs].copy(), self._y[self.noutputs :].copy()
+
+    def conditions(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Return the values of what the equations switch at."""
+        self.values(x, u, w)
+        return self._g.copy()
+
+    def derivatives(self, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> Derivatives:
+        """Return the derivatives at a point, exactly."""
+        width = self.n + self.m + self.lines
+        total = self.n + self.compiled.schedule.ninputs + length(self.compiled.program.layout)
+        given = np.concatenate([u, w, np.zeros(self.compiled.schedule.rates)])
+        columns = {"t": [self.t], "x": x, "u": given, "p": self.p}
+        with np.errstate(all="ignore"):
+            found = differentiated_at(self.compiled, self.tangent, columns, np.eye(total, width))
+        outputs = found["y"]
+        return Derivatives(found["dx"], outputs[: self.noutputs], outputs[self.noutputs :])
+
+    def leaving(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return what leaves the delays where all signals have been constant."""
+        w = np.zeros(self.lines)
+        for _ in range(_STEPS if self.lines else 0):
+            gap = self.values(x, u, w)[2] - w
+            if np.abs(gap).max() <= _CLOSE * (1.0 + np.abs(w).max()):
+                break
+            slope = np.eye(self.lines) - self.derivatives(x, u, w).arriving[:, self.n + self.m :]
+            w = w + np.linalg.lstsq(slope, gap, rcond=None)[0]
+        return w
+
+    def inputs(self, who: str, name: str, given: Any) -> np.ndarray:
+        """Return the inputs at a point, shape (ninputs,)."""
+        u = as_numbers(0.0 if given is None else given)
+        if u is not None:
+            u = np.full(self.m, float(u)) if u.ndim == 0 else u.reshape(-1)
+        if u is None or u.size != self.m or not np.all(np.isfinite(u)):
+            raise ParameterError(
+                f"{who} needs {counted(self.m, 'finite number')} for {name} of "
+                f"'{self.compiled.system.name}', got {given!r}"
+            )
+        return u.astype(float)
