@@ -1,4 +1,4 @@
-from . import actuators, controllers, faults, functions, native, paper, plants, references
+from . import actuators, controllers, faults, functions, native, paper, papers, plants, references
 from ._version import __version__ as __version__
 from .actuators import (
     AsymmetricSaturation,
@@ -254,6 +254,7 @@ __all__ = [
     "mrac",
     "native",
     "paper",
+    "papers",
     "param",
     "parameters",
     "plants",
