@@ -24,6 +24,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     + ["nlctl.accumulation", "nlctl.sampling", "nlctl.delays", "nlctl.sliding", "nlctl.reference"],
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.controllers", "nlctl.faults"],
     ["nlctl.paper"],
+    ["nlctl.papers"],
     ["nlctl.expressions"],
     ["nlctl.native"],
     ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.__main__"],
@@ -39,7 +40,9 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.analysis.studies"],
     ["nlctl.analysis.pages"],
     ["nlctl.analysis.loop_report", "nlctl.analysis.loop_checks"],
+    ["nlctl.analysis.reproductions"],
     ["nlctl.analysis.paper"],
+    ["nlctl.analysis.papers"],
     ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]

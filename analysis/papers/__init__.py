@@ -1,0 +1,34 @@
+"""The papers that are reproduced, by name: each module has one record and what composes its page."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from ..catalogue import paper_summaries
+
+if TYPE_CHECKING:
+    from ..reproductions.page import Reproduction
+
+__all__ = ["named_paper", "paper_key", "paper_names"]
+
+
+def paper_names() -> list[str]:
+    """Return the names of all papers."""
+    return list(paper_summaries())
+
+
+def paper_key(name: str, kind: str = "paper") -> str:
+    """Return the key of a paper that is called ``tabuada_2007`` or ``tabuada-2007``."""
+    key = name.replace("-", "_")
+    if key not in paper_names():
+        from nlctl.names import unknown
+
+        raise unknown(kind, name, paper_names())
+    return key
+
+
+def named_paper(name: str) -> Reproduction:
+    """Return the paper of a name."""
+    made: Reproduction = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
+    return made
