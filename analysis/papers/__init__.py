@@ -1,4 +1,4 @@
-"""The papers that are reproduced, by name: each module has one record and what composes its page."""
+"""The papers that are reproduced, by name: one module each, with a record and what composes it."""
 
 from __future__ import annotations
 

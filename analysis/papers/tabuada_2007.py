@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl.papers import tabuada_2007 as printed
-from nlctl.plotting.axes import TIME, draw_lines, stacked_axes
 
 from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, Part, Runs, Source, Statement
 
@@ -26,7 +26,7 @@ CASES = (
     PaperCase(
         key="1",
         make=printed.example_1,
-        times=np.linspace(0, HORIZON, 3001),
+        times=np.append(np.linspace(0, 1, 4001), np.linspace(1, HORIZON, 2801)[1:]),
         start=printed.START,
     ),
 )
@@ -107,10 +107,10 @@ def statements() -> list[Statement]:
         say(
             claim="Does that b bound the effect of e, V′ ≤ −a|x|² + b|x||e| for all x and e?",
             quantity="least b, 2 |PBK|", printed="8", relation="≤",
-            value=lambda runs: coupling(), by="the article, as quoted",
+            value=lambda runs: coupling(), by="the article as quoted",
         ),
         say(
-            claim=decay, quantity="0.05 · 2 |PBK| / λₘ(Q)", printed="1", relation="≤",
+            claim=decay, quantity="0.05 · 2 |PBK| / λₘ(Q)", printed="1", relation="≤", read="",
             value=lambda runs: SIGMA * coupling() / least_eigenvalue(),
         ),
         follow(
@@ -132,37 +132,28 @@ def statements() -> list[Statement]:
 def states(runs: Runs) -> MatplotlibFigure:
     """The states and the control input, which is held between samples."""
     run = runs["1"]
-    figure, (above, below) = stacked_axes(rows=2, height=1.9)
-    draw_lines(above, run.time, {"$x_1$": run["x1"], "$x_2$": run["x2"]})
-    draw_lines(below, run.time, {"$u$": run["u"]})
-    above.set(ylabel="state")
-    below.set(xlabel=TIME, ylabel="$u$")
-    return figure
+    t = run.time[1:]  # from the first sample on
+    x_1, x_2, u = (run[name][1:] for name in ("x1", "x2", "u"))
+    return rows_over_time({"state": {"$x_1$": (t, x_1), "$x_2$": (t, x_2)}, "$u$": {"u": (t, u)}})
 
 
 def errors(runs: Runs) -> MatplotlibFigure:
-    """The ratio |e| / |x|, a sawtooth below sigma, over the first second."""
-    run = runs["1"]
-    figure, (ax,) = stacked_axes()
-    t, y = run.time[1:], ratio(run)
-    early = t <= 1
-    draw_lines(ax, t[early], {"$|e|/|x|$": y[early], "rule": np.full(early.sum(), 0.03)})
-    ax.set(xlabel=TIME, ylabel="$|e| / |x|$")
-    return figure
+    """The ratio |e| / |x|, a sawtooth below sigma, over the first half second."""
+    t, y = runs["1"].time[1:], ratio(runs["1"])
+    early = t <= 0.5
+    signals = {"$|e|/|x|$": (t[early], y[early]), "rule": ([0.0, 0.5], [0.03, 0.03])}
+    return rows_over_time({"$|e| / |x|$": signals})
 
 
 def gaps(runs: Runs) -> MatplotlibFigure:
     """The intervals between samples, and the bound."""
-    run = runs["1"]
-    figure, (ax,) = stacked_axes()
-    between = intervals(run)
-    curves = {
-        "intervals": 1e3 * between,
-        "bound of the differential equation": np.full(between.size, 1e3 * bound(0.03)),
+    least = 1e3 * bound(0.03)
+    taken = (sampling_times(runs["1"])[1:], 1e3 * intervals(runs["1"]))
+    signals = {
+        "intervals": taken,
+        "bound of the differential equation": ([0, HORIZON], [least] * 2),
     }
-    draw_lines(ax, sampling_times(run)[1:], curves)
-    ax.set(xlabel=TIME, ylabel="interval (ms)", ylim=(0, None))
-    return figure
+    return rows_over_time({"interval (ms)": signals})
 
 
 MODEL = (
@@ -250,8 +241,8 @@ PAPER = Paper(
     ),
     open_points=(
         "The article itself could not be read: every printed number is one that the notes quote.",
-        "b = |KᵀBᵀP + PBK| = 8 is the norm of a symmetric matrix and bounds the effect of e = x "
-        "only. For e and x in any directions the term is 2 xᵀPBKe, and the least b is "
+        "b = |KᵀBᵀP + PBK| = 8 is the norm of a symmetric matrix and bounds the effect of an "
+        "error in the direction of x. For any e and x the term is 2 xᵀPBKe, and the least b is "
         "2 |PBK| = 8.5. The conclusion stands: 0.05 · 8.5 = 0.425 is below λₘ(Q) = 0.441.",
         "A printed value of the shortest interval was not found. The bound here is the closed "
         "form of the differential equation, 17.6 ms at σ = 0.03 and 28.4 ms at σ = 0.05.",

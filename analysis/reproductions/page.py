@@ -128,9 +128,7 @@ def verdict_of(paper: Paper, found: Sequence[Found]) -> str:
     """Return how many statements hold, which do not, and what is not reproduced at all."""
     missed = [f for f in found if not f.holds]
     names = "; ".join(
-        f"{f.statement.quantity} is {f.value:.4g}, {paper.asked} is "
-        f"{f.statement.relation.strip('=')} {f.statement.printed}".replace("  ", " ")
-        for f in missed
+        f"{f.statement.quantity} is {f.value:.4g}, not {f.statement.asked}" for f in missed
     )
     held = some_of(len(found) - len(missed), len(found), "statement", "holds", "hold")
     return f"{held}{f' ({names})' if missed else ''}. Not reproduced: {paper.not_reproduced}"
@@ -146,21 +144,23 @@ def claims_of(paper: Paper, found: Sequence[Found]) -> list[Claim]:
 
 def _claim(paper: Paper, text: str, answers: Sequence[Found]) -> Claim:
     missed = [each for each in answers if not each.holds]
-    first = (missed or answers)[0]
-    limit = f"{first.statement.relation} {first.statement.printed}"
-    if first.statement.relation == "=" and first.statement.tolerance:
-        limit = f"{limit} ± {first.statement.tolerance:g}"
-    of_all = f", {some_of(len(answers) - len(missed), len(answers), 'number', 'holds', 'hold')}"
-    told = f"{first.statement.quantity}: {first.value:{paper.digits}}"
-    by = first.statement.by
+    shown = (missed or answers)[0]
+    measured = f"{shown.statement.quantity}: {shown.value:{paper.digits}}"
+    limit = shown.statement.asked
+    if shown.statement.relation == "=" and shown.statement.tolerance:
+        limit = f"{limit} ± {shown.statement.tolerance:g}"
+    if len(answers) > 1 and not missed:
+        measured = some_of(len(answers), len(answers), "number", "holds", "hold")
+        limit = "each as it is printed or required"
+    by = shown.statement.by if missed else ""
     return Claim(
         text=text,
-        measured=told + (of_all if len(answers) > 1 else ""),
+        measured=measured,
         limit=limit,
         holds=not missed,
-        evidence=f"{first.statement.part}-{paper.numbers_key}",
-        status="refuted" if missed and by else "",
-        by=by if missed else "",
+        evidence=f"{shown.statement.part}-{paper.numbers_key}",
+        status="refuted" if by else "",
+        by=by,
     )
 
 

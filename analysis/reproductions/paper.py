@@ -70,6 +70,11 @@ class Statement:
     read: str = ""
     by: str = ""
 
+    @property
+    def asked(self) -> str:
+        """What is printed, with its relation where that is a bound."""
+        return f"{self.relation.strip('=')} {self.printed}".strip()
+
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
@@ -210,10 +215,12 @@ class Paper:
     limits: tuple[str, ...] = ()
     references: tuple[str, ...] = ()
     lead: PaperFigure | None = None
-    numbers_title: str = "{count} printed numbers, and what was found"
-    numbers_caption: str = "Each number as it is printed or quoted, and as it was computed here."
+    numbers_title: str = "{count} numbers, as printed or required, and as found"
+    numbers_caption: str = (
+        "What was read has the key of its source; what has none is required by us, or follows."
+    )
     numbers_key: str = "numbers"
-    asked: str = "printed"
+    asked: str = "printed or required"
     digits: str = ".6g"
     command: str = ""
     packages: tuple[str, ...] = field(default=())

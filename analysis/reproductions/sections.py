@@ -100,7 +100,7 @@ def number_table(paper: Paper, found: Sequence[Found]) -> Table:
             each.statement.case,
             each.statement.quantity,
             f"{each.value:{paper.digits}}",
-            f"{each.statement.relation.strip('=')} {each.statement.printed}".strip(),
+            each.statement.asked,
             f"{each.error:.1e}",
             f"{each.statement.tolerance:.0e}",
             "pass" if each.holds else ("refuted" if each.statement.by else "fail"),
