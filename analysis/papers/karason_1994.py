@@ -204,7 +204,7 @@ PAPER = Paper(
             key="example-1",
             title="The scalar example",
             make=printed.example_1,
-            blocks=("plant", "law", "error", "weights"),
+            blocks=("plant", "controller.law", "controller.error", "controller.weights"),
             picture="The loop as simulated, and the inside of its controller.",
             figures=(
                 PaperFigure(
