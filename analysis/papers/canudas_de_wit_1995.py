@@ -13,29 +13,29 @@ from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
 from ..reproductions.figures import paths_figure, rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
-from ..reproductions.paper import Paper, PaperFigure, Part, Runs, Source, Statement
+from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
-F_S, SIGMA_0, PUSH = 1.5, 1e5, 1.425
-TIGHT = {"rtol": 1e-8, "atol": 1e-12}
+_F_S, _SIGMA_0, _PUSH = 1.5, 1e5, 1.425
+_TIGHT = {"rtol": 1e-8, "atol": 1e-12}
 
 # as read off the reconstructed Fig. 4: rate of the force (N/s), force of break-away (N)
-BREAK_AWAY = {1.0: 1.425, 5.0: 1.307, 10.0: 1.212, 20.0: 1.090, 30.0: 1.012}
+_BREAK_AWAY = {1.0: 1.425, 5.0: 1.307, 10.0: 1.212, 20.0: 1.090, 30.0: 1.012}
 # as read off the reconstructed Fig. 3: frequency (rad/s), largest friction (N)
-LARGEST = {1.0: 1.389, 10.0: 1.378, 25.0: 1.346}
+_LARGEST = {1.0: 1.389, 10.0: 1.378, 25.0: 1.346}
 # as read off the reconstructed Fig. 8: extremes of the position (m), one after the other
-EXTREMES = (1.50, 0.765, 1.115, 0.925)
+_EXTREMES = (1.50, 0.765, 1.115, 0.925)
 
 
 def _presliding() -> PaperCase:
     times = np.linspace(0, 60, 6001)
-    push = PUSH * np.interp(times, [0, 10, 15, 35, 40, 60], [0, 1, 1, -1, -1, 1])
-    return PaperCase(key="presliding", make=printed.example_1, times=times, inputs=push, **TIGHT)
+    push = _PUSH * np.interp(times, [0, 10, 15, 35, 40, 60], [0, 1, 1, -1, -1, 1])
+    return PaperCase(key="presliding", make=printed.example_1, times=times, inputs=push, **_TIGHT)
 
 
 def _ramp(rate: float) -> PaperCase:
     times = np.linspace(0, 2 / rate, 20_001)
     return PaperCase(
-        key=f"ramp {rate:g}", make=printed.example_1, times=times, inputs=rate * times, **TIGHT
+        key=f"ramp {rate:g}", make=printed.example_1, times=times, inputs=rate * times, **_TIGHT
     )
 
 
@@ -45,14 +45,14 @@ def _lag(omega: float) -> PaperCase:
     return PaperCase(key=f"lag {omega:g}", make=make, times=times, rtol=1e-9, atol=1e-13)
 
 
-CASES = (
+_CASES = (
     _presliding(),
-    *map(_ramp, BREAK_AWAY),
-    *map(_lag, LARGEST),
+    *map(_ramp, _BREAK_AWAY),
+    *map(_lag, _LARGEST),
     PaperCase(
-        key="stick-slip", make=printed.example_3, times=np.linspace(0, 30, 15_001), **TIGHT
+        key="stick-slip", make=printed.example_3, times=np.linspace(0, 30, 15_001), **_TIGHT
     ),
-    PaperCase(key="hunting", make=printed.example_4, times=np.linspace(0, 100, 20_001), **TIGHT),
+    PaperCase(key="hunting", make=printed.example_4, times=np.linspace(0, 100, 20_001), **_TIGHT),
 )  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def break_away(run: PaperRun) -> float:
     return float(force[np.argmax(np.diff(force) < 0)])
 
 
-def settled(run: PaperRun) -> tuple[np.ndarray, np.ndarray]:
+def last_period(run: PaperRun) -> tuple[np.ndarray, np.ndarray]:
     """Return velocity (m/s) and friction (N) over the last period of a lag."""
     late = run.time >= 5.0
     return run["velocity"][late], run["force"][late]
@@ -75,7 +75,7 @@ def settled(run: PaperRun) -> tuple[np.ndarray, np.ndarray]:
 
 def width_at(run: PaperRun, velocity: float = 1e-3) -> float:
     """Return by how much friction is larger while the velocity rises (N)."""
-    v, force = settled(run)
+    v, force = last_period(run)
     rising = np.gradient(v) > 0
     order = np.argsort(v[rising]), np.argsort(v[~rising])
     up = np.interp(velocity, v[rising][order[0]], force[rising][order[0]])
@@ -89,7 +89,7 @@ def slips(run: PaperRun) -> np.ndarray:
     return run.time[1:][(v[:-1] < 0.02) & (v[1:] >= 0.02)]
 
 
-def extremes(run: PaperRun) -> np.ndarray:
+def resting_places(run: PaperRun) -> np.ndarray:
     """Return the positions in which the mass rests (m), one after the other."""
     x, v = run["position"], run["velocity"]
     moving = np.abs(v) > 1e-3
@@ -97,7 +97,7 @@ def extremes(run: PaperRun) -> np.ndarray:
     return x[stops + 1]
 
 
-def crossings(run: PaperRun) -> np.ndarray:
+def rises(run: PaperRun) -> np.ndarray:
     """Return when the position rises through 1 m (s)."""
     x = run["position"]
     return run.time[1:][(x[:-1] < 1) & (x[1:] >= 1)]
@@ -120,7 +120,7 @@ def _on_figure_2_and_4() -> list[Statement]:
         ),
         slide(
             quantity="to the closed form of a slow push, (F_s/σ₀) ln 20 (µm)",
-            printed=f"{1e6 * F_S / SIGMA_0 * np.log(20):.2f}", tolerance=0.5,
+            printed=f"{1e6 * _F_S / _SIGMA_0 * np.log(20):.2f}", tolerance=0.5,
             value=lambda runs: position_at(runs["presliding"], 10.0),
         ),
         say(
@@ -135,7 +135,7 @@ def _on_figure_2_and_4() -> list[Statement]:
                 tolerance=0.015, read="figure",
                 value=lambda runs, rate=rate: break_away(runs[f"ramp {rate:g}"]),
             )
-            for rate, force in BREAK_AWAY.items()
+            for rate, force in _BREAK_AWAY.items()
         ),
     ]  # fmt: skip
 
@@ -148,9 +148,9 @@ def _on_figure_3() -> list[Statement]:
             say(
                 claim=claim, case=f"{omega:g} rad/s", quantity="largest friction (N)",
                 printed=f"{force:g}", tolerance=0.005, read="figure",
-                value=lambda runs, omega=omega: float(settled(runs[f"lag {omega:g}"])[1].max()),
+                value=lambda runs, omega=omega: float(last_period(runs[f"lag {omega:g}"])[1].max()),
             )
-            for omega, force in LARGEST.items()
+            for omega, force in _LARGEST.items()
         ),
         *(
             say(
@@ -202,53 +202,53 @@ def _on_figure_8() -> list[Statement]:
         *(
             say(
                 quantity=f"rest {i + 1} (m)", printed=f"{place:g}", tolerance=0.01,
-                value=lambda runs, i=i: float(extremes(runs["hunting"])[i]),
+                value=lambda runs, i=i: float(resting_places(runs["hunting"])[i]),
             )
-            for i, place in enumerate(EXTREMES)
+            for i, place in enumerate(_EXTREMES)
         ),
         say(
             quantity="amplitude of the limit cycle (m)", printed="0.064", tolerance=0.005,
-            value=lambda runs: float(np.ptp(extremes(runs["hunting"])[-2:]) / 2),
+            value=lambda runs: float(np.ptp(resting_places(runs["hunting"])[-2:]) / 2),
         ),
         say(
             quantity="period of the limit cycle (s)", printed="24.4", tolerance=0.5,
-            value=lambda runs: float(np.diff(crossings(runs["hunting"]))[-1]),
+            value=lambda runs: float(np.diff(rises(runs["hunting"]))[-1]),
         ),
     ]  # fmt: skip
 
 
-def statements() -> list[Statement]:
+def _statements() -> list[Statement]:
     """Return what the figures show, as it was read off them."""
     return [*_on_figure_2_and_4(), *_on_figure_3(), *_on_figure_6(), *_on_figure_8()]
 
 
-def presliding(runs: Runs) -> MatplotlibFigure:
+def _draw_presliding(runs: PaperRuns) -> MatplotlibFigure:
     """Friction over displacement before sliding."""
     run = runs["presliding"]
     path = {"friction": (1e6 * run["position"], run["force"])}
     return paths_figure(path, "displacement (µm)", "friction (N)")
 
 
-def away(runs: Runs) -> MatplotlibFigure:
+def _draw_away(runs: PaperRuns) -> MatplotlibFigure:
     """The force of break-away over the rate of the force."""
-    rates = list(BREAK_AWAY)
+    rates = list(_BREAK_AWAY)
     paths = {
         "here": (rates, [break_away(runs[f"ramp {rate:g}"]) for rate in rates]),
-        "as read": (rates, list(BREAK_AWAY.values())),
+        "as read": (rates, list(_BREAK_AWAY.values())),
     }
     return paths_figure(paths, "rate of the force (N/s)", "force of break-away (N)")
 
 
-def lag(runs: Runs) -> MatplotlibFigure:
+def _draw_lag(runs: PaperRuns) -> MatplotlibFigure:
     """Friction over velocity at three frequencies."""
     paths = {}
-    for omega in LARGEST:
-        v, force = settled(runs[f"lag {omega:g}"])
+    for omega in _LARGEST:
+        v, force = last_period(runs[f"lag {omega:g}"])
         paths[f"{omega:g} rad/s"] = (1e3 * v, force)
     return paths_figure(paths, "velocity (mm/s)", "friction (N)")
 
 
-def stick_slip(runs: Runs) -> MatplotlibFigure:
+def _draw_stick_slip(runs: PaperRuns) -> MatplotlibFigure:
     """Position and the end of the spring, friction, velocity."""
     run = runs["stick-slip"]
     t = run.time
@@ -261,7 +261,7 @@ def stick_slip(runs: Runs) -> MatplotlibFigure:
     )
 
 
-def hunting(runs: Runs) -> MatplotlibFigure:
+def _draw_hunting(runs: PaperRuns) -> MatplotlibFigure:
     """The position under PID control, and the force."""
     run = runs["hunting"]
     t = run.time
@@ -273,12 +273,12 @@ def hunting(runs: Runs) -> MatplotlibFigure:
     )
 
 
-CITATION = (
+_CITATION = (
     "C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky: A new model for control of systems "
     "with friction. IEEE Transactions on Automatic Control 40(3), 1995, pp. 419–425. "
     "doi 10.1109/9.376053."
 )
-MODEL = (
+_MODEL = (
     Paragraph(text="Bristles that bend and slip, at the relative velocity v:"),
     Equation(
         latex=r"\dot z = v - \frac{|v|}{g(v)} z,\quad"
@@ -288,7 +288,7 @@ MODEL = (
     Paragraph(text="A mass of 1 kg is pushed, pulled by a spring, or moved to a position:"),
     Equation(latex=r"\ddot x = u - F,\quad u = -K_v \dot x - K_p (x - x_d) - K_i \int (x - x_d)"),
 )
-TABLE_I = (
+_TABLE_I = (
     ("σ₀", "10⁵ N/m", "{friction.sigma_0:g}", "Table I"),
     ("σ₁", "√10⁵ N s/m", "{friction.sigma_1:.5g}", "Table I"),
     ("σ₂", "0.4 N s/m", "{friction.sigma_2:g}", "Table I"),
@@ -296,12 +296,12 @@ TABLE_I = (
     ("v_s", "0.001 m/s", "{friction.v_s:g}", "Table I"),
 )
 
-PAPER = Paper(
+_PAPER = Paper(
     key="canudas_de_wit_1995",
     title="The LuGre model of friction, reproduced",
     question="does the model show what its figures show, with the parameters of its Table I?",
-    citation=CITATION,
-    model=MODEL,
+    citation=_CITATION,
+    model=_MODEL,
     parts=(
         Part(
             key="example-1",
@@ -310,15 +310,15 @@ PAPER = Paper(
             blocks=("mass", "friction"),
             figures=(
                 PaperFigure(
-                    key="example-1-presliding", draw=presliding,
+                    key="example-1-presliding", draw=_draw_presliding,
                     caption="Fig. 2: below the static friction the mass moves by micrometres.",
                 ),
                 PaperFigure(
-                    key="example-1-break-away", draw=away,
+                    key="example-1-break-away", draw=_draw_away,
                     caption="Fig. 4: the faster the force rises, the earlier the mass slides.",
                 ),
             ),
-            parameters=(*TABLE_I, ("mass", "unit", "1", "in kg"),
+            parameters=(*_TABLE_I, ("mass", "unit", "1", "in kg"),
                         ("largest push", "1.425 N, 95 % of F_S", "1.425", "")),
         ),
         Part(
@@ -328,7 +328,7 @@ PAPER = Paper(
             blocks=("motion",),
             figures=(
                 PaperFigure(
-                    key="example-2-lag", draw=lag,
+                    key="example-2-lag", draw=_draw_lag,
                     caption="Fig. 3: friction is larger while the velocity rises.",
                 ),
             ),
@@ -345,7 +345,7 @@ PAPER = Paper(
             blocks=("end", "spring"),
             figures=(
                 PaperFigure(
-                    key="example-3-stick-slip", draw=stick_slip,
+                    key="example-3-stick-slip", draw=_draw_stick_slip,
                     caption="Fig. 6: it sticks until the spring is strong enough, and slips.",
                 ),
             ),
@@ -361,7 +361,7 @@ PAPER = Paper(
             blocks=("control",),
             figures=(
                 PaperFigure(
-                    key="example-4-hunting", draw=hunting,
+                    key="example-4-hunting", draw=_draw_hunting,
                     caption="Fig. 8: the integral grows while the mass sticks, and it never rests.",
                 ),
             ),
@@ -372,22 +372,22 @@ PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, CASES),
-    cases=len(CASES),
-    statements=statements,
+    simulate=partial(simulate_cases, _CASES),
+    cases=len(_CASES),
+    statements=_statements,
     reproduced="Figs. 2, 3, 4, 6 and 8: presliding, lag, break-away, stick-slip, hunting",
     not_reproduced=(
         "the article's own pictures, which could not be read (numbers are read off a "
         "reconstruction); Figs. 5 and 7; the friction observer."
     ),
     sources=(
-        Source(
+        PaperSource(
             key="figure",
             text="Pictures of the repository auralius/LuGre (commit 1b72c62, 2023-02-14), which "
             "calls itself a full reconstruction of the article and says which picture is which "
             "figure; read off by eye, to about a pixel.",
         ),
-        Source(
+        PaperSource(
             key="program",
             text="The MATLAB programs of that repository: Table I, unit mass, spring, gains of the "
             "PID controller, and what the article says of how each figure was made.",
@@ -410,11 +410,11 @@ PAPER = Paper(
     limits=(
         "The model's behaviour is reproduced, not that of friction: nothing here was measured.",
     ),
-    references=(CITATION,),
+    references=(_CITATION,),
     lead=PaperFigure(
-        key="lead", draw=hunting,
+        key="lead", draw=_draw_hunting,
         caption="Under PID control the mass hunts about the position that is wanted.",
     ),
 )  # fmt: skip
 
-REPRODUCTION = Reproduction(paper=PAPER, compose=partial(compose_paper, PAPER))
+REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

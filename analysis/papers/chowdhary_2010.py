@@ -14,19 +14,19 @@ from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
 from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
-from ..reproductions.paper import Paper, PaperFigure, Part, Runs, Source, Statement
+from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
-TIMES = np.linspace(0, 40, 4001)
-W, GAMMA = (-1.0, 1.0, 0.5), 3.5
-P = solve_continuous_lyapunov(np.array([[0.0, 1.0], [-1.5, -1.3]]).T, -np.eye(2))
+_TIMES = np.linspace(0, 40, 4001)
+W, _GAMMA = (-1.0, 1.0, 0.5), 3.5
+_P = solve_continuous_lyapunov(np.array([[0.0, 1.0], [-1.5, -1.3]]).T, -np.eye(2))
 
-CASES = (
-    PaperCase(key="with", make=printed.example_1, times=TIMES, start=printed.START),
+_CASES = (
+    PaperCase(key="with", make=printed.example_1, times=_TIMES, start=printed.INITIAL_STATE),
     PaperCase(
         key="without",
         make=partial(printed.example_1, concurrent=False),
-        times=TIMES,
-        start=printed.START,
+        times=_TIMES,
+        start=printed.INITIAL_STATE,
     ),
 )
 
@@ -55,13 +55,13 @@ def lyapunov_function(run: PaperRun) -> np.ndarray:
     """Return V = E^T P E + |W_hat - W|^2 / Gamma along a run."""
     E = np.array([run[f"plant.x{i}"] - run[f"model.xm{i}"] for i in (1, 2)])
     off = weights(run) - np.array(W)[:, None]
-    return np.einsum("ik,ij,jk->k", E, P, E) + np.sum(off**2, axis=0) / GAMMA
+    return np.einsum("ik,ij,jk->k", E, _P, E) + np.sum(off**2, axis=0) / _GAMMA
 
 
 def decay_rate(run: PaperRun) -> float:
     """Return the rate of V that Q and the record imply (1/s)."""
-    of_state = 1.0 / np.linalg.eigvalsh(P)[-1]
-    return float(min(of_state, 2 * GAMMA * np.linalg.eigvalsh(record_matrix(run))[0]))
+    of_state = 1.0 / np.linalg.eigvalsh(_P)[-1]
+    return float(min(of_state, 2 * _GAMMA * np.linalg.eigvalsh(record_matrix(run))[0]))
 
 
 def above_bound(run: PaperRun) -> float:
@@ -73,7 +73,7 @@ def above_bound(run: PaperRun) -> float:
     return float((V[shown] / bound[shown]).max())
 
 
-def statements() -> list[Statement]:
+def _statements() -> list[Statement]:
     """Return what the program has, and what the authors say of it."""
     say = partial(Statement, part="example-1")
     own, other = "with recorded points", "without"
@@ -115,25 +115,25 @@ def statements() -> list[Statement]:
     ]  # fmt: skip
 
 
-def tracked(runs: Runs) -> MatplotlibFigure:
+def _tracked(runs: PaperRuns) -> MatplotlibFigure:
     """The angle and its model, and the errors of both laws."""
     own, other = runs["with"], runs["without"]
-    angles = {"model": (TIMES, own["xm1"]), "plant": (TIMES, own["y"])}
+    angles = {"model": (_TIMES, own["xm1"]), "plant": (_TIMES, own["y"])}
     return rows_over_time(
         {
             "$x_1$": angles,
-            "$e$": {"with a record": (TIMES, own["e"]), "without": (TIMES, other["e"])},
+            "$e$": {"with a record": (_TIMES, own["e"]), "without": (_TIMES, other["e"])},
         }
     )
 
 
-def learned(runs: Runs) -> MatplotlibFigure:
+def _learned(runs: PaperRuns) -> MatplotlibFigure:
     """The weights of both laws, and the true ones."""
     rows = {}
     for key, label in (("with", "with a record"), ("without", "without")):
         names = [rf"$\hat W_{i}$" for i in range(3)]
         found = zip(names, weights(runs[key]), strict=True)
-        rows[label] = {name: (TIMES, values) for name, values in found}
+        rows[label] = {name: (_TIMES, values) for name, values in found}
     figure = rows_over_time(rows)
     for ax in figure.axes:
         for value in W:
@@ -141,11 +141,11 @@ def learned(runs: Runs) -> MatplotlibFigure:
     return figure
 
 
-CITATION = (
+_CITATION = (
     "G. Chowdhary, E. Johnson: Concurrent learning for convergence in adaptive control without "
     "persistency of excitation. 49th IEEE Conference on Decision and Control, 2010, p. 3674."
 )
-MODEL = (
+_MODEL = (
     Paragraph(text="A plant like an inverted pendulum, and a model that it shall follow:"),
     Equation(
         latex=r"\ddot x = \delta - \sin(\pi x) + |\dot x| \dot x"
@@ -163,12 +163,12 @@ MODEL = (
     ),
 )
 
-PAPER = Paper(
+_PAPER = Paper(
     key="chowdhary_2010",
     title="Concurrent learning without persistent excitation, reproduced",
     question="do weights that learn from recorded points come to their true values?",
-    citation=CITATION,
-    model=MODEL,
+    citation=_CITATION,
+    model=_MODEL,
     parts=(
         Part(
             key="example-1",
@@ -177,11 +177,11 @@ PAPER = Paper(
             blocks=("plant", "basis", "law"),
             figures=(
                 PaperFigure(
-                    key="example-1-weights", draw=learned,
+                    key="example-1-weights", draw=_learned,
                     caption="Weights with and without a record; dotted, the true ones.",
                 ),
                 PaperFigure(
-                    key="example-1-tracking", draw=tracked,
+                    key="example-1-tracking", draw=_tracked,
                     caption="The angle follows its model; the error with and without a record.",
                 ),
             ),
@@ -198,22 +198,22 @@ PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, CASES),
-    cases=len(CASES),
-    statements=statements,
+    simulate=partial(simulate_cases, _CASES),
+    cases=len(_CASES),
+    statements=_statements,
     reproduced="weights with and without a record, on the first author's uncertain pendulum",
     not_reproduced=(
         "the article's figures, which could not be read; its rule that trains on present data "
         "first; recorded points by the rule of rank, in the place of which there is their number."
     ),
     sources=(
-        Source(
+        PaperSource(
             key="program",
             text="G. Chowdhary's program “inverted pendulum like system simulation with structured "
             "uncertainty”, last modified 2010-11-16, with its function inv_pendu, in a public "
             "repository; it refers to the article.",
         ),
-        Source(
+        PaperSource(
             key="abstract",
             text="The abstracts of “Adaptive flight control with guaranteed convergence” and of "
             "“Exponential parameter and tracking error convergence guarantees for adaptive "
@@ -235,11 +235,11 @@ PAPER = Paper(
         "The acceleration is measured, as in the program.",
     ),
     limits=("One run from one start; there is no noise on the acceleration.",),
-    references=(CITATION,),
+    references=(_CITATION,),
     lead=PaperFigure(
-        key="lead", draw=learned,
+        key="lead", draw=_learned,
         caption="With a record the weights come to their true values (dotted).",
     ),
 )  # fmt: skip
 
-REPRODUCTION = Reproduction(paper=PAPER, compose=partial(compose_paper, PAPER))
+REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

@@ -13,25 +13,27 @@ from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
 from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
-from ..reproductions.paper import Paper, PaperFigure, Part, Runs, Source, Statement
+from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
-TIMES = np.linspace(0, 20, 8001)
-THETA, K = -2.0, 1.0  # the gains of the matching conditions
-SMALL = 0.25
+_TIMES = np.linspace(0, 20, 8001)
+_THETA, K = -2.0, 1.0  # the gains of the matching conditions
+_SMALL = 0.25
 
 
 def _case(key: str, learns_from: str, amplitude: float) -> PaperCase:
     make = partial(printed.example_1, learns_from=learns_from, amplitude=amplitude)
-    return PaperCase(key=key, make=make, times=TIMES, start=printed.START, rtol=1e-10, atol=1e-12)
+    return PaperCase(
+        key=key, make=make, times=_TIMES, start=printed.INITIAL_STATE, rtol=1e-10, atol=1e-12
+    )
 
 
-CASES = (
+_CASES = (
     _case("with", "controllable", 5.0),
     _case("without", "all", 5.0),
     _case("with, sin", "controllable", 1.0),
     _case("without, sin", "all", 1.0),
 )
-COMMANDS = {"5 sin 0.5t": ("", 5.0), "sin 0.5t": (", sin", 1.0)}  # suffix of the keys, amplitude
+_COMMANDS = {"5 sin 0.5t": ("", 5.0), "sin 0.5t": (", sin", 1.0)}  # suffix of the keys, amplitude
 
 
 def last_saturated(run: PaperRun) -> float:
@@ -63,7 +65,7 @@ def imbalance(run: PaperRun) -> float:
     """Return how far V(20) - V(0) is from the integral of a_m e_u^2, of V(0)."""
     theta, k = gains(run)
     beta = run["controller.error.beta_hat"]
-    V = (run["r"] ** 2 + ((theta - THETA) ** 2 + (k - K) ** 2) / 0.1 + (beta - 1) ** 2) / 2
+    V = (run["r"] ** 2 + ((theta - _THETA) ** 2 + (k - K) ** 2) / 0.1 + (beta - 1) ** 2) / 2
     lost = np.trapezoid(run["r"] ** 2, run.time)
     return float(abs(V[-1] - V[0] + lost) / V[0])
 
@@ -79,7 +81,7 @@ def _with_correction(command: str, suffix: str) -> list[Statement]:
             value=lambda runs: last_saturated(runs[f"with{suffix}"]),
         ),
         say(
-            quantity="max |e| for t ≥ 10 s", printed=f"{SMALL:g}", relation="≤",
+            quantity="max |e| for t ≥ 10 s", printed=f"{_SMALL:g}", relation="≤",
             value=lambda runs: late_error(runs[f"with{suffix}"], 10.0),
         ),
     ]  # fmt: skip
@@ -106,12 +108,12 @@ def _without_correction(command: str, suffix: str, amplitude: float) -> list[Sta
     ]  # fmt: skip
 
 
-def statements() -> list[Statement]:
+def _statements() -> list[Statement]:
     """Return what is said of the runs, and what must follow."""
     say = partial(Statement, part="example-1", case="controllable error, 5 sin 0.5t")
     return [
-        *(line for c, (suffix, _) in COMMANDS.items() for line in _with_correction(c, suffix)),
-        *(line for c, own in COMMANDS.items() for line in _without_correction(c, *own)),
+        *(line for c, (suffix, _) in _COMMANDS.items() for line in _with_correction(c, suffix)),
+        *(line for c, own in _COMMANDS.items() for line in _without_correction(c, *own)),
         say(
             claim="Does V fall by the integral of the controllable error squared?", read="post",
             quantity="imbalance of V, of V(0)", printed="0", tolerance=1e-5,
@@ -130,7 +132,7 @@ def statements() -> list[Statement]:
     ]  # fmt: skip
 
 
-def states_and_inputs(runs: Runs) -> MatplotlibFigure:
+def _states_and_inputs(runs: PaperRuns) -> MatplotlibFigure:
     """Plant and model, and the input, with and without the correction."""
     own, other = runs["with"], runs["without"]
     t = own.time
@@ -146,7 +148,7 @@ def states_and_inputs(runs: Runs) -> MatplotlibFigure:
     )
 
 
-def errors(runs: Runs) -> MatplotlibFigure:
+def _errors(runs: PaperRuns) -> MatplotlibFigure:
     """The error, and its part that the gains learn from."""
     run = runs["with"]
     t = run.time
@@ -156,23 +158,23 @@ def errors(runs: Runs) -> MatplotlibFigure:
     )
 
 
-def estimates(runs: Runs) -> MatplotlibFigure:
+def _estimates(runs: PaperRuns) -> MatplotlibFigure:
     """The gains of both laws."""
     rows = {}
     for name, place in ((r"$\theta$", 0), ("$k$", 1)):
         values = {key: gains(runs[key])[place] for key in ("with", "without")}
         rows[name] = {
-            "controllable error": (TIMES, values["with"]),
-            "all of the error": (TIMES, values["without"]),
+            "controllable error": (_TIMES, values["with"]),
+            "all of the error": (_TIMES, values["without"]),
         }
     return rows_over_time(rows)
 
 
-CITATION = (
+_CITATION = (
     "S. P. Karason, A. M. Annaswamy: Adaptive control in the presence of input constraints. IEEE "
     "Transactions on Automatic Control 39(11), 1994, pp. 2325–2330. doi 10.1109/9.333787."
 )
-MODEL = (
+_MODEL = (
     Paragraph(text="Plant, reference model, and a law whose output is limited:"),
     Equation(
         latex=r"\dot x_p = x_p + u,\quad \dot x_m = -x_m + r,\quad u_c = \theta x_p + k r,\quad"
@@ -193,12 +195,12 @@ MODEL = (
     ),
 )
 
-PAPER = Paper(
+_PAPER = Paper(
     key="karason_1994",
     title="Adaptive control with a constrained input, reproduced",
     question="does an unstable plant at the edge of what its input can hold track in the end?",
-    citation=CITATION,
-    model=MODEL,
+    citation=_CITATION,
+    model=_MODEL,
     parts=(
         Part(
             key="example-1",
@@ -208,15 +210,15 @@ PAPER = Paper(
             picture="The loop as simulated, and the inside of its controller.",
             figures=(
                 PaperFigure(
-                    key="example-1-states", draw=states_and_inputs,
+                    key="example-1-states", draw=_states_and_inputs,
                     caption="Plant and model, and the input, with and without the correction.",
                 ),
                 PaperFigure(
-                    key="example-1-errors", draw=errors,
+                    key="example-1-errors", draw=_errors,
                     caption="The error, the part to learn from, and the part due to the limit.",
                 ),
                 PaperFigure(
-                    key="example-1-gains", draw=estimates, folded=True,
+                    key="example-1-gains", draw=_estimates, folded=True,
                     caption="Gains: with the correction they stay near −2 and 1.",
                 ),
             ),
@@ -235,22 +237,22 @@ PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, CASES),
-    cases=len(CASES),
-    statements=statements,
+    simulate=partial(simulate_cases, _CASES),
+    cases=len(_CASES),
+    statements=_statements,
     reproduced="both runs of its scalar example, and the balance of its Lyapunov function",
     not_reproduced=(
         "what the post says of seven seconds, with its program's command; the article's own gains "
         "and figures, which are not given or could not be read; its local theorem."
     ),
     sources=(
-        Source(
+        PaperSource(
             key="post",
             text="D. P. Wiese: Adaptive control in the presence of input constraints, 2020-12-12 "
             "(repository dpwiese/personal-website): equations, the Lyapunov function, and what is "
             "seen in two runs that were made to be similar to those of the article.",
         ),
-        Source(
+        PaperSource(
             key="program",
             text="The program of that post (repository dpwiese/control-examples, "
             "saturation-protection): all values.",
@@ -276,11 +278,11 @@ PAPER = Paper(
         "Two runs from one start. Beyond |x| = 10 no input of at most 10 brings the plant back, "
         "whatever the law.",
     ),
-    references=(CITATION,),
+    references=(_CITATION,),
     lead=PaperFigure(
-        key="lead", draw=states_and_inputs,
+        key="lead", draw=_states_and_inputs,
         caption="The plant comes back from the edge, and follows its model.",
     ),
 )  # fmt: skip
 
-REPRODUCTION = Reproduction(paper=PAPER, compose=partial(compose_paper, PAPER))
+REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

@@ -13,7 +13,7 @@ from nlctl.wording import some_of
 
 from ..report.document import Claim, Figure, Report, Section, versions
 from ..report.svg import Drawn
-from .paper import Found, Paper, Runs
+from .paper import FoundNumber, Paper, PaperRuns
 from .sections import (
     drawn_figure,
     found_numbers,
@@ -108,7 +108,7 @@ def report_of(
     )
 
 
-def paper_page(paper: Paper, runs: Runs) -> Report:
+def paper_page(paper: Paper, runs: PaperRuns) -> Report:
     """Compose the page of a paper from its runs."""
     found = found_numbers(paper, runs)
     parts = [section for part in paper.parts for section in part_sections(paper, part, runs, found)]
@@ -124,7 +124,7 @@ def paper_page(paper: Paper, runs: Runs) -> Report:
     )
 
 
-def verdict_of(paper: Paper, found: Sequence[Found]) -> str:
+def verdict_of(paper: Paper, found: Sequence[FoundNumber]) -> str:
     """Return how many statements hold, which do not, and what is not reproduced at all."""
     missed = [f for f in found if not f.holds]
     names = "; ".join(
@@ -134,15 +134,15 @@ def verdict_of(paper: Paper, found: Sequence[Found]) -> str:
     return f"{held}{f' ({names})' if missed else ''}. Not reproduced: {paper.not_reproduced}"
 
 
-def claims_of(paper: Paper, found: Sequence[Found]) -> list[Claim]:
+def claims_of(paper: Paper, found: Sequence[FoundNumber]) -> list[Claim]:
     """Return one claim for each question, with the numbers that answer it."""
-    asked: dict[str, list[Found]] = {}
+    asked: dict[str, list[FoundNumber]] = {}
     for each in found:
         asked.setdefault(each.statement.claim, []).append(each)
     return [_claim(paper, text, answers) for text, answers in asked.items()]
 
 
-def _claim(paper: Paper, text: str, answers: Sequence[Found]) -> Claim:
+def _claim(paper: Paper, text: str, answers: Sequence[FoundNumber]) -> Claim:
     missed = [each for each in answers if not each.holds]
     shown = (missed or answers)[0]
     measured = f"{shown.statement.quantity}: {shown.value:{paper.digits}}"

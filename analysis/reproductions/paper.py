@@ -11,14 +11,14 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from ..report.document import Item
 
-__all__ = ["Found", "Paper", "PaperFigure", "Part", "Source", "Statement"]
+__all__ = ["FoundNumber", "Paper", "PaperFigure", "PaperSource", "Part", "Statement"]
 
-Runs = Mapping[str, Any]
+PaperRuns = Mapping[str, Any]
 """Simulated cases of a paper by key."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class PaperSource:
     """Where numbers of a paper were read.
 
     Attributes
@@ -64,7 +64,7 @@ class Statement:
     case: str
     quantity: str
     printed: str
-    value: Callable[[Runs], float]
+    value: Callable[[PaperRuns], float]
     relation: str = "="
     tolerance: float = 0.0
     read: str = ""
@@ -77,7 +77,7 @@ class Statement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class FoundNumber:
     """A statement, and what was found."""
 
     statement: Statement
@@ -113,8 +113,8 @@ class PaperFigure:
 
     key: str
     caption: str
-    draw: Callable[[Runs], MatplotlibFigure]
-    description: str | Callable[[Runs], str] = ""
+    draw: Callable[[PaperRuns], MatplotlibFigure]
+    description: str | Callable[[PaperRuns], str] = ""
     folded: bool = False
 
 
@@ -152,7 +152,7 @@ class Part:
     figures: tuple[PaperFigure, ...] = ()
     more: str = "More figures"
     parameters: tuple[tuple[str, str, str, str], ...] = ()
-    items: Callable[[Runs], Sequence[Item]] | None = None
+    items: Callable[[PaperRuns], Sequence[Item]] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,7 +175,7 @@ class Paper:
         How many are simulated.
     statements : callable
         Returns them; it is called once per page.
-    sources : tuple of Source
+    sources : tuple of PaperSource
         What was read, next to the references.
     open_points : tuple of str
         What does not reproduce, what could not be read, and what is a choice of ours.
@@ -202,14 +202,14 @@ class Paper:
     question: str
     citation: str
     parts: tuple[Part, ...]
-    simulate: Callable[[Callable[[float], object]], Runs]
+    simulate: Callable[[Callable[[float], object]], PaperRuns]
     cases: int
     statements: Callable[[], Sequence[Statement]]
     reproduced: str
     not_reproduced: str
     heading: str = "What the paper has"
     model: tuple[Item, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[PaperSource, ...] = ()
     open_points: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()

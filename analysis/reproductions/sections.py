@@ -11,7 +11,7 @@ from nlctl.diagrams import leaves
 from ..pages.diagram import diagram_figure
 from ..report.document import Figure, Item, Paragraph, Section, Table
 from ..report.equations import equations_of
-from .paper import Found, Paper, PaperFigure, Part, Runs
+from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part
 
 __all__ = [
     "drawn_figure",
@@ -23,9 +23,9 @@ __all__ = [
 ]
 
 
-def found_numbers(paper: Paper, runs: Runs) -> list[Found]:
+def found_numbers(paper: Paper, runs: PaperRuns) -> list[FoundNumber]:
     """Return every statement of a paper with the value that the runs give it."""
-    return [Found(statement=s, value=float(s.value(runs))) for s in paper.statements()]
+    return [FoundNumber(statement=s, value=float(s.value(runs))) for s in paper.statements()]
 
 
 def model_section(paper: Paper) -> Section:
@@ -36,7 +36,9 @@ def model_section(paper: Paper) -> Section:
     )  # fmt: skip
 
 
-def part_sections(paper: Paper, part: Part, runs: Runs, found: Sequence[Found]) -> list[Section]:
+def part_sections(
+    paper: Paper, part: Part, runs: PaperRuns, found: Sequence[FoundNumber]
+) -> list[Section]:
     """Return one example: its loop and its figures, then what is folded below them."""
     diagram = part.make()
     key, own = part.key, [each for each in found if each.statement.part == part.key]
@@ -64,7 +66,7 @@ def part_sections(paper: Paper, part: Part, runs: Runs, found: Sequence[Found]) 
     ]
 
 
-def drawn_figure(figure: PaperFigure, runs: Runs) -> Figure:
+def drawn_figure(figure: PaperFigure, runs: PaperRuns) -> Figure:
     """Return a figure of a paper, drawn."""
     told = figure.description
     text = told(runs) if isinstance(told, Callable) else told
@@ -91,7 +93,7 @@ def parameter_table(part: Part, diagram: ct.InterconnectedSystem) -> Table:
     )
 
 
-def number_table(paper: Paper, found: Sequence[Found]) -> Table:
+def number_table(paper: Paper, found: Sequence[FoundNumber]) -> Table:
     """Return numbers as found and as printed; where they were read, if that is known of any."""
     is_read = any(each.statement.read for each in found)
     columns = ("case", "quantity", "found", paper.asked, "difference", "tolerance", "status")

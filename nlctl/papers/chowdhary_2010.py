@@ -26,9 +26,9 @@ from ..plants import integrator_chain, no_disturbance
 from ..references import FunctionReference
 from ..sampling import sampled
 
-__all__ = ["START", "Pendulum", "PendulumRegressor", "example_1"]
+__all__ = ["INITIAL_STATE", "Pendulum", "PendulumRegressor", "example_1"]
 
-START = {"model.xm1": 1.0, "model.xm2": 1.0}
+INITIAL_STATE = {"model.xm1": 1.0, "model.xm2": 1.0}
 """Start of the reference model, which is that of the plant."""
 
 
@@ -40,7 +40,7 @@ def regressor(x):
 
 
 @equation
-def acceleration(x, v, p):
+def pendulum_acceleration(x, v, p):
     """Angular acceleration v + W^T psi(x)."""
     psi, rate = regressor(x), 1.0 * v
     for i in range(3):
@@ -85,16 +85,16 @@ class Pendulum:
     initial = {"x1": 1.0, "x2": 1.0}
     feedthrough = True
 
-    f = staticmethod(acceleration)
+    f = staticmethod(pendulum_acceleration)
     d = staticmethod(still)
-    update = staticmethod(integrator_chain(acceleration, still))
+    update = staticmethod(integrator_chain(pendulum_acceleration, still))
 
     @staticmethod
     @equation
     def output(t, x, u, p):
         """The angle, the state, and the acceleration."""
         x1, x2 = x
-        return x1, x1, x2, acceleration((x1, x2), u[0], p)
+        return x1, x1, x2, pendulum_acceleration((x1, x2), u[0], p)
 
     @staticmethod
     @equation

@@ -24,9 +24,9 @@ from ..equations import equation
 from ..plants import PureFeedback
 from ..references import SumOfSines
 
-__all__ = ["START", "example_1"]
+__all__ = ["INITIAL_STATE", "example_1"]
 
-START = {
+INITIAL_STATE = {
     "controller.model.xm1": -9.9,
     "controller.weights.W_hat[0]": 2.2,
     "controller.weights.W_hat[1]": -1.1,

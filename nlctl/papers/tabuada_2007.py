@@ -15,7 +15,7 @@ from ..equations import equation
 from ..params import param, record
 from ..sampling.triggered import TriggeredHold
 
-__all__ = ["START", "RelativeThreshold", "example_1", "least_interval"]
+__all__ = ["INITIAL_STATE", "RelativeThreshold", "example_1", "least_interval"]
 
 
 @record
@@ -88,7 +88,7 @@ def example_1(*, sigma: float = 0.03, name: str = "example_1") -> ct.Interconnec
     Examples
     --------
     >>> loop = nlctl.papers.tabuada_2007.example_1()
-    >>> run = nlctl.input_output_response(loop, [0, 1], 0, nlctl.papers.tabuada_2007.START)
+    >>> run = nlctl.input_output_response(loop, [0, 1], 0, nlctl.papers.tabuada_2007.INITIAL_STATE)
     >>> print(run.events["time"].iloc[1:].diff().min() > 0.005)
     True
     """
@@ -105,7 +105,7 @@ def example_1(*, sigma: float = 0.03, name: str = "example_1") -> ct.Interconnec
     return interconnect(parts, outputs=outputs, name=name)
 
 
-START = {"plant.x[0]": 0.5, "plant.x[1]": 0.5}
+INITIAL_STATE = {"plant.x[0]": 0.5, "plant.x[1]": 0.5}
 """Where a program of a reader starts; the article's own start could not be read."""
 
 

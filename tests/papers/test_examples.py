@@ -16,9 +16,9 @@ rates = st.floats(0.1, 10.0)
 angles = st.floats(0.0, 2 * np.pi)
 
 LOOPS = {
-    "tabuada_2007.example_1": (tabuada_2007.example_1, tabuada_2007.START, 0.3),
-    "karason_1994.example_1": (karason_1994.example_1, karason_1994.START, 2.0),
-    "chowdhary_2010.example_1": (chowdhary_2010.example_1, chowdhary_2010.START, 0.4),
+    "tabuada_2007.example_1": (tabuada_2007.example_1, tabuada_2007.INITIAL_STATE, 0.3),
+    "karason_1994.example_1": (karason_1994.example_1, karason_1994.INITIAL_STATE, 2.0),
+    "chowdhary_2010.example_1": (chowdhary_2010.example_1, chowdhary_2010.INITIAL_STATE, 0.4),
     "canudas_de_wit_1995.example_2": (canudas_de_wit_1995.example_2, {}, 0.02),
     "canudas_de_wit_1995.example_3": (canudas_de_wit_1995.example_3, {}, 0.01),
     "canudas_de_wit_1995.example_4": (canudas_de_wit_1995.example_4, {}, 0.01),
@@ -56,9 +56,9 @@ def test_the_least_interval_is_that_of_its_differential_equation(a, b, sigma):
 def test_the_effect_of_an_error_is_within_the_least_b(x, e):
     """2 x^T P B K e <= 2 |P B K| |x| |e|, in all directions; the quoted 8 is not enough in one."""
     x, e = np.array([np.cos(x), np.sin(x)]), np.array([np.cos(e), np.sin(e)])
-    assert 2 * x @ tabuada.P @ tabuada.BK @ e <= tabuada.coupling() * (1 + 1e-12)
-    U, _, V = np.linalg.svd(tabuada.P @ tabuada.BK)
-    assert 2 * U[:, 0] @ tabuada.P @ tabuada.BK @ V[0] == pytest.approx(8.5)
+    assert 2 * x @ tabuada.LYAPUNOV_MATRIX @ tabuada.BK @ e <= tabuada.coupling() * (1 + 1e-12)
+    U, _, V = np.linalg.svd(tabuada.LYAPUNOV_MATRIX @ tabuada.BK)
+    assert 2 * U[:, 0] @ tabuada.LYAPUNOV_MATRIX @ tabuada.BK @ V[0] == pytest.approx(8.5)
 
 
 @pytest.mark.slow
@@ -70,15 +70,15 @@ def test_no_interval_undercuts_the_bound(angle, sigma):
     loop = nlctl.compile(tabuada_2007.example_1(sigma=sigma))
     made = nlctl.input_output_response(loop, times, 0, start, **TIGHT)
     between = np.diff(made.events["time"].to_numpy())
-    assert between.min() >= tabuada.bound(sigma) * (1 - 1e-7)
+    assert between.min() >= tabuada.interval_bound(sigma) * (1 - 1e-7)
     x = made.outputs[:2]
-    assert np.all(np.diff(np.einsum("ik,ij,jk->k", x, tabuada.P, x)[1:]) < 0)
+    assert np.all(np.diff(np.einsum("ik,ij,jk->k", x, tabuada.LYAPUNOV_MATRIX, x)[1:]) < 0)
 
 
 def test_the_plant_of_the_record_is_that_of_the_diagram():
     """What the page computes norms of is what is simulated."""
     plant = next(s for s in tabuada_2007.example_1().syslist if s.name == "plant")
-    np.testing.assert_array_equal(plant.A, tabuada.A)
+    np.testing.assert_array_equal(plant.A, tabuada.PLANT_MATRIX)
     np.testing.assert_array_equal(plant.B @ [[1.0, -4.0]], tabuada.BK)
 
 
@@ -87,7 +87,7 @@ def test_the_lyapunov_function_of_concurrent_learning_is_balanced():
     times = np.linspace(0.5, 4.0, 7001)
     loop = chowdhary_2010.example_1()
     made = nlctl.input_output_response(
-        loop, np.append(0.0, times), 0, chowdhary_2010.START, **TIGHT
+        loop, np.append(0.0, times), 0, chowdhary_2010.INITIAL_STATE, **TIGHT
     )  # fmt: skip
     signals = dict(zip(nlctl.state_names(loop), made.states[:, 1:], strict=True))
     run = type("Run", (), {"time": times, "__getitem__": lambda self, name: signals[name]})()

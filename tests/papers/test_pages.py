@@ -9,7 +9,7 @@ from places import ROOT
 import nlctl
 from nlctl.analysis.papers import named_paper, paper_names
 from nlctl.analysis.reproductions.page import compose_paper, paper_page
-from nlctl.analysis.reproductions.paper import Found, Statement
+from nlctl.analysis.reproductions.paper import FoundNumber, Statement
 from nlctl.analysis.reproductions.sections import found_numbers
 
 SIBLINGS = [name for name in paper_names() if name != "lv_2017"]
@@ -87,7 +87,7 @@ def test_what_is_found_of_a_bound():
             claim="", part="", case="", quantity="", printed="2", relation=relation,
             value=lambda runs: value,
         )  # fmt: skip
-        found = Found(statement=line, value=value)
+        found = FoundNumber(statement=line, value=value)
         return found.error, found.holds
 
     assert error("≤", 1.0) == error("≥", 3.0) == (0.0, True)

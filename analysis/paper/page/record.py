@@ -8,7 +8,7 @@ from collections.abc import Callable
 from nlctl import paper
 
 from ...report.document import History, Paragraph
-from ...reproductions.paper import Found, Paper, PaperFigure, Part, Runs, Statement
+from ...reproductions.paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part, Statement
 from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expectations, run_all
 from .. import figures as histories
 from . import text as text
@@ -47,9 +47,9 @@ _PLOTS = (
 _SHOWN = ("tracking", "input")  # the other figures are folded
 
 
-def found_of(check: Check) -> Found:
+def found_of(check: Check) -> FoundNumber:
     """Return a figure that was reached or missed as a statement and what was found."""
-    return Found(statement=_statement(check.expectation), value=check.value)
+    return FoundNumber(statement=_statement(check.expectation), value=check.value)
 
 
 def _statement(expected: Expectation) -> Statement:
@@ -65,7 +65,7 @@ def _statement(expected: Expectation) -> Statement:
     )
 
 
-def _simulate(done: Callable[[float], object]) -> Runs:
+def _simulate(done: Callable[[float], object]) -> PaperRuns:
     return run_all(CASES, done=lambda _: done(1))
 
 
