@@ -14,7 +14,7 @@ from nlctl.plotting.labels import plain
 
 __all__ = ["arms", "drawable", "number_axes", "plain", "within_reach"]
 
-LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
+_LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
 
 
 def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
@@ -39,7 +39,7 @@ def within_reach(values: object) -> np.ndarray:
     """Return numbers with infinite ones just beyond the finite ones; NaN stays."""
     y = np.asarray(values, dtype=float)
     reach = 1.15 * float(np.max(np.abs(y), initial=0.0, where=np.isfinite(y))) or 1.0
-    return np.clip(y, -min(reach, LARGEST), min(reach, LARGEST))
+    return np.clip(y, -min(reach, _LARGEST), min(reach, _LARGEST))
 
 
 def drawable(table: pd.DataFrame) -> pd.DataFrame:
