@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
@@ -16,7 +17,7 @@ from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
 _F_S, _SIGMA_0, _PUSH = 1.5, 1e5, 1.425
-_TIGHT = {"rtol": 1e-8, "atol": 1e-12}
+_TIGHT: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-12}
 
 # as read off the reconstructed Fig. 4: rate of the force (N/s), force of break-away (N)
 _BREAK_AWAY = {1.0: 1.425, 5.0: 1.307, 10.0: 1.212, 20.0: 1.090, 30.0: 1.012}

@@ -50,7 +50,7 @@ def coupling() -> float:
 def sampling_times(run: PaperRun) -> np.ndarray:
     """Return when samples were taken (s), the first one right behind the start."""
     rows = run.events
-    return rows["time"][rows["block"] == "hold"].to_numpy()
+    return np.asarray(rows["time"][rows["block"] == "hold"])
 
 
 def intervals(run: PaperRun) -> np.ndarray:

@@ -71,7 +71,7 @@ class PositionControl:
         return (-p.K_v * velocity - p.K_p * (position - wanted) - p.K_i * integral,)
 
 
-def _mass() -> ct.StateSpace:
+def _mass() -> ct.InputOutputSystem:
     """Return a mass of 1 kg with an applied force and friction."""
     return ct.ss(
         [[0, 1], [0, 0]], [[0, 0], [1, -1]], np.eye(2), 0, name="mass",

@@ -85,7 +85,7 @@ def example_1(
         law=ConstrainedLaw(u_max=10.0),
     )
     blocks = {
-        "command": SumOfSines(order=0, amplitudes=amplitude, frequencies=0.5, phases=0.0),
+        "command": SumOfSines(order=0, amplitudes=(amplitude,), frequencies=(0.5,), phases=(0.0,)),
         "plant": PureFeedback(order=1, f=unstable, initial={"x1": -9.99}),
         "controller": controller,
         "actuator": Gain(),
