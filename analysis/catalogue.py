@@ -66,6 +66,16 @@ def function_summaries() -> dict[str, dict[str, str]]:
     return {group: lines for group, lines in found.items() if lines}
 
 
+def paper_summaries() -> dict[str, str]:
+    """Return the first line of each paper's module: ``{name: line}``."""
+    folder = Path(errors.__file__).parent / "papers"
+    found = {}
+    for name in _public(ast.parse((folder / "__init__.py").read_bytes())):
+        said = ast.get_docstring(ast.parse((folder / f"{name}.py").read_bytes())) or ""
+        found[name] = said.partition("\n")[0]
+    return found
+
+
 def making_function(name: str) -> Any:
     """Return the function of that name, which `function_summaries` has."""
     (group,) = (group for group, lines in function_summaries().items() if name in lines)

@@ -12,7 +12,13 @@ from rich.text import Text
 
 from nlctl.errors import ParameterError
 
-from ..catalogue import block_summaries, function_summaries, making_function, named_block
+from ..catalogue import (
+    block_summaries,
+    function_summaries,
+    making_function,
+    named_block,
+    paper_summaries,
+)
 
 if TYPE_CHECKING:
     from ..studies.kind import Kind
@@ -37,6 +43,7 @@ def show_all() -> None:
     for title, lines in groups.items():
         _show_group(title.capitalize(), lines, width)
     console.print("[bold]Examples[/bold]\n  example-1 (dead zone), example-2 (backlash)")
+    _show_group("Papers", paper_summaries(), width)
     console.print(HELP, highlight=False)
 
 
@@ -54,6 +61,8 @@ def show(name: str) -> None:
         return _show_block(name, named_block(name))
     if name in functions:
         return _show_function(name, making_function(name))
+    if (key := name.replace("-", "_")) in paper_summaries():
+        return _show_paper(key)
     from ..studies.kinds import KINDS as STUDIED  # takes a second
 
     kinds = {kind.name: kind for kind in STUDIED}
@@ -63,7 +72,8 @@ def show(name: str) -> None:
     if name not in kinds:
         from nlctl.names import unknown
 
-        raise unknown("block", name, [*blocks, *functions, *kinds, _KINDS])
+        papers = paper_summaries()
+        raise unknown("block", name, [*blocks, *functions, *kinds, *papers, _KINDS])
     return _show_kind(name, kinds[name])
 
 
@@ -122,6 +132,19 @@ def _signals(record: type) -> str:
         return f"({', '.join(made.inputs)}) -> ({', '.join(made.outputs)}){states}"
     except (UsageError, TypeError):
         return ""
+
+
+def _show_paper(key: str) -> None:
+    """Print the examples of a paper, and what makes its page."""
+    from importlib import import_module
+
+    module = import_module(f"nlctl.papers.{key}")
+    table = Table("example", "what it is", title=None)
+    for name in module.__all__:
+        if name.startswith("example_"):
+            call = f"nlctl.papers.{key}.{name}()"
+            table.add_row(Text(call), Text(_summary(getattr(module, name))))
+    _show_table(key, f"{_summary(module)}  Its page: nlctl report {key}", table)
 
 
 def _show_function(name: str, function: Any) -> None:

@@ -13,7 +13,7 @@ from .simulation import simulated
 if TYPE_CHECKING:
     from ..report.document import Report
 
-__all__ = ["compose_page", "is_loop_name", "page_folder"]
+__all__ = ["compose_page", "is_loop_name", "is_paper_name", "page_folder"]
 
 HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
@@ -22,6 +22,11 @@ def is_loop_name(text: str) -> bool:
     """Whether a text is ``file.py:function`` or ``package.module:function``, and no path."""
     place, colon, function = text.rpartition(":")
     return bool(colon and place) and function.isidentifier() and not Path(text).exists()
+
+
+def is_paper_name(text: str) -> bool:
+    """Whether a text is a bare word, as names of papers are, and no file or folder."""
+    return text.replace("-", "_").isidentifier() and not Path(text).exists()
 
 
 def page_folder(name: str) -> Path:

@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,9 +13,17 @@ import typer
 
 from nlctl.wording import counted
 
+from ..papers import paper_key
 from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
-from .own_page import HORIZON_OF_PAGE, STEP_OF_PAGE, compose_page, is_loop_name, page_folder
+from .own_page import (
+    HORIZON_OF_PAGE,
+    STEP_OF_PAGE,
+    compose_page,
+    is_loop_name,
+    is_paper_name,
+    page_folder,
+)
 from .printing import error_line, in_json, say
 from .studies import (
     EXIT_CODES,
@@ -67,9 +74,9 @@ def report(
         Path | None,
         typer.Argument(
             metavar="WHAT",
-            help="A study file (.toml), which is run or taken up, the folder of a run, or a loop: "
-            "path/to/file.py:function or package.module:function. "
-            "Without it, the paper: both examples, the proof, and a quick study of each.",
+            help="A study file (.toml), which is run or taken up, the folder of a run, a loop: "
+            "path/to/file.py:function or package.module:function, or a paper such as "
+            "tabuada_2007. Without it, lv_2017: both examples, the proof, a quick study of each.",
         ),
     ] = None,
     out: Annotated[
@@ -106,7 +113,10 @@ def report(
         _check_loop_options(is_loop, set_, input_, until, step)
         check_junit(junit)
         if what is None:
-            made = _paper(out or Path("reports/paper"), jobs, far=far, **options)
+            made = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
+        elif is_paper_name(str(what)):
+            key = paper_key(str(what), "file, folder or paper")
+            made = _paper(key, out or Path("reports", key), jobs, far=far, **options)
         elif is_loop:
             run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
             made = _loop(str(what), run, out, **options)
@@ -157,18 +167,21 @@ def _loop(
     return Made(told=made.verdict, title=made.title, claims=made.claims, page=page, code=code)
 
 
-def _paper(out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool) -> Made:
-    """Reproduce the paper."""
+def _paper(
+    name: str, out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool
+) -> Made:
+    """Reproduce a paper."""
     with _other_process() as beside:
-        beside.submit(_import_ahead)  # first of all: imports there and here take seconds
+        beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
         check_report_options(out, pdf=pdf, force=force)
-        from ..paper.report import clear, compose
+        from ..papers import named_paper
         from ..report.render import write_report
         from .study_report import tell
         from .terminal import progress_bar
 
-        clear(out, force=force)
-        made = compose(
+        reproduction = named_paper(name)
+        reproduction.clear(out, force=force)
+        made = reproduction.compose(
             out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, tell=tell
         )
         options = " --far" * far + " --interactive" * interactive
@@ -182,8 +195,10 @@ def _paper(out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, for
     )  # fmt: skip
 
 
-def _import_ahead() -> None:
-    import_module("nlctl.analysis.paper.report")
+def _import_ahead(name: str) -> None:
+    from ..papers import named_paper
+
+    named_paper(name)
 
 
 @contextmanager

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,9 @@ from nlctl import paper
 
 from ..pages.study.redrawn import loop_again, rows_again
 from ..pages.study.report import study_part
-from ..report.document import Report, Section
-from ..report.svg import Drawn, draw_ahead
+from ..report.document import Section
+from ..report.svg import draw_ahead
+from ..reproductions.page import Composed, ProgressWatch, unwatched
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
 from ..robustness.runs.parquet import parquet
@@ -51,36 +51,9 @@ __all__ = [
 QUICK = ("example-1-quick", "example-2-quick")
 """The studies of the report, of those that come with nlctl."""
 
-ProgressWatch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
-"""``watch(what, total)`` is entered around a part of the work; what it gives is called with how
-much more of `total` is done."""
-
-
-def _unwatched(what: str, total: float) -> AbstractContextManager[Callable[[float], object]]:
-    return nullcontext(lambda amount: None)
-
 
 def _untold(words: str) -> None:
     return None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Composed:
-    """The report, before it is written.
-
-    Attributes
-    ----------
-    report : Report
-    drawn : mapping
-        Those of its figures that are drawn already, for
-        `nlctl.analysis.report.render.write_report`.
-    passed : bool
-        Whether all numbers of the reproduction are those that were to be reached.
-    """
-
-    report: Report
-    drawn: Drawn
-    passed: bool
 
 
 class _Here(Executor):
@@ -92,7 +65,7 @@ class _Here(Executor):
         return made
 
 
-def reproduction(watch: ProgressWatch = _unwatched) -> list[Section]:
+def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
     """Run both examples, and return the report's first part: their figures and numbers."""
     with watch("simulating", len(CASES)) as advance:
         runs = run_all(CASES, done=lambda _: advance(1))
@@ -102,7 +75,7 @@ def reproduction(watch: ProgressWatch = _unwatched) -> list[Section]:
 def proof(
     horizon: float = HORIZON,
     far: proofs.FarRuns | None = None,
-    watch: ProgressWatch = _unwatched,
+    watch: ProgressWatch = unwatched,
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part."""
     far = far or proofs.FarRuns()
@@ -130,7 +103,7 @@ def compose(
     whole: bool = False,
     threads: int | None = None,
     beside: Executor | None = None,
-    watch: ProgressWatch = _unwatched,
+    watch: ProgressWatch = unwatched,
     tell: Callable[[str], object] = _untold,
 ) -> Composed:
     """Reproduce the paper, check its proof, run the studies, and compose the report of it all."""

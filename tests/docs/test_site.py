@@ -24,6 +24,8 @@ PUBLIC = [
     *(
         "nlctl",
         "nlctl.paper",
+        *(f"nlctl.papers.{name}" for name in ("tabuada_2007", "karason_1994", "chowdhary_2010")),
+        "nlctl.papers.canudas_de_wit_1995",
         "nlctl.analysis.lyapunov",
         "nlctl.analysis.robustness",
         "nlctl.analysis.studies",

@@ -25,6 +25,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.plants", "nlctl.actuators", "nlctl.references", "nlctl.sources", "nlctl.controllers"]
     + ["nlctl.faults"],
     ["nlctl.paper"],
+    ["nlctl.papers"],
     ["nlctl.expressions"],
     ["nlctl.observers"],
     ["nlctl.native"],
@@ -41,7 +42,9 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.analysis.studies"],
     ["nlctl.analysis.pages"],
     ["nlctl.analysis.loop_report", "nlctl.analysis.loop_checks"],
+    ["nlctl.analysis.reproductions"],
     ["nlctl.analysis.paper"],
+    ["nlctl.analysis.papers"],
     ["nlctl.analysis.cli"],
 ]
 BLOCK_MODULES = LAYERS[3]

@@ -12,8 +12,10 @@ EXCEPTIONS = {
     "made": "what a kind of analysis returns, in docs/studies.md; and what a run returns",
     "main": "what a script or a command calls",
     "Spec": "the contract of a block, and a specification of a response: both are public",
-    "example_1": "the example of the paper, and the same with controllers that studies compare",
-    "example_2": "the example of the paper, and the same with controllers that studies compare",
+    "example_1": "that of each paper, and the same with controllers that studies compare",
+    "example_2": "that of each paper, and the same with controllers that studies compare",
+    "INITIAL_STATE": "where the printed example of each paper starts",
+    "REPRODUCTION": "the record of each paper, which its name finds",
 }
 
 

@@ -40,6 +40,7 @@ def our_modules():
 def offered():
     """The public functions of all packages, by the names under which they are offered."""
     homes = ["nlctl", "nlctl.analysis", *(place.name for place in our_modules() if place.ispkg)]
+    homes += [home for home, _ in documented_names() if home.startswith("nlctl.papers.")]
     for home in dict.fromkeys(homes):
         if hasattr(importlib.import_module(home), "__all__"):
             for name, made in functions(home).items():

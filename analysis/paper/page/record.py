@@ -1,0 +1,149 @@
+"""Lv et al. 2017 as a record: what its page has in common with that of every paper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from nlctl import paper
+
+from ...report.document import History, Paragraph
+from ...reproductions.paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part, Statement
+from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expectations, run_all
+from .. import figures as histories
+from . import text as text
+
+__all__ = ["LV_2017", "found_of"]
+
+_CASES = {case.key: case for case in CASES}
+_METRICS = {metric.key: metric for metric in METRICS}
+
+_PLOTS = (
+    ("tracking", histories.tracking, r"Output \(y\) and reference \(y_d\)."),
+    (
+        "input",
+        histories.control_input,
+        r"Control input \(u\), and output \(v\) of the actuator.",
+    ),
+    (
+        "error",
+        histories.tracking_error,
+        r"Tracking error \(e_1\); the band holds it for "
+        f"t ≥ {TAIL:g} s.",
+    ),
+    ("states", histories.upper_states, "The other states of the plant."),
+    ("actuator", histories.actuator_path, "The part of the actuator's characteristic in use."),
+    (
+        "nussbaum",
+        histories.nussbaum_gain,
+        r"Argument \(\zeta\) and value \(N(\zeta)\) of the Nussbaum gain.",
+    ),
+    (
+        "adaptation",
+        histories.adaptation,
+        r"Norm of the weights \(\hat W\), and estimate \(\hat\delta\) of the robust term.",
+    ),
+)
+_SHOWN = ("tracking", "input")  # the other figures are folded
+
+
+def found_of(check: Check) -> FoundNumber:
+    """Return a figure that was reached or missed as a statement and what was found."""
+    return FoundNumber(statement=_statement(check.expectation), value=check.value)
+
+
+def _statement(expected: Expectation) -> Statement:
+    case = _CASES[expected.case]
+    return Statement(
+        claim="Are all numbers of an independent computation reached?",
+        part=f"example-{case.example}",
+        case=case.title,
+        quantity=_METRICS[expected.metric].meaning,
+        printed=expected.printed,
+        tolerance=expected.tolerance,
+        value=lambda runs: runs[expected.case].metrics.get(expected.metric, math.nan),
+    )
+
+
+def _simulate(done: Callable[[float], object]) -> PaperRuns:
+    return run_all(CASES, done=lambda _: done(1))
+
+
+def _part(number: int) -> Part:
+    key = f"example-{number}"
+    return Part(
+        key=key,
+        title=text.TITLES[number],
+        make=paper.EXAMPLES[f"example_{number}"],
+        blocks=("plant", "actuator"),
+        number=f"Ex. {number}",
+        picture="The closed loop as simulated, and the inside of its controller.",
+        figures=tuple(_figure(number, *plot) for plot in _PLOTS),
+        more="The other signals over time, and the actuator's characteristic",
+        parameters=text.PRINTED[number],
+        items=lambda runs: [_interactive(number, runs[str(number)])],
+    )
+
+
+def _figure(number: int, name: str, draw: Callable, caption: str) -> PaperFigure:
+    return PaperFigure(
+        key=f"example-{number}-{name}",
+        caption=caption,
+        draw=lambda runs: draw(runs[str(number)]),
+        description=lambda runs: f"{caption} Over {HORIZON:g} s: {_summary(runs[str(number)])}",
+        folded=name not in _SHOWN,
+    )
+
+
+def _summary(run: CaseRun) -> str:
+    m = run.metrics
+    return (
+        f"max |e₁| for t ≥ {TAIL:g} s is {m['tail_max_e']:.5g}, max |u| {m['max_u']:.5g}, "
+        f"zeta ends at {m['zeta_end']:.5g}, max norm of W_hat {m['max_W']:.3g}."
+    )
+
+
+def _interactive(number: int, run: CaseRun) -> History:
+    names = ("y", "yd", "e", "u", "v", "zeta")
+    return History(
+        key=f"example-{number}-history",
+        caption=f"{text.TITLES[number]}: output y, reference yd, tracking error e, control input "
+        "u, output of the actuator v, argument of the Nussbaum gain zeta.",
+        description=f"Chart of {', '.join(names)} over {HORIZON:g} s; the figures above show the "
+        "same signals, the slider below tells their values.",
+        time=run.time,
+        signals={name: run.signals[name] for name in names},
+        shown=("y", "yd", "e", "zeta"),
+    )
+
+
+LV_2017 = Paper(
+    key="lv_2017",
+    title="Adaptive neural control with an uncertain actuator, reproduced",
+    question=text.QUESTION,
+    citation=text.CITATION,
+    heading="Plant class and controller",
+    model=(
+        Paragraph(text="The plant is a chain of integrators with a non-affine last equation:"),
+        text.PLANT_CLASS,
+        *text.CONTROLLER_PART,
+    ),
+    parts=(_part(1), _part(2)),
+    simulate=_simulate,
+    cases=len(CASES),
+    statements=lambda: [_statement(expected) for expected in expectations()],
+    reproduced="both examples over 20 s, with either actuator",
+    not_reproduced="the theorem: the lemma that its proof rests on is false",
+    methods=text.METHODS_TEXT,
+    references=text.REFERENCES,
+    numbers_title="The {count} numbers to reach",
+    numbers_caption=(
+        "Found by nlctl's engine from the python-control diagrams; to reach: converged digits "
+        "of an independent event-located integration."
+    ),
+    numbers_key="figures",
+    asked="to reach",
+    digits=".10f",
+    command="nlctl report",
+    packages=("python-flint", "clarabel", "cma"),
+)

@@ -1,0 +1,1 @@
+"""What a reproduced paper is, and its page: the same for every paper."""

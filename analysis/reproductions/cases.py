@@ -1,0 +1,83 @@
+"""Cases of a paper: a diagram of its, a start, an input, and what became of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nlctl.diagrams import state_names
+from nlctl.response import input_output_response
+
+__all__ = ["PaperCase", "PaperRun", "simulate_case", "simulate_cases"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PaperCase:
+    """One run of one example.
+
+    Attributes
+    ----------
+    key : str
+    make : callable
+        Returns the diagram.
+    times : array of shape (m,)
+        Output times (s).
+    inputs : float or array
+        Of an open diagram.
+    start : mapping
+        Initial states by qualified name; the others start as their blocks say.
+    rtol, atol : float
+    """
+
+    key: str
+    make: Callable[[], Any]
+    times: np.ndarray
+    inputs: Any = 0.0
+    start: Mapping[str, float] = field(default_factory=dict)
+    rtol: float = 1e-8
+    atol: float = 1e-10
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PaperRun:
+    """A simulated case: times (s), outputs and states by name, events."""
+
+    case: PaperCase
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    events: pd.DataFrame
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a signal by name."""
+        return self.signals[name]
+
+
+def simulate_case(case: PaperCase, engine: str = "auto") -> PaperRun:
+    """Simulate a case, by either engine."""
+    loop = case.make()
+    response = input_output_response(
+        loop, case.times, case.inputs, dict(case.start), rtol=case.rtol, atol=case.atol,
+        engine=engine,
+    )  # fmt: skip
+    outputs = np.reshape(response.outputs, (len(loop.output_labels), -1))
+    states = np.reshape(response.states, (len(state_names(loop)), -1))
+    signals = dict(zip(loop.output_labels, outputs, strict=True))
+    signals |= dict(zip(state_names(loop), states, strict=True))
+    return PaperRun(
+        case=case, time=np.asarray(response.time), signals=signals, events=response.events
+    )
+
+
+def simulate_cases(
+    cases: Sequence[PaperCase], done: Callable[[float], object] = lambda amount: None
+) -> dict[str, PaperRun]:
+    """Simulate cases by key, one after the other."""
+    runs = {}
+    for case in cases:
+        runs[case.key] = simulate_case(case)
+        done(1)
+    return runs

@@ -1,0 +1,226 @@
+"""A paper as a record: what it prints, where that was read, and how each of it is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from matplotlib.figure import Figure as MatplotlibFigure
+
+from ..report.document import Item
+
+__all__ = ["FoundNumber", "Paper", "PaperFigure", "PaperSource", "Part", "Statement"]
+
+PaperRuns = Mapping[str, Any]
+"""Simulated cases of a paper by key."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperSource:
+    """Where numbers of a paper were read.
+
+    Attributes
+    ----------
+    key : str
+        As statements name it.
+    text : str
+        What it is, so that another reader finds it.
+    """
+
+    key: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """A number that is printed, and how it is computed from the runs.
+
+    Attributes
+    ----------
+    claim : str
+        The question that it answers, on the page one line with others that have the same.
+    part : str
+        Key of the part of the page that has it.
+    case, quantity : str
+        What was run, and what is read off it.
+    printed : str
+        As printed.
+    value : callable
+        ``value(runs) -> float``.
+    relation : {"=", "≤", "≥"}
+        What is said of the value.
+    tolerance : float
+        For "=", how far it may be off; of what is printed exactly, rounding.
+    read : str
+        Key of its source; empty for what was computed independently.
+    by : str
+        Who is refuted where it does not hold; empty for statements of ours.
+    """
+
+    claim: str
+    part: str
+    case: str
+    quantity: str
+    printed: str
+    value: Callable[[PaperRuns], float]
+    relation: str = "="
+    tolerance: float = 0.0
+    read: str = ""
+    by: str = ""
+
+    @property
+    def asked(self) -> str:
+        """What is printed, with its relation where that is a bound."""
+        return f"{self.relation.strip('=')} {self.printed}".strip()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundNumber:
+    """A statement, and what was found."""
+
+    statement: Statement
+    value: float
+
+    @property
+    def error(self) -> float:
+        """How far the value is from what is printed; of a bound, how far beyond."""
+        apart = self.value - float(self.statement.printed)
+        if self.statement.relation == "=":
+            return abs(apart)
+        beyond = apart if self.statement.relation == "≤" else -apart
+        return beyond if beyond > 0 or math.isnan(beyond) else 0.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether that is within the tolerance; false for NaN."""
+        return self.error <= self.statement.tolerance
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PaperFigure:
+    """A figure of the page: its anchor, its caption, and how it is drawn from the runs.
+
+    Attributes
+    ----------
+    description : str or callable
+        For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The
+        caption where it is empty.
+    folded : bool
+        Whether it stands behind a heading that is opened.
+    """
+
+    key: str
+    caption: str
+    draw: Callable[[PaperRuns], MatplotlibFigure]
+    description: str | Callable[[PaperRuns], str] = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """One example of a paper on its page.
+
+    Attributes
+    ----------
+    key, title : str
+        Its anchor and its heading.
+    make : callable
+        Returns the diagram.
+    blocks : tuple of str
+        Blocks whose equations stand on the page.
+    number : str
+        In front of each equation; empty for none.
+    picture : str
+        Caption of the diagram.
+    figures : tuple of PaperFigure
+    more : str
+        Heading of the figures that are folded.
+    parameters : tuple of (str, str, str, str)
+        Name, as printed, as used, remark; the third is filled in from the blocks by name.
+    items : callable, optional
+        ``items(runs)``, what else stands behind its figures.
+    """
+
+    key: str
+    title: str
+    make: Callable[[], Any]
+    blocks: tuple[str, ...]
+    number: str = ""
+    picture: str = "The loop as simulated."
+    figures: tuple[PaperFigure, ...] = ()
+    more: str = "More figures"
+    parameters: tuple[tuple[str, str, str, str], ...] = ()
+    items: Callable[[PaperRuns], Sequence[Item]] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Paper:
+    """A paper whose examples are reproduced.
+
+    Attributes
+    ----------
+    key : str
+        ``author_year``, the name of its module in `nlctl.papers`.
+    title, question, citation : str
+    heading : str
+        Of the section that says what the paper has.
+    model : tuple of Item
+        Its equations, as printed or as quoted.
+    parts : tuple of Part
+    simulate : callable
+        ``simulate(done) -> runs``; ``done(amount)`` is called as cases are finished.
+    cases : int
+        How many are simulated.
+    statements : callable
+        Returns them; it is called once per page.
+    sources : tuple of PaperSource
+        What was read, next to the references.
+    open_points : tuple of str
+        What does not reproduce, what could not be read, and what is a choice of ours.
+    methods, limits, references : tuple of str
+        Paragraphs, as those of a `Report`.
+    lead : PaperFigure, optional
+        The picture at the top.
+    reproduced, not_reproduced : str
+        In a few words each, for the table of papers and the verdict.
+    numbers_title, numbers_caption, asked : str
+        Heading, caption and column title of the tables of numbers.
+    numbers_key : str
+        Anchor of these tables, behind that of their part.
+    digits : str
+        Format of the numbers found.
+    command : str
+        What makes the page again; ``nlctl report KEY`` where it is empty.
+    packages : tuple of str
+        Packages whose versions stand on the page next to those of every report.
+    """
+
+    key: str
+    title: str
+    question: str
+    citation: str
+    parts: tuple[Part, ...]
+    simulate: Callable[[Callable[[float], object]], PaperRuns]
+    cases: int
+    statements: Callable[[], Sequence[Statement]]
+    reproduced: str
+    not_reproduced: str
+    heading: str = "What the paper has"
+    model: tuple[Item, ...] = ()
+    sources: tuple[PaperSource, ...] = ()
+    open_points: tuple[str, ...] = ()
+    methods: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
+    references: tuple[str, ...] = ()
+    lead: PaperFigure | None = None
+    numbers_title: str = "{count} numbers, as printed or required, and as found"
+    numbers_caption: str = (
+        "What was read has the key of its source; what has none is required by us, or follows."
+    )
+    numbers_key: str = "numbers"
+    asked: str = "printed or required"
+    digits: str = ".6g"
+    command: str = ""
+    packages: tuple[str, ...] = field(default=())
