@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -246,11 +247,40 @@ def compare_command(
     first: Annotated[Path, typer.Argument(help="report.json, its folder, or that of a run.")],
     second: Annotated[Path, typer.Argument(help="Another one.")],
     rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a page of what differs; none by default.")
+    ] = None,
+    open_: Open = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    force: Force = False,
     json: Json = False,
 ) -> None:
-    """Say what differs between two reports or two runs of studies; exit 1 if anything does."""
-    if not compare_reports(first, second, rtol=rtol, as_json=json):
+    """Say what differs between two reports or two runs of studies; exit 1 if anything does.
+
+    With --out a page shows it: claims, numbers, figures, and signals of both.
+    """
+    _check_page_options(out, pdf=pdf, open_=open_, force=force)
+    same = compare_reports(first, second, rtol=rtol, as_json=json)
+    if out is not None:
+        from ..report.render import write_report
+        from .compare_page import compose_comparison
+
+        made = compose_comparison(first, second, out, rtol)
+        page = write_report(made, out, force=force)
+        with redirect_stdout(sys.stderr):  # what differs, alone, is on stdout
+            finish_report(page, pdf=pdf, open_=open_)
+    if not same:
         raise typer.Exit(1)
+
+
+def _check_page_options(out: Path | None, *, pdf: bool, open_: bool, force: bool) -> None:
+    """Refuse what is set of a page where none is made, or where it could not be written."""
+    from nlctl.errors import UsageError
+
+    if out is not None:
+        check_report_options(out, pdf=pdf, force=force)
+    elif pdf or open_ or force:
+        raise UsageError("--pdf, --open and --force are of a page: say where, with --out DIR")
 
 
 def gallery(

@@ -1,6 +1,7 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
 from .faults import fault_margins, fault_pairs
+from .overlaid import overlaid
 from .proof import (
     bounds,
     burst,
@@ -46,6 +47,7 @@ __all__ = [
     "margins_figure",
     "margins_of_both",
     "most_frequent",
+    "overlaid",
     "paired_differences",
     "quantile",
     "radius_steps",

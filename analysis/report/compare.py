@@ -18,7 +18,7 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["Difference", "compare_contents", "read_report"]
+__all__ = ["ABSENT", "Difference", "compare_contents", "differences", "read_report"]
 
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
@@ -88,9 +88,16 @@ def compare_contents(
     numbers.e: 0.14 -> 0.15
     []
     """
+    return differences(read_report(first), read_report(second), rtol, common=common)
+
+
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
+) -> list[Difference]:
+    """Compare two reports as `compare_contents` does, given what is in their files."""
     if not 0 <= rtol < math.inf:
         raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
-    reports = [read_report(path) for path in (first, second)]
+    reports = (first, second)
     both = set(reports[0]["sections"]) & set(reports[1]["sections"])
     one, two = (_flat(report, both if common else set(report["sections"])) for report in reports)
     return [

@@ -14,7 +14,7 @@ import numpy as np
 
 from nlctl.wording import counted, some_of
 
-from .document import Claim, Figure, History, Item, Report, Section, Table
+from .document import Claim, Figure, Headline, History, Item, Report, Section, Table
 
 __all__ = [
     "Placed",
@@ -46,7 +46,15 @@ LIGHTS = {
     "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed", "held"),
     "proved": ("proved", "computed"),
     "checked": ("checked", "sampled", "shown"),
-    "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),
+    "caution": (
+        "undecided",
+        "open",
+        "inconclusive",
+        "not confirmed",
+        "not shown yet",
+        "no claim",
+        "not run yet",
+    ),
     "refuted": ("refuted", "violated as printed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
@@ -71,11 +79,12 @@ _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in s
 
 @dataclass(frozen=True, kw_only=True)
 class TableCell:
-    """One cell of a table as shown: text, number to sort by, look of its badge."""
+    """One cell of a table as shown: text, number to sort by, look of its badge, its link."""
 
     text: str
     value: str = ""
     badge: str = ""
+    target: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,9 +145,12 @@ def cells(table: Table) -> list[list[TableCell]]:
     """Return the rows of a table as they are shown, all of one length."""
     width = max([len(table.columns), *map(len, table.rows)])
     titles = [*table.columns, *[""] * (width - len(table.columns))]
+    badges = (table.status,) if isinstance(table.status, str) else table.status
     return [
         [
-            _cell(value, bool(table.status) and title == table.status)
+            _link(value)
+            if table.links and title == table.links
+            else _cell(value, bool(title) and title in badges)
             for title, value in zip_longest(titles, row, fillvalue="")
         ]
         for row in table.rows
@@ -166,6 +178,11 @@ def _cell(value: object, is_status: bool) -> TableCell:
     if is_status:
         return TableCell(text=text, badge=light(text))
     return TableCell(text=text, value=sort_key(value))
+
+
+def _link(value: object) -> TableCell:
+    """Return a cell that holds the key of a section or figure."""
+    return TableCell(text=_shown(value), target=_shown(value))
 
 
 def is_long(text: str) -> bool:
@@ -222,8 +239,11 @@ def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
     return {status: told for status, told in MEANINGS.items() if status in used}
 
 
-def summary(claims: Sequence[Claim]) -> tuple[str, str]:
-    """Return the report's traffic light, and the sentence that it stands for."""
+def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[str, str]:
+    """Return the report's traffic light, and the sentence that it stands for.
+
+    Without claims that is the `headline`, if there is one.
+    """
     statuses = [claim_status(claim) for claim in claims]
     looks = [look for _, look in statuses]
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
@@ -242,6 +262,8 @@ def summary(claims: Sequence[Claim]) -> tuple[str, str]:
         return "refuted", f"{'; '.join(told)}."
     if open_:
         return "caution", f"{some_of(open_, total, 'claim', 'is', 'are')} {waiting}."
+    if not claims and headline is not None:
+        return headline.look, headline.text
     if not claims:
         return "neutral", "No claims are made."
     hold = "The claim holds" if total == 1 else f"All {total} claims hold"

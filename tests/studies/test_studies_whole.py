@@ -76,7 +76,7 @@ READERS = {
 
 def parts_of(folder):
     """The files and the folders that a run has written."""
-    pages = {"index.html", "report.json"}
+    pages = {"index.html", "report.json", "signals.json"}
     return sorted(
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
