@@ -30,6 +30,7 @@ from .studies import (
     exit_codes,
     run_folder,
 )
+from .study_report import Stamp, stamped
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -94,6 +95,10 @@ def report(
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
+    revision: Annotated[
+        str, typer.Option(help="Of what is reported; it stands on the page and in galleries.")
+    ] = "",
+    date: Annotated[str, typer.Option(help="The same for a date.")] = "",
     force: Force = False,
     trust: Trust = False,
 ) -> None:
@@ -101,7 +106,10 @@ def report(
 
     Rows of a study are drawn from its loop: the code that the study names is run.
     """
-    options: dict[str, Any] = {"pdf": pdf, "interactive": interactive, "force": force}
+    stamp = {k: v for k, v in (("revision", revision), ("date", date)) if v}
+    options: dict[str, Any] = {
+        "pdf": pdf, "interactive": interactive, "force": force, "stamp": stamp,
+    }  # fmt: skip
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
         _check_loop_options(is_loop, set_, input_, until, step)
@@ -145,20 +153,29 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
 
 
 def _loop(
-    name: str, run: Any, out: Path | None, *, pdf: bool, interactive: bool, force: bool
+    name: str,
+    run: Any,
+    out: Path | None,
+    *,
+    pdf: bool,
+    interactive: bool,
+    force: bool,
+    stamp: Stamp,
 ) -> Made:
     """Report a loop of the user's."""
     folder = out or page_folder(name)
     check_report_options(folder, pdf=pdf, force=force)
     from ..report.render import write_report
 
-    made = compose_page(name, *run)
+    made = stamped(compose_page(name, *run), stamp)
     page = write_report(made, folder, interactive=interactive, force=force)
     code = int(not all(claim.holds for claim in made.claims))
     return Made(told=made.verdict, title=made.title, claims=made.claims, page=page, code=code)
 
 
-def _paper(out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool) -> Made:
+def _paper(
+    out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool, stamp: Stamp
+) -> Made:
     """Reproduce the paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead)  # first of all: imports there and here take seconds
@@ -173,7 +190,7 @@ def _paper(out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, for
             out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, tell=tell
         )
         options = " --far" * far + " --interactive" * interactive
-        report = replace(made.report, command=made.report.command + options)
+        report = stamped(replace(made.report, command=made.report.command + options), stamp)
         page = write_report(
             report, out, interactive=interactive, force=force, pool=beside, drawn=made.drawn
         )
@@ -212,6 +229,7 @@ def _study(
     interactive: bool,
     force: bool,
     trust: bool,
+    stamp: Stamp,
 ) -> Made:
     """Report a study."""
     from ..pages.study.claims import claims
@@ -233,6 +251,7 @@ def _study(
         interactive=interactive,
         force=force,
         trust=trust,
+        stamp=stamp,
     )
     code = EXIT_CODES.get(result.answer, 0)
     if not result.complete:
@@ -288,7 +307,10 @@ def gallery(
     open_: Open = False,
     force: Force = False,
 ) -> None:
-    """Write FOLDER/index.html: every report below it with its verdict."""
+    """Write FOLDER/index.html: every report below it with its verdict.
+
+    Reports of one title are shown over their dates and revisions.
+    """
     write_gallery_of(folder, open_=open_, force=force)
 
 
@@ -388,13 +410,14 @@ def _no_report(path: Path) -> UsageError:
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is."""
+    from ..pages.trend import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
     from ..studies.whole.page import check_page
     from .terminal import check_writable
 
     check_writable(folder)
-    page = write_gallery(folder, force=force, check=check_page)
+    page = write_gallery(folder, force=force, check=check_page, draw=trend_figure)
     say(page)
     if open_ and not open_page(page):
         say("no browser was found to show it")

@@ -24,6 +24,7 @@ from .runs import (
     running_estimate,
 )
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .trend import trend
 from .tuning import before_and_after, bought, margins_of_both, tried
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "shares",
     "story",
     "tornado",
+    "trend",
     "tried",
     "violation_rates",
     "windowed_maximum",

@@ -33,8 +33,12 @@ __all__ = ["Compared", "comparison"]
 LISTED = 100  # numbers of a table
 DRAWN = 4  # signals of a figure
 _CLAIM_COLUMNS = (
-    "claim", "before", "after", "found before", "found after", "limit before", "limit after",
+    "before", "after", "claim", "found before", "found after", "limit before", "limit after",
 )  # fmt: skip
+_NUMBER_COLUMNS = (
+    "number", "before", "after", "after − before", "share of the larger", "tolerance",
+)  # fmt: skip
+_LINE = re.compile(r"^numbers\.(study\.)?(tables|running estimate)\b")  # of a table of a study
 _TOLD_APART = ("title", "verdict", "question", "revision", "date")
 
 
@@ -114,7 +118,7 @@ def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headl
             else ("The claim ends as before" if claims else "Neither report makes a claim")
         )
         return Headline(look="neutral" if count else "pass", text=f"{same}{_differ(count)}.")
-    told = [f"{counted(len(c), 'claim')} {_moved(*s)}" for s, c in moved.items()]
+    told = [f"{counted(len(c), 'claim')}: {_moved(*s)}" for s, c in moved.items()]
     worst = max(change.worse for change in claims)
     looks = {2: "fail", 1: "caution", 0: "neutral"}
     return Headline(look=looks.get(worst, "pass"), text=f"{'; '.join(told)}.")
@@ -193,7 +197,7 @@ def _claims_table(caption: str, claims: Sequence[ClaimChange], folded: bool = Fa
         columns=("id",) * ids + _CLAIM_COLUMNS,
         rows=[
             (
-                *(change.ids,) * ids, change.text, *change.statuses,
+                *(change.ids,) * ids, *change.statuses, change.text,
                 *(_of(c, "measured") for c in (change.first, change.second)),
                 *(_of(c, "limit") for c in (change.first, change.second)),
             )
@@ -209,24 +213,29 @@ def _of(claim: Claim | None, field: str) -> str:
 
 
 def _numbers_section(numbers: Sequence[Difference], rtol: float) -> Section:
-    shown = numbers[:LISTED]
-    more = (
-        f" The first {LISTED} of {len(numbers)}; nlctl compare prints all."
-        if (len(numbers) > LISTED)
-        else ""
-    )
+    """Return the numbers that differ: first those that stand alone, then cells of tables."""
     close = f"further apart than {rtol:g} of the larger" if rtol else "that are not equal"
-    items: list[Item] = [Paragraph(text=f"No two numbers are {close.removeprefix('that are ')}.")]
-    if shown:
-        items = [
-            Table(
-                caption=f"Numbers {close}, the largest share first.{more}",
-                columns=("number", "before", "after", "after − before", "share of the larger",
-                         "tolerance"),
-                rows=[_number_row(one, rtol) for one in shown],
-            )
-        ]  # fmt: skip
-    return Section(key="number_changes", title="Numbers", items=items)
+    lines = [one for one in numbers if _LINE.search(one.where)]
+    main = [one for one in numbers if not _LINE.search(one.where)]
+    items: list[Item] = []
+    if main:
+        items.append(_numbers_table(f"Numbers {close}", main, rtol, folded=False))
+    if lines:
+        items.append(_numbers_table(f"Lines of tables {close}", lines, rtol, folded=True))
+    none = f"No two numbers are {close.removeprefix('that are ')}."
+    return Section(key="number_changes", title="Numbers", items=items or [Paragraph(text=none)])
+
+
+def _numbers_table(
+    caption: str, numbers: Sequence[Difference], rtol: float, *, folded: bool
+) -> Table:
+    more = f" The first {LISTED} of {len(numbers)}; nlctl compare prints all."
+    return Table(
+        caption=f"{caption}, the largest share first.{more * (len(numbers) > LISTED)}",
+        columns=_NUMBER_COLUMNS,
+        rows=[_number_row(one, rtol) for one in numbers[:LISTED]],
+        folded=folded,
+    )
 
 
 def _number_row(one: Difference, rtol: float) -> tuple[Any, ...]:
@@ -263,7 +272,7 @@ def _signal_items(
             figure=figures.overlaid(*both, unit=one.unit),
         )
         yield Table(
-            caption="How far the signals are apart at most, and when.",
+            caption="How far the signals are apart at most, and when; to 6 digits.",
             columns=("signal", "largest difference", "at (s)", "share of its range before",
                      "tolerance"),
             rows=[(n, *apart[n], _range_share(one, n, apart[n][0]), rtol) for n in names],

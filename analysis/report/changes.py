@@ -16,9 +16,9 @@ from .drawings import drawings
 from .history import SIGNALS
 from .outline import claim_status
 
-__all__ = ["ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
+__all__ = ["RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
 
-_RANK = {"pass": 0, "proved": 0, "checked": 0, "neutral": 1, "caution": 1, "refuted": 2, "fail": 2}
+RANK = {"pass": 0, "proved": 0, "checked": 0, "neutral": 1, "caution": 1, "refuted": 2, "fail": 2}
 GONE, NEW = "gone", "new"
 
 
@@ -38,7 +38,7 @@ class ClaimChange:
     @property
     def worse(self) -> int:
         """How much worse it is: from shown to refuted 2, from refuted to shown -2."""
-        ranks = [1 if c is None else _RANK[claim_status(c)[1]] for c in (self.first, self.second)]
+        ranks = [1 if c is None else RANK[claim_status(c)[1]] for c in (self.first, self.second)]
         return ranks[1] - ranks[0]
 
     @property
