@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from nlctl.annotations import as_annotated
-from nlctl.plotting.axes import BLUE, GREEN, GREY, ORANGE, WIDTH, legend_above, set_style
+from nlctl.plotting.axes import BLUE, GREY, ORANGE, WIDTH, legend_above, set_style
 from nlctl.plotting.labels import plain
 
 __all__ = ["trend"]
 
 LOOKS = {  # how a claim ended: colour, marker, word
-    "holds": (GREEN, "o", "holds"),
+    "holds": (BLUE, "o", "holds"),
     "open": (GREY, "D", "open"),
     "fails": (ORANGE, "X", "fails or is refuted"),
 }

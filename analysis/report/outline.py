@@ -244,36 +244,69 @@ def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[
 
     Without claims that is the `headline`, if there is one.
     """
-    statuses = [claim_status(claim) for claim in claims]
-    looks = [look for _, look in statuses]
+    looks = [claim_status(claim)[1] for claim in claims]
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
     total = len(claims)
     if failed:
         return "fail", f"{some_of(failed, total, 'claim', 'fails', 'fail')}."
+    if refuted:
+        return "refuted", _refuted(claims)
+    if open_:
+        waiting = _waiting(claims)
+        return "caution", f"{some_of(open_, total, 'claim', 'is', 'are')} {waiting}."
+    if not claims:
+        look = (
+            Headline(look="neutral", text="No claims are made.") if headline is None else headline
+        )
+        return look.look, look.text
+    hold = "The claim holds" if total == 1 else f"All {total} claims hold"
+    return "pass", f"{hold}{_known(claims, ': ')}."
+
+
+def _waiting(claims: Sequence[Claim]) -> str:
+    """Return what claims without an answer are: those of studies may still be shown."""
+    statuses = {claim_status(claim)[0] for claim in claims}
+    return "not shown yet" if statuses <= set(ANSWERS) else "open"
+
+
+def _known(claims: Sequence[Claim], before: str, after: str = "") -> str:
+    """Return how claims are known, 2 checked, 1 proved; nothing where they just hold."""
+    statuses = [claim_status(claim) for claim in claims]
     kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
     kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
-    if refuted:
-        left = total - refuted - open_
-        told = [f"{_whose(claims)} refuted"]
-        told += [f"{open_} {'is' if open_ == 1 else 'are'} {waiting}"] * bool(open_)
-        holds = "other holds" if left == 1 else "others hold"
-        told += [f"{left} {holds}{f' ({kept})' if kept else ''}"] * bool(left)
-        return "refuted", f"{'; '.join(told)}."
-    if open_:
-        return "caution", f"{some_of(open_, total, 'claim', 'is', 'are')} {waiting}."
-    if not claims and headline is not None:
-        return headline.look, headline.text
-    if not claims:
-        return "neutral", "No claims are made."
-    hold = "The claim holds" if total == 1 else f"All {total} claims hold"
-    return "pass", f"{hold}: {kept}." if kept else f"{hold}."
+    return f"{before}{kept}{after}" if kept else ""
 
 
-def _whose(claims: Sequence[Claim]) -> str:
-    """Return how many claims are refuted, and whose they are if all are somebody's: 1 claim is."""
-    of = [claim.by for claim in claims if claim_status(claim)[1] == "refuted"]
-    if not any(of):
-        return some_of(len(of), len(claims), "claim", "is", "are")
-    whose = f" of {of[0]}" if len(set(of)) == 1 else ""
-    return f"{counted(len(of), 'claim')}{whose} {'is' if len(of) == 1 else 'are'}"
+def _refuted(claims: Sequence[Claim]) -> str:
+    """Return what became of the claims where some are refuted; somebody's and ours apart."""
+    whose = {claim.by for claim in claims if claim_status(claim)[1] == "refuted"}
+    by = whose.pop() if len(whose) == 1 else None
+    theirs = [claim for claim in claims if claim.by == by] if by else claims
+    looks = [claim_status(claim)[1] for claim in theirs]
+    refuted, open_ = looks.count("refuted"), looks.count("caution")
+    held = len(theirs) - refuted - open_
+    waiting = [f"{open_} {'is' if open_ == 1 else 'are'} {_waiting(claims)}"] * bool(open_)
+    are = "is" if refuted == 1 else "are"
+    if by:
+        told = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
+        told += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
+        return f"{', '.join(told)}{_ours([claim for claim in claims if claim.by != by])}."
+    first = f"{counted(refuted, 'claim')} {are} refuted"
+    if by is not None:
+        first = f"{some_of(refuted, len(claims), 'claim', 'is', 'are')} refuted"
+    others = f"{held} {'other holds' if held == 1 else 'others hold'}{_known(claims, ' (', ')')}"
+    return f"{'; '.join([first, *waiting, *[others] * bool(held)])}."
+
+
+def _ours(claims: Sequence[Claim]) -> str:
+    """Return what became of our own claims, of which none fails or is refuted."""
+    held = [claim for claim in claims if claim_status(claim)[1] != "caution"]
+    left = len(claims) - len(held)
+    told = []
+    if held:
+        every = "all " if not left and len(held) > 1 else ""
+        verb = "holds" if len(held) == 1 else "hold"
+        told.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
+    if left:
+        told.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
+    return f"; of ours {', '.join(told)}" if told else ""
