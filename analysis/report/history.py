@@ -9,6 +9,7 @@ import numpy as np
 
 from ..json_values import as_json
 from .document import History, Report
+from .outline import place_anchors
 
 __all__ = ["SIGNALS", "chart", "signals_json", "thinned"]
 
@@ -37,11 +38,11 @@ def chart(history: History) -> dict[str, Any]:
 
 
 def signals_json(report: Report) -> str:
-    """Return the time histories of a report by their keys; nothing if it has none."""
+    """Return the time histories of a report by their anchors; nothing if it has none."""
     charts = {
-        item.key: chart(item)
-        for section in report.sections
-        for item in section.items
+        anchor: chart(item)
+        for part in place_anchors(report)
+        for anchor, _, item in part.items
         if isinstance(item, History)
     }
     return json.dumps(as_json(charts), ensure_ascii=False, allow_nan=False) + "\n" if charts else ""

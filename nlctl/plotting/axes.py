@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -38,7 +39,8 @@ INK = "#000000"
 STYLES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (GREY, ":"))  # of several of a kind
 TIME = "time t (s)"
 WIDTH = 6.2  # in, with letters that can still be read on a phone
-LINE, SHORT_LINE = 50, 34  # characters that a legend above the axes has room for
+_MARKUP = re.compile(r"[\\${}_^]")  # of a formula, no letters
+LINE, SHORT_LINE = 54, 36  # characters that a legend above the axes has room for
 
 
 def stacked_axes(
@@ -80,7 +82,7 @@ def legend_above(
         labels, handles = list(shown or ()), list((shown or {}).values())
     if not labels:
         return
-    widest = max(len(label.replace("\\", "")) for label in labels) + 6
+    widest = max(len(_MARKUP.sub("", label)) for label in labels) + 6
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
     if isinstance(ax, Figure):
         place = {"loc": "outside upper left"}
