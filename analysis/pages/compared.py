@@ -342,7 +342,7 @@ def _compared_section(first: Compared, second: Compared) -> Section:
     ]
     table = Table(
         caption="What was compared, and what made each of them that differs.",
-        columns=("", "before", "after"),
+        columns=("what", "before", "after"),
         rows=[row for row in rows if any(row[1:])],
     )
     return Section(key="compared", title="The two reports", items=[table])
