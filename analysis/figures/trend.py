@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from nlctl.annotations import as_annotated
-from nlctl.plotting.axes import BLUE, GREY, ORANGE, WIDTH, legend_above, set_style
+from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, set_style
 from nlctl.plotting.labels import plain
 
 __all__ = ["trend"]
@@ -22,6 +22,7 @@ LOOKS = {  # how a claim ended: colour, marker, word
     "fails": (ORANGE, "X", "fails or is refuted"),
 }
 ROW, PANEL, FRAME = 0.3, 1.1, 0.9  # in
+MOST = 20  # labels of revisions
 
 
 @as_annotated
@@ -63,11 +64,14 @@ def trend(
         ax.margins(y=0.2)
     last = figure.axes[-1]
     last.set_xlim(-0.4, len(labels) - 0.6)
-    turned = max(map(len, labels), default=0) * len(labels) > 50
+    step = -(-len(labels) // MOST)  # of very many not each has its label
+    turned = max(map(len, labels), default=0) * len(labels) > LINE
     last.set_xticks(
-        at, [plain(x) for x in labels], parse_math=False,
-        **({"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if turned else {}),
-    )  # fmt: skip
+        at[::step],
+        [plain(x) for x in labels[::step]],
+        parse_math=False,
+        rotation=90 if turned else 0,
+    )
     return figure
 
 

@@ -15,6 +15,7 @@ __all__ = [
     "GREEN",
     "GREY",
     "INK",
+    "LINE",
     "ORANGE",
     "PURPLE",
     "SHORT_LINE",
