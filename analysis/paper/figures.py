@@ -14,6 +14,7 @@ from nlctl.plotting.axes import (
     BLUE,
     GREY,
     ORANGE,
+    SHORT_LINE,
     STYLES,
     TIME,
     WIDTH,
@@ -149,7 +150,7 @@ def after_burst(burst: Burst) -> Figure:
     legend_above(through)
     for (K, e), (colour, style) in zip(burst.late.items(), STYLES, strict=False):
         late.plot(burst.late_time, e, style, color=colour, linewidth=1.2, label=f"$N = -{K:g}$")
-    legend_above(late)
+    legend_above(late, line=SHORT_LINE // 2)
     late.set(xlabel="time after the burst (s)", ylabel="$e_1$")
     return figure
 
