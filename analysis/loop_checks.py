@@ -66,7 +66,7 @@ def headline(checks: Sequence[LoopCheck]) -> Headline:
     held = applied.count("pass")
     look = "fail" if "fail" in applied else "pass" if held == len(applied) else "caution"
     if held == len(applied) > 1:
-        return Headline(look=look, text=f"All {held} checks of the loop hold.")
+        return Headline(look=look, text=f"All {counted(held, 'check')} of the loop hold.")
     return Headline(
         look=look,
         text=f"{some_of(held, len(applied), 'check', 'holds', 'hold')}; nothing is claimed.",
@@ -88,7 +88,7 @@ def told(checks: Sequence[LoopCheck]) -> str:
 def proof_check(found: Ledger) -> LoopCheck:
     """Return whether the proof's statements, corrected where they can be, hold along the run."""
     lines = [line for line in found.lines if line.reading == "corrected"]
-    kept = f"{len(lines) - len(found.violated)} of {counted(len(lines), 'line')}"
+    kept = f"{len(lines) - len(found.violated)} of {len(lines)} hold"
     return LoopCheck(
         what="The lines of the proof, corrected where they can be, hold along the run",
         found=kept,

@@ -87,9 +87,7 @@ def render_html(
         for anchor, item in items.items()
         if interactive and isinstance(item, History)
     }
-    own = {"report.json": _digest(render_json(report))}
-    if signals := signals_json(report):
-        own[SIGNALS] = _digest(signals)
+    own = _own_files(report)
     return fill(
         "report.html",
         interactive=bool(charts),
@@ -114,6 +112,12 @@ def render_html(
             own | dict(report.files),
         ),
     )
+
+
+def _own_files(report: Report) -> dict[str, str]:
+    """Return the files next to a page with their SHA-256."""
+    texts = {"report.json": render_json(report), SIGNALS: signals_json(report)}
+    return {name: _digest(text) for name, text in texts.items() if text}
 
 
 def _digest(text: str) -> str:

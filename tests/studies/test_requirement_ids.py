@@ -107,7 +107,7 @@ def test_without_ids_nothing_speaks_of_them(tmp_path):
     [
         ('id = "REQ-13"', 'id = "REQ-12"', "spec.bounded.id", "'REQ-12' is that of 'rises'"),
         ('id = "REQ-12"\n', 'id = "REQ-21"\n', "analysis[2].id", "unknown requirement id 'REQ-21'"),
-        ('"REQ-12", "REQ-13"', '"REQ-12", "REQ-12"', "analysis[1].id", "'REQ-12' 2 times"),
+        ('"REQ-12", "REQ-13"', '"REQ-12", "REQ-12"', "analysis[1].id", "got 'REQ-12' again"),
         ('"REQ-12", "REQ-13"', '"REQ-12", ""', "analysis[1].id", "got an empty one"),
         ("limit = 0.5\n", "", "analysis[1].id", "'probability' claims nothing that could answer"),
         ('id = "REQ-14"', 'id = "REQ 14"', "spec.calm.id", "should match pattern"),

@@ -26,7 +26,7 @@ def id_problems(study: Study, *, whole: bool) -> Iterator[Problem]:
             if not name:
                 message = "needs the id of a requirement, got an empty one"
             elif asked.id.count(name) > 1:
-                message = f"needs each id once, got '{name}' {asked.id.count(name)} times"
+                message = f"needs each id once, got '{name}' again"
             elif whole and name not in owners:
                 where = "(spec.NAME.id gives a requirement its id)"
                 message = str(unknown("requirement id", name, owners, where))
