@@ -102,7 +102,6 @@ def render_html(
         light=light,
         told=told,
         margins=any(claim.margin for claim in report.claims),
-        ids=any(claim.ids for claim in report.claims),
         meanings=meanings(report.claims),
         has_signals=SIGNALS in own,
         made_by=_pairs("What made it.", ("what", "version or value"), report.provenance),
