@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,20 @@ from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
 from nlctl.response import input_output_response
-from nlctl.wording import counted
+from nlctl.wording import counted, some_of
 
 from .lyapunov.ledger import Ledger, ledger
-from .report.document import Section, Table
+from .report.document import Headline, Section, Table
 
-__all__ = ["LoopCheck", "checks_of", "checks_section", "proof_of", "told"]
+__all__ = [
+    "LoopCheck",
+    "checks_of",
+    "checks_section",
+    "headline",
+    "proof_check",
+    "proof_of",
+    "told",
+]
 
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
 _TIGHTER = 1e-2  # of the tolerances, for the comparison
@@ -52,18 +60,43 @@ def checks_of(loop: Any, response: Any, params: Mapping[str, Any]) -> list[LoopC
     ]
 
 
-def told(checks: list[LoopCheck]) -> str:
-    """Return a sentence that sums checks up; what applies and does not pass is named."""
-    applied = [check for check in checks if check.status != "not applicable"]
-    open_ = [check.what[0].lower() + check.what[1:] for check in applied if check.status != "pass"]
-    if open_:
-        return f"Not so, or not known: {'; '.join(open_)}."
-    return (
-        f"{counted(len(applied), 'check')} of the run {'pass' if len(applied) > 1 else 'passes'}."
+def headline(checks: Sequence[LoopCheck]) -> Headline:
+    """Return how many of the checks that apply hold."""
+    applied = [check.status for check in checks if check.status != "not applicable"]
+    held = applied.count("pass")
+    look = "fail" if "fail" in applied else "pass" if held == len(applied) else "caution"
+    if held == len(applied) > 1:
+        return Headline(look=look, text=f"All {counted(held, 'check')} of the loop hold.")
+    return Headline(
+        look=look,
+        text=f"{some_of(held, len(applied), 'check', 'holds', 'hold')}; nothing is claimed.",
     )
 
 
-def checks_section(checks: list[LoopCheck]) -> Section:
+def told(checks: Sequence[LoopCheck]) -> str:
+    """Return what was checked in a sentence, first what does not hold or is not known."""
+    parts = (
+        ("Does not hold", "fail"), ("Not known", "caution"), ("Checked, and it holds", "pass"),
+    )  # fmt: skip
+    found = []
+    for words, status in parts:
+        these = [c.what[0].lower() + c.what[1:] for c in checks if c.status == status]
+        found += [f"{words}: {'; '.join(these)}."] * bool(these)
+    return " ".join(found)
+
+
+def proof_check(found: Ledger) -> LoopCheck:
+    """Return whether the proof's statements, corrected where they can be, hold along the run."""
+    lines = [line for line in found.lines if line.reading == "corrected"]
+    kept = f"{len(lines) - len(found.violated)} of {len(lines)} hold"
+    return LoopCheck(
+        what="The lines of the proof, corrected where they can be, hold along the run",
+        found=kept,
+        status={"violated": "fail", "undecided": "caution"}.get(found.answer, "pass"),
+    )
+
+
+def checks_section(checks: Sequence[LoopCheck]) -> Section:
     """Return checks as a section."""
     table = Table(
         caption="What was checked of this loop and of this run.",

@@ -41,7 +41,15 @@ def compose_page(
 ) -> Report:
     """Run a loop, check what can be checked of any, and compose its page."""
     made = simulated(name, settings, inputs, until, step)
-    from ..loop_checks import LoopCheck, checks_of, checks_section, proof_of, told
+    from ..loop_checks import (
+        LoopCheck,
+        checks_of,
+        checks_section,
+        headline,
+        proof_check,
+        proof_of,
+        told,
+    )
     from ..loop_report import loop_report
     from .terminal import progress_bar
 
@@ -51,16 +59,17 @@ def compose_page(
         proof = proof_of(made.loop, until, made.start, made.params)
         advance(1)
     applies = not isinstance(proof, LoopCheck)
+    every = [*checks, proof_check(proof) if applies else proof]
     page = loop_report(
         made.loop,
         title=made.loop.name,
         response=made.response,
         params=made.params,
         ledger=proof if applies else None,
-        sections=[checks_section(checks if applies else [*checks, proof])],
+        sections=[checks_section(every)],
         command=_command(name, settings, inputs, until, step),
     )
-    return replace(page, verdict=f"{page.verdict} {told(checks)}")
+    return replace(page, verdict=f"{page.verdict} {told(every)}", headline=headline(every))
 
 
 def _command(

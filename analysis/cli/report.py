@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +37,7 @@ from .studies import (
     exit_codes,
     run_folder,
 )
+from .study_report import Stamp, stamped
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -100,6 +102,10 @@ def report(
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
+    revision: Annotated[
+        str, typer.Option(help="Of what is reported; it stands on the page and in galleries.")
+    ] = "",
+    date: Annotated[str, typer.Option(help="The same for a date.")] = "",
     force: Force = False,
     trust: Trust = False,
 ) -> None:
@@ -107,7 +113,10 @@ def report(
 
     Rows of a study are drawn from its loop: the code that the study names is run.
     """
-    options: dict[str, Any] = {"pdf": pdf, "interactive": interactive, "force": force}
+    stamp = {k: v for k, v in (("revision", revision), ("date", date)) if v}
+    options: dict[str, Any] = {
+        "pdf": pdf, "interactive": interactive, "force": force, "stamp": stamp,
+    }  # fmt: skip
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
         _check_loop_options(is_loop, set_, input_, until, step)
@@ -154,22 +163,30 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
 
 
 def _loop(
-    name: str, run: Any, out: Path | None, *, pdf: bool, interactive: bool, force: bool
+    name: str,
+    run: Any,
+    out: Path | None,
+    *,
+    pdf: bool,
+    interactive: bool,
+    force: bool,
+    stamp: Stamp,
 ) -> Made:
     """Report a loop of the user's."""
     folder = out or page_folder(name)
     check_report_options(folder, pdf=pdf, force=force)
     from ..report.render import write_report
 
-    made = compose_page(name, *run)
+    made = stamped(compose_page(name, *run), stamp)
     page = write_report(made, folder, interactive=interactive, force=force)
     code = int(not all(claim.holds for claim in made.claims))
     return Made(told=made.verdict, title=made.title, claims=made.claims, page=page, code=code)
 
 
 def _paper(
-    name: str, out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool
-) -> Made:
+    name: str, out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool,
+    stamp: Stamp,
+) -> Made:  # fmt: skip
     """Reproduce a paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
@@ -185,7 +202,7 @@ def _paper(
             out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, tell=tell
         )
         options = " --far" * far + " --interactive" * interactive
-        report = replace(made.report, command=made.report.command + options)
+        report = stamped(replace(made.report, command=made.report.command + options), stamp)
         page = write_report(
             report, out, interactive=interactive, force=force, pool=beside, drawn=made.drawn
         )
@@ -226,6 +243,7 @@ def _study(
     interactive: bool,
     force: bool,
     trust: bool,
+    stamp: Stamp,
 ) -> Made:
     """Report a study."""
     from ..pages.study.claims import claims
@@ -247,6 +265,7 @@ def _study(
         interactive=interactive,
         force=force,
         trust=trust,
+        stamp=stamp,
     )
     code = EXIT_CODES.get(result.answer, 0)
     if not result.complete:
@@ -261,11 +280,40 @@ def compare_command(
     first: Annotated[Path, typer.Argument(help="report.json, its folder, or that of a run.")],
     second: Annotated[Path, typer.Argument(help="Another one.")],
     rtol: Annotated[float, typer.Option(help="Numbers this close count as equal.")] = 0.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a page of what differs; none by default.")
+    ] = None,
+    open_: Open = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    force: Force = False,
     json: Json = False,
 ) -> None:
-    """Say what differs between two reports or two runs of studies; exit 1 if anything does."""
-    if not compare_reports(first, second, rtol=rtol, as_json=json):
+    """Say what differs between two reports or two runs of studies; exit 1 if anything does.
+
+    With --out a page shows it: claims, numbers, figures, and signals of both.
+    """
+    _check_page_options(out, pdf=pdf, open_=open_, force=force)
+    same = compare_reports(first, second, rtol=rtol, as_json=json)
+    if out is not None:
+        from ..report.render import write_report
+        from .compare_page import compose_comparison
+
+        made = compose_comparison(first, second, out, rtol)
+        page = write_report(made, out, force=force)
+        with redirect_stdout(sys.stderr):  # what differs, alone, is on stdout
+            finish_report(page, pdf=pdf, open_=open_)
+    if not same:
         raise typer.Exit(1)
+
+
+def _check_page_options(out: Path | None, *, pdf: bool, open_: bool, force: bool) -> None:
+    """Refuse what is set of a page where none is made, or where it could not be written."""
+    from nlctl.errors import UsageError
+
+    if out is not None:
+        check_report_options(out, pdf=pdf, force=force)
+    elif pdf or open_ or force:
+        raise UsageError("--pdf, --open and --force are of a page: say where, with --out DIR")
 
 
 def gallery(
@@ -273,7 +321,10 @@ def gallery(
     open_: Open = False,
     force: Force = False,
 ) -> None:
-    """Write FOLDER/index.html: every report below it with its verdict."""
+    """Write FOLDER/index.html: every report below it with its verdict.
+
+    Reports of one title are shown over their dates and revisions.
+    """
     write_gallery_of(folder, open_=open_, force=force)
 
 
@@ -373,13 +424,14 @@ def _no_report(path: Path) -> UsageError:
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is."""
+    from ..pages.trend import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
     from ..studies.whole.page import check_page
     from .terminal import check_writable
 
     check_writable(folder)
-    page = write_gallery(folder, force=force, check=check_page)
+    page = write_gallery(folder, force=force, check=check_page, draw=trend_figure)
     say(page)
     if open_ and not open_page(page):
         say("no browser was found to show it")

@@ -4,19 +4,33 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from .printing import error_line
 from .studies import run_folder
 
 if TYPE_CHECKING:
+    from ..report.document import Report
     from ..studies.result import Result
     from ..studies.run import Watch
 
-__all__ = ["report_study", "tell"]
+__all__ = ["NO_STAMP", "Stamp", "report_study", "stamped", "tell"]
+
+
+Stamp = Mapping[str, str]  # revision and date, as far as they are given
+NO_STAMP: Stamp = MappingProxyType({})
+
+
+def stamped(report: Report, stamp: Stamp) -> Report:
+    """Return a report with its revision and date, and with the command that gives them."""
+    options = [part for name, text in stamp.items() for part in (f"--{name}", text)]
+    command = " ".join(filter(None, (report.command, shlex.join(options))))
+    return replace(report, command=command, **stamp)
 
 
 def report_study(
@@ -28,6 +42,7 @@ def report_study(
     interactive: bool = False,
     force: bool = False,
     trust: bool = False,
+    stamp: Stamp = NO_STAMP,
 ) -> tuple[Path, Result]:
     """Write the report of a study."""
     from ..pages.study.loop import loop_of
@@ -48,6 +63,7 @@ def report_study(
     loop = None if prepared is None else loop_of(prepared)
     published = PUBLISHED.get(result.study.loop)
     made = study_report(result, rows_again(result, prepared, threads), command, loop, published)
+    made = stamped(made, stamp)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
         made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})

@@ -1,6 +1,7 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
 from .faults import fault_margins, fault_pairs
+from .overlaid import overlaid
 from .proof import (
     bounds,
     burst,
@@ -23,6 +24,7 @@ from .runs import (
     running_estimate,
 )
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .trend import trend
 from .tuning import before_and_after, bought, margins_of_both, tried
 
 __all__ = [
@@ -46,6 +48,7 @@ __all__ = [
     "margins_figure",
     "margins_of_both",
     "most_frequent",
+    "overlaid",
     "paired_differences",
     "quantile",
     "radius_steps",
@@ -56,6 +59,7 @@ __all__ = [
     "shares",
     "story",
     "tornado",
+    "trend",
     "tried",
     "violation_rates",
     "windowed_maximum",

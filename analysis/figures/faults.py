@@ -64,7 +64,7 @@ def fault_pairs(margin: pd.DataFrame) -> Figure:
     rows, columns = np.nonzero(violates(margin.to_numpy()))
     ax.plot(columns, rows, "x", color=MAP_INK, markersize=4)
     names = [plain(name) for name in margin.index]
-    ax.set_yticks(np.arange(count), names, parse_math=False, fontsize="small")
-    ax.set_xticks(np.arange(count), names, parse_math=False, fontsize="small", rotation=90)
+    ax.set_yticks(np.arange(count), names, parse_math=False, fontsize="medium")
+    ax.set_xticks(np.arange(count), names, parse_math=False, fontsize="medium", rotation=90)
     figure.colorbar(image, ax=ax, label="least margin (1)")
     return figure

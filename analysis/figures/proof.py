@@ -108,7 +108,7 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
     axes = np.ravel(figure.subplots(1 if run is None else 2, 1))
     for ax in axes:
         set_style(ax)
-    axes[0].plot(time, yd, "--", color=ORANGE, linewidth=1.6, label="reference $y_d$")
+    axes[0].plot(time, yd, "--", color=GREY, linewidth=1.6, label="reference $y_d$")
     axes[0].plot(time, y, "-", color=BLUE, linewidth=1.4, label="output $y$")
     legend_above(axes[0])
     axes[0].set(xlabel=TIME)
@@ -277,7 +277,7 @@ def _panels(margins: Sequence[Margin], *, sharey: bool = False) -> tuple[Figure,
         ax.set_axis_off()
     for ax, margin in zip(axes, margins, strict=False):
         set_style(ax)
-        ax.set_title(margin.equation, fontsize=9, loc="left")
+        ax.set_title(margin.equation, fontsize="medium", loc="left")
     for ax in axes[: len(margins)][-2:]:
         ax.set_xlabel(TIME)
         ax.tick_params(labelbottom=True)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from nlctl.annotations import as_annotated
-from nlctl.plotting.axes import BLUE, GREY, ORANGE, SHORT_LINE, legend_above
+from nlctl.plotting.axes import BLUE, GREY, ORANGE, PURPLE, SHORT_LINE, legend_above
 
 from .labels import arms, drawable, number_axes, within_reach
 
@@ -38,7 +38,7 @@ def screening(effects: pd.DataFrame) -> Figure:
     figure, ax = number_axes(effects.index)
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
     at = np.arange(len(effects))
-    ax.plot(effects["sigma"], at, "D", color=ORANGE, markersize=5, label="$\\sigma$, deviation")
+    ax.plot(effects["sigma"], at, "D", color=PURPLE, markersize=5, label="$\\sigma$, deviation")
     legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("effect: change of the response per width of the box")
     return figure
@@ -62,7 +62,7 @@ def shares(indices: pd.DataFrame) -> Figure:
     indices = drawable(indices[["S1", "S1_low", "S1_high", "ST", "ST_low", "ST_high"]])
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
-    _bar(ax, indices, ("ST", "ST_low", "ST_high"), ORANGE, "$S_T$, with interactions", 0.18, "///")
+    _bar(ax, indices, ("ST", "ST_low", "ST_high"), PURPLE, "$S_T$, with interactions", 0.18, "///")
     legend_above(ax, line=SHORT_LINE)
     ax.set_xlabel("share of the variance (1)")
     return figure
@@ -91,7 +91,7 @@ def tornado(effects: pd.DataFrame, value: float) -> Figure:
     value = float(within_reach(value))
     figure, ax = number_axes(effects.index)
     figure.set_figheight(figure.get_figheight() + 0.4)
-    at, ends = np.arange(len(effects)), (("low", ORANGE, "v", "///"), ("high", BLUE, "^", ""))
+    at, ends = np.arange(len(effects)), (("low", PURPLE, "v", "///"), ("high", BLUE, "^", ""))
     wide = 3.0 * float(effects[["low", "high"]].abs().max(axis=None, skipna=True)) or 1.0
     for end, colour, marker, hatch in ends:
         name = "lower end" if end == "low" else "upper end"

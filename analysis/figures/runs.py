@@ -93,6 +93,7 @@ def margins_figure(values: np.ndarray) -> Figure:
     part.yaxis.set_major_formatter(PercentFormatter(1.0, symbol="\N{NO-BREAK SPACE}%"))
     for ax in (counts, part):
         set_style(ax)
+        ax.xaxis.set_major_locator(MaxNLocator(4))  # of -0.25 and the like there is room for
     counts.yaxis.set_major_locator(MaxNLocator(integer=True))
     return figure
 

@@ -17,6 +17,7 @@ from nlctl.plotting.axes import (
     BLUE,
     GREEN,
     GREY,
+    INK,
     ORANGE,
     PURPLE,
     SHORT_LINE,
@@ -63,7 +64,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
             label=None if name in labelled else plain(name),
         )  # fmt: skip
         labelled.add(name)
-    ax.step(np.arange(1, y.size + 1), y, where="post", color=ORANGE, linewidth=1.4)
+    ax.step(np.arange(1, y.size + 1), y, where="post", color=INK, linewidth=1.4)
     ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     legend_above(ax)
     ax.set(xlabel="runs", ylabel="lowest margin (1)")
@@ -88,7 +89,7 @@ def deviations(table: pd.DataFrame) -> Figure:
     figure, ax = number_axes(table.index)
     table, height = drawable(table), 0.7 / len(table.columns)
     for i, ((name, values), (colour, hatch)) in enumerate(
-        zip(table.items(), ((GREY, ""), (ORANGE, "///")), strict=False)
+        zip(table.items(), ((GREY, ""), (BLUE, "///")), strict=False)
     ):
         at = np.arange(len(table)) + (i - (len(table.columns) - 1) / 2) * height
         ax.barh(at, values, height, color=colour, hatch=hatch, edgecolor="white", label=str(name))

@@ -13,7 +13,8 @@ from nlctl.plotting.axes import (
     BLUE,
     GREEN,
     GREY,
-    ORANGE,
+    INK,
+    PURPLE,
     SHORT_LINE,
     TIME,
     legend_above,
@@ -52,7 +53,7 @@ def before_and_after(
     """
     figure, axes = stacked_axes(len(before), 1.8)
     for ax, name in zip(axes, before, strict=True):
-        ax.plot(time, before[name], "--", color=ORANGE, linewidth=1.4, label="before")
+        ax.plot(time, before[name], "--", color=GREY, linewidth=1.4, label="before")
         ax.plot(time, after[name], color=BLUE, linewidth=1.4, label="after")
         ax.set_ylabel(plain(name), parse_math=False)
     legend_above(axes[0])
@@ -85,7 +86,7 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
             ax.plot(runs[own], y[own], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)
-        ax.step(runs, best, where="post", color=ORANGE, linewidth=1.4, label="best")
+        ax.step(runs, best, where="post", color=INK, linewidth=1.4, label="best")
     legend_above(ax)
     ax.set(xlabel="runs (1 + 0.7 k for k derivatives)", ylabel="cost" if cost else "least margin")
     return figure
@@ -118,11 +119,11 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
         label="this one alone as found",
     )  # fmt: skip
     ax.barh(
-        at + 0.18, rest - after, 0.34, left=after, color=ORANGE, hatch="///", edgecolor="white",
+        at + 0.18, rest - after, 0.34, left=after, color=PURPLE, hatch="///", edgecolor="white",
         label="all but this one as found",
     )  # fmt: skip
     ax.axvline(before, color=GREY, linewidth=1.0, linestyle="--", label="before")
-    ax.axvline(after, color=GREEN, linewidth=1.2, label="after")
+    ax.axvline(after, color=BLUE, linewidth=1.2, label="after")
     legend_above(ax, line=SHORT_LINE)
     ax.use_sticky_edges = False
     ax.margins(x=0.05)
@@ -152,7 +153,7 @@ def margins_of_both(before: np.ndarray, after: np.ndarray) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
-    for y, colour, style, label in ((before, ORANGE, "--", "before"), (after, BLUE, "-", "after")):
+    for y, colour, style, label in ((before, GREY, "--", "before"), (after, BLUE, "-", "after")):
         ordered = np.sort(clipped_margins(y))
         share = np.arange(1, ordered.size + 1) / ordered.size
         ax.step(ordered, share, style, where="post", color=colour, linewidth=1.4, label=label)

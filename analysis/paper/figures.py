@@ -13,6 +13,8 @@ from nlctl.functions import nussbaum
 from nlctl.plotting.axes import (
     BLUE,
     GREY,
+    ORANGE,
+    SHORT_LINE,
     STYLES,
     TIME,
     WIDTH,
@@ -58,7 +60,12 @@ def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figu
 
 def tracking(run: CaseRun) -> Figure:
     """Output y against the reference yd."""
-    return _one(run.time, {"$y$": run.signals["y"], "$y_d$": run.signals["yd"]}, "output")
+    figure, (ax,) = stacked_axes()
+    ax.plot(run.time, run.signals["yd"], "--", color=GREY, linewidth=1.4, label="$y_d$")
+    ax.plot(run.time, run.signals["y"], "-", color=BLUE, linewidth=1.4, label="$y$")
+    legend_above(ax)
+    ax.set(xlabel=TIME, ylabel="output")
+    return figure
 
 
 def tracking_error(run: CaseRun) -> Figure:
@@ -143,7 +150,7 @@ def after_burst(burst: Burst) -> Figure:
     legend_above(through)
     for (K, e), (colour, style) in zip(burst.late.items(), STYLES, strict=False):
         late.plot(burst.late_time, e, style, color=colour, linewidth=1.2, label=f"$N = -{K:g}$")
-    legend_above(late)
+    legend_above(late, line=SHORT_LINE // 2)
     late.set(xlabel="time after the burst (s)", ylabel="$e_1$")
     return figure
 
@@ -168,7 +175,7 @@ def sampling_errors(record: pd.DataFrame, titles: Mapping[str, str], band: float
             (shown[label],) = ax.plot(x, y, style, color=colour, linewidth=1.4)
             if 0 < last < good.size:
                 ax.plot(x[-1:], y[-1:], "x", color=colour, markersize=7)
-        ax.axhline(band, color=GREY, linewidth=0.9)
+        ax.axhline(band, color=ORANGE, linewidth=1.2, linestyle="--")
         ax.set(xscale="log", yscale="log", ylim=(5e-3, 10), ylabel=f"{title}: $|y - y_d|$")
     axes[-1].set(xlabel="sampling time (ms)")
     legend_above(axes[0], shown)

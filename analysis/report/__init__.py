@@ -2,7 +2,7 @@
 
 from .browser import write_pdf
 from .compare import compare_contents
-from .document import Claim, Equation, Figure, History, Paragraph, Report, Section, Table
+from .document import Claim, Equation, Figure, Headline, History, Paragraph, Report, Section, Table
 from .gallery import write_gallery
 from .junit import junit
 from .render import file_hashes, framed, render_html, render_json, write_report
@@ -11,6 +11,7 @@ __all__ = [
     "Claim",
     "Equation",
     "Figure",
+    "Headline",
     "History",
     "Paragraph",
     "Report",

@@ -18,7 +18,7 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["Difference", "compare_contents", "read_report"]
+__all__ = ["ABSENT", "Difference", "compare_contents", "differences", "read_report"]
 
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
@@ -88,9 +88,16 @@ def compare_contents(
     numbers.e: 0.14 -> 0.15
     []
     """
-    if not 0 <= rtol < math.inf:
-        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
-    reports = [read_report(path) for path in (first, second)]
+    _check_tolerance(rtol)
+    return differences(read_report(first), read_report(second), rtol, common=common)
+
+
+def differences(
+    first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
+) -> list[Difference]:
+    """Compare two reports as `compare_contents` does, given what is in their files."""
+    _check_tolerance(rtol)
+    reports = (first, second)
     both = set(reports[0]["sections"]) & set(reports[1]["sections"])
     one, two = (_flat(report, both if common else set(report["sections"])) for report in reports)
     return [
@@ -98,6 +105,11 @@ def compare_contents(
         for where in dict.fromkeys([*one, *two])
         if where not in one or where not in two or not _same(one[where], two[where], rtol)
     ]
+
+
+def _check_tolerance(rtol: float) -> None:
+    if not 0 <= rtol < math.inf:
+        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
 
 
 def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:

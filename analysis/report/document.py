@@ -26,6 +26,7 @@ __all__ = [
     "Claim",
     "Equation",
     "Figure",
+    "Headline",
     "History",
     "Item",
     "Paragraph",
@@ -77,10 +78,13 @@ class Table:
 
     Attributes
     ----------
-    status : str
-        Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as a badge.
+    status : str or sequence of str
+        Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as badges; or of
+        several.
     folded : bool
         Whether the page shows the caption only until it is opened; paper shows all.
+    links : str
+        Title of a column that holds keys of sections or figures of the report, drawn as links.
 
     Examples
     --------
@@ -95,8 +99,9 @@ class Table:
     caption: str
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
-    status: str = ""
+    status: str | Sequence[str] = ""
     folded: bool = False
+    links: str = ""
 
 
 @as_annotated
@@ -224,6 +229,8 @@ class Claim:
     by : str
         Who else claims it, such as ``"the paper"``: where it does not hold, they are refuted and
         nothing of ours has failed, which the page says in another colour.
+    ids : sequence of str
+        Ids of the requirements that it answers, such as ``["REQ-12"]``.
 
     Examples
     --------
@@ -248,6 +255,34 @@ class Claim:
     margin: str = ""
     status: str = ""
     by: str = ""
+    ids: Sequence[str] = ()
+
+
+@as_annotated
+@dataclass(frozen=True, kw_only=True)
+class Headline:
+    """What a report without claims is headed with.
+
+    Attributes
+    ----------
+    look : {"pass", "proved", "checked", "caution", "refuted", "fail", "neutral"}
+        Its colour and its sign.
+    text : str
+        A sentence.
+
+    Examples
+    --------
+    >>> from nlctl.analysis.report import Headline, Report, render_html
+    >>> headline = Headline(look="pass", text="3 of 3 checks hold.")
+    >>> report = Report(
+    ...     title="Arm", verdict="", claims=[], sections=[], command="", headline=headline
+    ... )
+    >>> "<strong>3 of 3 checks hold.</strong>" in render_html(report)
+    True
+    """
+
+    look: str
+    text: str
 
 
 @as_annotated
@@ -279,8 +314,10 @@ class Report:
     lead : Figure, optional
         The picture beside the verdict that tells the story.
     author, revision, date : str
-        Below the title; on paper the first page is then a title page.  They are only what is
-        given: a report that is made twice is the same to the byte.
+        Below the title.  They are only what is given: a report that is made twice is the same to
+        the byte.
+    headline : Headline, optional
+        What stands above the verdict where nothing is claimed.
 
     Examples
     --------
@@ -312,6 +349,7 @@ class Report:
     author: str = ""
     revision: str = ""
     date: str = ""
+    headline: Headline | None = None
 
 
 PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib")

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 
+from .changes import RANK
 from .compare import read_report
-from .document import Claim
-from .outline import summary
+from .document import Claim, Figure, Headline
+from .outline import claim_status, summary
 from .page import check_gallery_folder, fill, write_files
+from .svg import shapes_svg, svg, svg_files
+from .trends import Revision, Trend, trends
 
 __all__ = ["Entry", "entries", "write_gallery"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One report of a gallery: its folder, what it says, and its traffic light."""
+    """One report of a gallery: its folder, what it says, and its traffic light.
+
+    `requirements` has the id of each, and look and status of the claim that answers it.
+    """
 
     folder: str
     title: str
@@ -29,6 +36,9 @@ class Entry:
     light: str
     told: str
     readable: bool = False
+    revision: str = ""
+    requirements: Sequence[tuple[str, str, str]] = ()
+    content: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def link(self) -> str:
@@ -61,7 +71,9 @@ def _entry(folder: Path, name: str, check: Callable[[Path], object]) -> Entry:
     try:
         check(folder)
         report = read_report(folder)
-        light, told = summary([Claim(**claim) for claim in report["claims"]])
+        claims = [Claim(**claim) for claim in report["claims"]]
+        headline = report.get("headline")
+        light, told = summary(claims, None if headline is None else Headline(**headline))
         if not (folder / "index.html").is_file():
             raise UsageError("a page is missing")
     except (UsageError, OSError, TypeError):
@@ -74,7 +86,21 @@ def _entry(folder: Path, name: str, check: Callable[[Path], object]) -> Entry:
         light=light,
         told=told,
         readable=True,
+        revision=", ".join(filter(None, (report.get("revision", ""), report.get("date", "")))),
+        requirements=_requirements(claims),
+        content=report,
     )
+
+
+def _requirements(claims: Sequence[Claim]) -> list[tuple[str, str, str]]:
+    """Return each requirement once, with look and status of the worst claim that answers it."""
+    found: dict[str, tuple[str, str]] = {}
+    for claim in claims:
+        status, look = claim_status(claim)
+        for one in claim.ids:
+            if one not in found or RANK[look] > RANK[found[one][0]]:
+                found[one] = (look, status)
+    return [(one, *ended) for one, ended in found.items()]
 
 
 @as_annotated
@@ -83,8 +109,12 @@ def write_gallery(
     *,
     force: bool = False,
     check: Callable[[Path], object] = _unchecked,
+    draw: Callable[[Trend], Figure] | None = None,
 ) -> Path:
     """Write FOLDER/index.html: every report below it with its verdict and a link.
+
+    Where several reports have one title, as of one study at several revisions, the page shows
+    their claims and main numbers by date, revision and folder.
 
     Parameters
     ----------
@@ -94,6 +124,8 @@ def write_gallery(
         Whether an ``index.html`` is replaced that is not a gallery.
     check : callable, optional
         Takes the folder of a report, and raises UsageError where it is not to be believed.
+    draw : callable, optional
+        Takes what became of one study, and returns the figure of it; without it there are tables.
 
     Returns
     -------
@@ -114,6 +146,24 @@ def write_gallery(
     found = entries(folder, check)
     if not force:
         check_gallery_folder(folder)
-    page = fill("gallery.html", entries=found)
+    page = fill("gallery.html", entries=found, **_history(found, draw))
     write_files(Path(folder), {"index.html": page})
     return Path(folder) / "index.html"
+
+
+def _history(found: Sequence[Entry], draw: Callable[[Trend], Figure] | None) -> dict[str, object]:
+    """Return what the page shows of studies with several reports."""
+    several = trends(
+        Revision(folder=e.folder, label=e.revision or e.folder, content=e.content)
+        for e in found
+        if e.readable
+    )
+    pictures = [] if draw is None else [draw(trend) for trend in several]
+    shapes: dict[str, str] = {}
+    drawn = [
+        svg(figure, file, f"trend-{number}", shapes)
+        for number, (figure, file) in enumerate(
+            zip(pictures, svg_files([p.figure for p in pictures]), strict=True), 1
+        )
+    ]
+    return {"trends": several, "pictures": pictures, "drawn": drawn, "shapes": shapes_svg(shapes)}

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
 
-from .document import History
+from ..json_values import as_json
+from .document import History, Report
+from .outline import place_anchors
 
-__all__ = ["chart", "thinned"]
+__all__ = ["SIGNALS", "chart", "signals_json", "thinned"]
+
+SIGNALS = "signals.json"
+"""File beside a page with the time histories of the page, for comparisons."""
 
 _COUNT = 2000  # samples of each signal on the page
 DIGITS = 6
@@ -29,6 +35,17 @@ def chart(history: History) -> dict[str, Any]:
         "unit": history.unit,
         "data": [_rounded(row[kept]) for row in (time, *signals)],
     }
+
+
+def signals_json(report: Report) -> str:
+    """Return the time histories of a report by their anchors; nothing if it has none."""
+    charts = {
+        anchor: chart(item)
+        for part in place_anchors(report)
+        for anchor, _, item in part.items
+        if isinstance(item, History)
+    }
+    return json.dumps(as_json(charts), ensure_ascii=False, allow_nan=False) + "\n" if charts else ""
 
 
 def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:

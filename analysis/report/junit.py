@@ -21,7 +21,8 @@ def junit(title: str, claims: Sequence[Claim]) -> bytes:
     """Return claims as JUnit XML.
 
     A claim that fails or is refuted is a failure, one that is open an error; one of somebody else,
-    such as a paper's, that is refuted is skipped, since nothing of ours has failed.
+    such as a paper's, that is refuted is skipped, since nothing of ours has failed.  The ids of the
+    requirements that it answers stand before its name, and are properties ``requirement``.
 
     Parameters
     ----------
@@ -49,9 +50,12 @@ def junit(title: str, claims: Sequence[Claim]) -> bytes:
         errors=count["error"], skipped=count["skipped"],
     )  # fmt: skip
     for claim, verdict in zip(claims, verdicts, strict=True):
-        case = ElementTree.SubElement(
-            suite, "testcase", classname=_text(title), name=_text(claim.text)
-        )
+        name = f"{', '.join(claim.ids)}: {claim.text}" if claim.ids else claim.text
+        case = ElementTree.SubElement(suite, "testcase", classname=_text(title), name=_text(name))
+        if claim.ids:
+            known = ElementTree.SubElement(case, "properties")
+            for one in claim.ids:
+                ElementTree.SubElement(known, "property", name="requirement", value=_text(one))
         found = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
         if verdict:
             told = ElementTree.SubElement(case, verdict, message=_text(found))

@@ -14,7 +14,7 @@ import numpy as np
 
 from nlctl.wording import counted, some_of
 
-from .document import Claim, Figure, History, Item, Report, Section, Table
+from .document import Claim, Figure, Headline, History, Item, Report, Section, Table
 
 __all__ = [
     "Placed",
@@ -46,7 +46,15 @@ LIGHTS = {
     "pass": ("pass", "passes", "hold", "holds", "ok", "reached", "confirmed", "held"),
     "proved": ("proved", "computed"),
     "checked": ("checked", "sampled", "shown"),
-    "caution": ("undecided", "open", "inconclusive", "not confirmed", "not shown yet"),
+    "caution": (
+        "undecided",
+        "open",
+        "inconclusive",
+        "not confirmed",
+        "not shown yet",
+        "no claim",
+        "not run yet",
+    ),
     "refuted": ("refuted", "violated as printed"),
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
@@ -71,11 +79,12 @@ _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in s
 
 @dataclass(frozen=True, kw_only=True)
 class TableCell:
-    """One cell of a table as shown: text, number to sort by, look of its badge."""
+    """One cell of a table as shown: text, number to sort by, look of its badge, its link."""
 
     text: str
     value: str = ""
     badge: str = ""
+    target: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,9 +145,12 @@ def cells(table: Table) -> list[list[TableCell]]:
     """Return the rows of a table as they are shown, all of one length."""
     width = max([len(table.columns), *map(len, table.rows)])
     titles = [*table.columns, *[""] * (width - len(table.columns))]
+    badges = (table.status,) if isinstance(table.status, str) else table.status
     return [
         [
-            _cell(value, bool(table.status) and title == table.status)
+            _link(value)
+            if table.links and title == table.links
+            else _cell(value, bool(title) and title in badges)
             for title, value in zip_longest(titles, row, fillvalue="")
         ]
         for row in table.rows
@@ -166,6 +178,11 @@ def _cell(value: object, is_status: bool) -> TableCell:
     if is_status:
         return TableCell(text=text, badge=light(text))
     return TableCell(text=text, value=sort_key(value))
+
+
+def _link(value: object) -> TableCell:
+    """Return a cell that holds the key of a section or figure."""
+    return TableCell(text=_shown(value), target=_shown(value))
 
 
 def is_long(text: str) -> bool:
@@ -222,36 +239,74 @@ def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
     return {status: told for status, told in MEANINGS.items() if status in used}
 
 
-def summary(claims: Sequence[Claim]) -> tuple[str, str]:
-    """Return the report's traffic light, and the sentence that it stands for."""
-    statuses = [claim_status(claim) for claim in claims]
-    looks = [look for _, look in statuses]
+def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[str, str]:
+    """Return the report's traffic light, and the sentence that it stands for.
+
+    Without claims that is the `headline`, if there is one.
+    """
+    looks = [claim_status(claim)[1] for claim in claims]
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
     total = len(claims)
     if failed:
         return "fail", f"{some_of(failed, total, 'claim', 'fails', 'fail')}."
-    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
-    kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
-    waiting = "not shown yet" if {status for status, _ in statuses} <= set(ANSWERS) else "open"
     if refuted:
-        left = total - refuted - open_
-        told = [f"{_whose(claims)} refuted"]
-        told += [f"{open_} {'is' if open_ == 1 else 'are'} {waiting}"] * bool(open_)
-        holds = "other holds" if left == 1 else "others hold"
-        told += [f"{left} {holds}{f' ({kept})' if kept else ''}"] * bool(left)
-        return "refuted", f"{'; '.join(told)}."
+        return "refuted", _refuted(claims)
     if open_:
+        waiting = _waiting(claims)
         return "caution", f"{some_of(open_, total, 'claim', 'is', 'are')} {waiting}."
     if not claims:
-        return "neutral", "No claims are made."
+        look = (
+            Headline(look="neutral", text="No claims are made.") if headline is None else headline
+        )
+        return look.look, look.text
     hold = "The claim holds" if total == 1 else f"All {total} claims hold"
-    return "pass", f"{hold}: {kept}." if kept else f"{hold}."
+    return "pass", f"{hold}{_known(claims, ': ')}."
 
 
-def _whose(claims: Sequence[Claim]) -> str:
-    """Return how many claims are refuted, and whose they are if all are somebody's: 1 claim is."""
-    of = [claim.by for claim in claims if claim_status(claim)[1] == "refuted"]
-    if not any(of):
-        return some_of(len(of), len(claims), "claim", "is", "are")
-    whose = f" of {of[0]}" if len(set(of)) == 1 else ""
-    return f"{counted(len(of), 'claim')}{whose} {'is' if len(of) == 1 else 'are'}"
+def _waiting(claims: Sequence[Claim]) -> str:
+    """Return what claims without an answer are: those of studies may still be shown."""
+    statuses = {claim_status(claim)[0] for claim in claims}
+    return "not shown yet" if statuses <= set(ANSWERS) else "open"
+
+
+def _known(claims: Sequence[Claim], before: str, after: str = "") -> str:
+    """Return how claims are known, 2 checked, 1 proved; nothing where they just hold."""
+    statuses = [claim_status(claim) for claim in claims]
+    kinds = Counter(status for status, look in statuses if look in ("proved", "checked"))
+    kept = ", ".join(f"{number} {status}" for status, number in kinds.items())
+    return f"{before}{kept}{after}" if kept else ""
+
+
+def _refuted(claims: Sequence[Claim]) -> str:
+    """Return what became of the claims where some are refuted; somebody's and ours apart."""
+    whose = {claim.by for claim in claims if claim_status(claim)[1] == "refuted"}
+    by = whose.pop() if len(whose) == 1 else None
+    theirs = [claim for claim in claims if claim.by == by] if by else claims
+    looks = [claim_status(claim)[1] for claim in theirs]
+    refuted, open_ = looks.count("refuted"), looks.count("caution")
+    held = len(theirs) - refuted - open_
+    waiting = [f"{open_} {'is' if open_ == 1 else 'are'} {_waiting(claims)}"] * bool(open_)
+    are = "is" if refuted == 1 else "are"
+    if by:
+        told = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
+        told += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
+        return f"{', '.join(told)}{_ours([claim for claim in claims if claim.by != by])}."
+    first = f"{counted(refuted, 'claim')} {are} refuted"
+    if by is not None:
+        first = f"{some_of(refuted, len(claims), 'claim', 'is', 'are')} refuted"
+    others = f"{held} {'other holds' if held == 1 else 'others hold'}{_known(claims, ' (', ')')}"
+    return f"{'; '.join([first, *waiting, *[others] * bool(held)])}."
+
+
+def _ours(claims: Sequence[Claim]) -> str:
+    """Return what became of our own claims, of which none fails or is refuted."""
+    held = [claim for claim in claims if claim_status(claim)[1] != "caution"]
+    left = len(claims) - len(held)
+    told = []
+    if held:
+        every = "all " if not left and len(held) > 1 else ""
+        verb = "holds" if len(held) == 1 else "hold"
+        told.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
+    if left:
+        told.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
+    return f"; of ours {', '.join(told)}" if told else ""

@@ -121,10 +121,12 @@ def generator(template: str) -> str:
 def check_report_folder(folder: str | os.PathLike[str]) -> None:
     """Refuse a folder whose files a report would replace, unless a report has made them."""
     folder = Path(folder)
-    page, content, print_ = (folder / n for n in ("index.html", "report.json", "report.pdf"))
+    page, content, *others_of_page = (
+        folder / n for n in ("index.html", "report.json", "report.pdf", "signals.json")
+    )
     is_own = _maker(page) == generator("report.html")
     others = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
-    others += [] if is_own else [print_]
+    others += [] if is_own else others_of_page
     _refuse([path for path in others if path.exists()], "take another folder with --out")
 
 

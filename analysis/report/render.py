@@ -23,7 +23,7 @@ from nlctl.errors import ParameterError
 
 from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
-from .history import chart
+from .history import SIGNALS, chart, signals_json
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
@@ -31,6 +31,7 @@ from .typography import plain_text
 
 __all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
 
+RARE = ("ids", "links")
 DRAWN = ("figure", "time", "signals")  # curves are on the page only
 _TITLES = {
     "methods": "How it was found",
@@ -71,7 +72,7 @@ def render_html(
     See `Report`.
     """
     placed = place_anchors(report)
-    light, told = summary(report.claims)
+    light, told = summary(report.claims, report.headline)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
     figures = {} if report.lead is None else {"lead": report.lead}
     figures |= {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
@@ -86,7 +87,7 @@ def render_html(
         for anchor, item in items.items()
         if interactive and isinstance(item, History)
     }
-    digest = hashlib.sha256(to_bytes(render_json(report))).hexdigest()
+    own = _own_files(report)
     return fill(
         "report.html",
         interactive=bool(charts),
@@ -102,13 +103,24 @@ def render_html(
         told=told,
         margins=any(claim.margin for claim in report.claims),
         meanings=meanings(report.claims),
+        has_signals=SIGNALS in own,
         made_by=_pairs("What made it.", ("what", "version or value"), report.provenance),
         beside=_pairs(
             "Files that belong to this page, with their places as seen from it.",
             ("file", "SHA-256"),
-            {"report.json": digest, **report.files},
+            own | dict(report.files),
         ),
     )
+
+
+def _own_files(report: Report) -> dict[str, str]:
+    """Return the files next to a page with their SHA-256."""
+    texts = {"report.json": render_json(report), SIGNALS: signals_json(report)}
+    return {name: _digest(text) for name, text in texts.items() if text}
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(to_bytes(text)).hexdigest()
 
 
 def _byline(report: Report) -> str:
@@ -154,7 +166,7 @@ def render_json(report: Report) -> str:
         "revision": report.revision,
         "date": report.date,
         "lead": None if report.lead is None else _plain(report.lead),
-        "claims": [vars(claim) for claim in report.claims],
+        "claims": [_said(vars(claim)) for claim in report.claims],
         "sections": {
             part.anchor: {
                 "title": part.section.title,
@@ -171,11 +183,18 @@ def render_json(report: Report) -> str:
         "inputs": report.inputs,
         "files": report.files,
     }
+    if report.headline is not None:
+        content["headline"] = vars(report.headline)
     return json.dumps(as_json(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(item: Item) -> dict[str, Any]:
-    return {"kind": kind(item)} | {k: v for k, v in vars(item).items() if k not in DRAWN}
+    return {"kind": kind(item)} | _said({k: v for k, v in vars(item).items() if k not in DRAWN})
+
+
+def _said(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out what most items lack, where it is empty."""
+    return {name: value for name, value in fields.items() if value or name not in RARE}
 
 
 @as_annotated
@@ -188,7 +207,9 @@ def write_report(
     pool: Executor | None = None,
     drawn: Drawn = NONE_DRAWN,
 ) -> Path:
-    """Write ``index.html`` and ``report.json``; nothing is half written.
+    """Write ``index.html``, ``report.json``, and ``signals.json`` where the report has histories.
+
+    Nothing is half written.
 
     Parameters
     ----------
@@ -235,7 +256,11 @@ def write_report(
     if not force:
         check_report_folder(folder)
     page = render_html(report, interactive=interactive, pool=pool, drawn=drawn)
-    write_files(folder, {"report.json": render_json(report), "index.html": page})
+    signals = signals_json(report)
+    texts = {SIGNALS: signals} if signals else {}
+    write_files(folder, {"report.json": render_json(report), **texts, "index.html": page})
+    if not signals:
+        (folder / SIGNALS).unlink(missing_ok=True)  # of a page that was here before
     return folder / "index.html"
 
 

@@ -36,7 +36,8 @@ THEME = {
     axes.GREEN.lower(): "var(--green)",
     axes.PURPLE.lower(): "var(--purple)",
 }
-_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": 9.0}
+LETTERS = 11.2  # points: 9 px where a figure of WIDTH is as wide as a phone
+_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": LETTERS}
 _WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
@@ -97,8 +98,10 @@ def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup
     compact(root, shapes)
     attributes = {"role": "img", "aria-labelledby": f"{key}-title {key}-desc"}
     width = float(root.get("width", "0pt").removesuffix("pt"))
-    if width > _WIDE:
-        attributes["class"] = "broad" if width > BROAD else "wide"
+    looks = ["broad" if width > BROAD else "wide"] * (width > _WIDE)
+    looks += ["diagram"] * isinstance(figure.figure, picture.Drawing)  # letters of its own size
+    if looks:
+        attributes["class"] = " ".join(looks)
     root.attrib = attributes | {k: v for k, v in root.attrib.items() if k != "version"}
     title = ElementTree.Element("title", id=f"{key}-title")
     description = ElementTree.Element("desc", id=f"{key}-desc")

@@ -71,7 +71,7 @@ __all__ = [
 ]
 
 _OWN = ("study.toml", "run.json", "results.json", CONTENTS, "rows", ".lock", ".owner")
-_OWN += ("index.html", "report.json", "report.pdf")
+_OWN += ("index.html", "report.json", "signals.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 

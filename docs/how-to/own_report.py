@@ -76,8 +76,8 @@ with tempfile.TemporaryDirectory() as folder:
     )
 
 # %%
-# ``write_pdf(page, "report.pdf")`` prints it through an installed Chromium, with a title page where there is an
-# author or a revision. ``nlctl.analysis.report.framed(made)`` shows it in a notebook.
+# ``write_pdf(page, "report.pdf")`` prints it through an installed Chromium;
+# ``nlctl.analysis.report.framed(made)`` shows it in a notebook.
 #
 # The closed loop is linear where the angle is small: there its slowest mode is :math:`e^{-2t}`.
 late = np.abs(response.outputs[0, t >= 4])

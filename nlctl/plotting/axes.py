@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,8 @@ __all__ = [
     "BLUE",
     "GREEN",
     "GREY",
+    "INK",
+    "LINE",
     "ORANGE",
     "PURPLE",
     "SHORT_LINE",
@@ -25,12 +28,20 @@ __all__ = [
     "stacked_axes",
 ]
 
-# Okabe-Ito: distinguishable for colour-blind readers; line styles distinguish as well.
-BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#6b7280"
-STYLES = ((BLUE, "-"), (ORANGE, "--"), (GREEN, "-."), (PURPLE, ":"))
+# Okabe-Ito, with a darker purple: distinguishable for colour-blind readers; line styles, markers or
+# hatches distinguish as well.  One colour has one meaning in all figures:
+#   BLUE           what a figure is about: the output, what was found, after a change
+#   PURPLE, GREEN  the second and the third of several of a kind: signals, options, ways to search
+#   GREY           what it is compared with: the reference, before a change, 0
+#   INK            single runs over bands, and the best so far: the colour of the text
+#   ORANGE         a limit, and what violates it: a violation, a burst, a run that was lost
+BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#B3558A", "#6b7280"
+INK = "#000000"
+STYLES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (GREY, ":"))  # of several of a kind
 TIME = "time t (s)"
 WIDTH = 6.2  # in, with letters that can still be read on a phone
-LINE, SHORT_LINE = 62, 42  # characters that a legend above the axes has room for
+_MARKUP = re.compile(r"[\\${}_^]")  # of a formula, no letters
+LINE, SHORT_LINE = 54, 36  # characters that a legend above the axes has room for
 
 
 def stacked_axes(
@@ -72,7 +83,7 @@ def legend_above(
         labels, handles = list(shown or ()), list((shown or {}).values())
     if not labels:
         return
-    widest = max(len(label.replace("\\", "")) for label in labels) + 6
+    widest = max(len(_MARKUP.sub("", label)) for label in labels) + 6
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
     if isinstance(ax, Figure):
         place = {"loc": "outside upper left"}

@@ -12,13 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..annotations import as_annotated
-from .axes import BLUE, GREEN, GREY, ORANGE, PURPLE, STYLES, TIME, legend_above, stacked_axes
+from .axes import BLUE, INK, ORANGE, STYLES, TIME, legend_above, stacked_axes
 from .labels import plain
 
 __all__ = ["LIMIT", "Limit", "bands", "most_frequent", "quantile", "upper_envelope"]
 
 BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
-LINES = ((PURPLE, "--"), (GREY, "-"), (GREEN, "-."), (PURPLE, ":"))  # of single runs
+LINES = ("-", "--", "-.", ":")  # of single runs
 LIMIT = "limit of the spec"
 Limit = tuple[float, float, float]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -58,8 +58,10 @@ def bands(
                     time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
                 )
         for k, (label, line) in enumerate(lines.items()):
-            colour, style = LINES[k % len(LINES)]
-            ax.plot(time, np.clip(line[name], low, high), style, color=colour, label=label)
+            style = LINES[k % len(LINES)]
+            ax.plot(
+                time, np.clip(line[name], low, high), style, color=INK, linewidth=1.2, label=label
+            )
         for value, start, end in own:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)
         unit = units.get(name, "")

@@ -136,10 +136,9 @@ def test_nothing_that_is_given_is_markup():
     assert frame[0][1]["srcdoc"] == render_html(made)
 
 
-def test_a_report_without_author_has_no_title_page():
-    """Nor a line of nothing below its title; and without a command it says so."""
+def test_a_report_without_author_has_no_byline():
+    """No line of nothing below its title; and without a command it says so."""
     plain = render_html(loop_report(LOOP, title="Decay"))
-    assert 'class="titled"' not in plain
     assert 'class="byline"' not in plain
     assert "no command was given" in plain
 

@@ -4,20 +4,35 @@ import math
 import re
 import subprocess
 
+import numpy as np
 import pytest
 from extras import needed, needed_program
 from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
 
+from nlctl.analysis.pages.compared import Compared, comparison
+from nlctl.analysis.pages.trend import trend_figure
 from nlctl.analysis.paper.page.report import paper_report
-from nlctl.analysis.report import write_gallery, write_pdf, write_report
+from nlctl.analysis.report import (
+    Claim,
+    History,
+    Report,
+    Section,
+    Table,
+    write_gallery,
+    write_pdf,
+    write_report,
+)
 from nlctl.analysis.report.browser import BROWSERS
+from nlctl.analysis.report.compare import read_report
+from nlctl.analysis.report.svg import LETTERS
 
 pytestmark = pytest.mark.browser
 
-PAGES = ("plain", "hostile", "long", "paper", "gallery", "charts", "hostile charts")
+PAGES = ("plain", "hostile", "long", "paper", "compared", "gallery", "charts", "hostile charts")
 PHONE = 390
+SMALLEST_OF_DIAGRAMS = 8.0  # points
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +61,41 @@ def pages(tmp_path_factory):
         "charts": write_report(charted(), folder / "charts", interactive=True),
         "hostile charts": write_report(charted(hostile), folder / "odd", interactive=True),
     }
-    return made | {"gallery": write_gallery(folder)}
+    (folder / "revisions").mkdir()
+    for name, shift in (("first", 0.0), ("second", 0.3)):
+        write_report(revised(name, shift), folder / "revisions" / name)
+    both = [folder / "revisions" / name for name in ("first", "second")]
+    of_both = comparison(*(Compared(name=p.name, content=read_report(p), folder=p) for p in both))
+    made["compared"] = write_report(of_both, folder / "compared")
+    return made | {"gallery": write_gallery(folder, draw=trend_figure)}
+
+
+def revised(name, shift):
+    """One revision of a report: its claims have ids, one of them is lost with a shift."""
+    t = np.linspace(0, 10, 101)
+    history = History(
+        key="run-history",
+        caption="A run",
+        description="y",
+        time=t,
+        signals={"y": np.sin(t) + shift},
+    )
+    claims = [
+        Claim(
+            text=f"|y| <= {limit}", measured=f"{1 + shift:g}", limit=f"{limit}", evidence="run",
+            holds=1 + shift <= limit, margin=f"{limit - 1 - shift:.1f}", ids=[f"REQ-{number}"],
+        )
+        for number, limit in ((1, 1.2), (2, 2.0))
+    ]  # fmt: skip
+    links = Table(
+        caption="From requirement to evidence.", columns=("id", "verdict", "evidence"),
+        rows=[("REQ-1", "shown", "run")], status="verdict", links="evidence",
+    )  # fmt: skip
+    run = Section(key="run", title="A run", items=[history, links])
+    return Report(
+        title="A wave", verdict="v", claims=claims, sections=[run], command="", revision=name,
+        numbers={"peak": 1 + shift, "same": 2.0},
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -197,13 +246,22 @@ def test_everything_is_readable_without_scripts(visit):
     assert ["".join(text.split()) for text in seen] == ["".join(text.split()) for text in written]
 
 
-def test_a_phone_shows_whole_figures(visit):
-    """Plots, diagrams and their legends are as wide as the screen, not wider."""
-    page = visit("paper", width=PHONE)
+@pytest.mark.parametrize("name", ["paper", "compared", "gallery"])
+def test_a_phone_shows_whole_figures_with_letters_of_9_px(visit, name):
+    """Plots and their legends are as wide as the screen; diagrams scroll in boxes of their own."""
+    page = visit(name, width=PHONE)
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true; })")
-    for drawing in page.locator("figure svg").all():
-        box = drawing.bounding_box()
-        assert 0.5 * PHONE < box["width"] <= PHONE - box["x"]
+    drawings = page.locator("figure svg").all()
+    assert drawings
+    for drawing in drawings:
+        box, is_diagram = (
+            drawing.bounding_box(),
+            "diagram" in (drawing.get_attribute("class") or ""),
+        )
+        points = float(drawing.get_attribute("viewBox").split()[2])
+        assert box["width"] > 0.5 * PHONE
+        assert is_diagram or box["width"] <= PHONE - box["x"]
+        assert (SMALLEST_OF_DIAGRAMS if is_diagram else LETTERS) * box["width"] / points >= 9.0
 
 
 @pytest.mark.parametrize("scripts", [True, False])
@@ -471,3 +529,25 @@ def test_pages_of_paper_are_numbered_and_unfolded(chromium, pages, tmp_path):
     for sheet in sheets:
         for head in heads.finditer(sheet):
             assert sheet[head.end() :].count("pass") + sheet[head.end() :].count("fail") > 1
+
+
+@pytest.mark.parametrize("name", ["paper", "compared", "gallery"])
+def test_no_page_of_paper_is_half_empty(chromium, pages, tmp_path, name):
+    """But the last one: what does not fit below leaves less than half of a page."""
+    printer = needed_program(("pdftoppm",))
+    made = write_pdf(pages[name], tmp_path / "report.pdf")
+    subprocess.run([printer, "-gray", "-r", "30", made, tmp_path / "sheet"], check=True)
+    *sheets, _ = sorted(tmp_path.glob("sheet-*.pgm"))
+    for sheet in sheets:
+        assert filled(sheet) > 0.5, sheet.name
+
+
+def filled(path):
+    """How much of a sheet's height between its margins is used (1)."""
+    magic, size, _, grey = path.read_bytes().split(b"\n", 3)
+    assert magic == b"P5"
+    width, height = map(int, size.split())
+    shade = np.frombuffer(grey, dtype=np.uint8).reshape(height, width)
+    top, bottom = (round(height * x / 297) for x in (16, 297 - 18))  # mm of @page
+    used = np.flatnonzero((shade[top:bottom] < 200).any(axis=1))
+    return (used[-1] + 1) / (bottom - top) if used.size else 0.0

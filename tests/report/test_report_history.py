@@ -19,11 +19,12 @@ from test_report_page import HOSTILE, LADDER, Reader
 from typer.testing import CliRunner
 
 from nlctl.analysis.cli.main import app
+from nlctl.analysis.json_values import as_json
 from nlctl.analysis.pages.study.histories import Histories
 from nlctl.analysis.pages.study.rows import fan_items
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import Figure, History, Report, Section, render_html, write_report
-from nlctl.analysis.report.history import chart, thinned
+from nlctl.analysis.report.history import SIGNALS, chart, thinned
 from nlctl.errors import UsageError
 
 VENDOR = ROOT / "analysis" / "report" / "vendor" / "uplot"
@@ -65,12 +66,34 @@ def without_histories(report):
     return dataclasses.replace(report, sections=sections)
 
 
+def without_file(page):
+    """A page without what it says of signals.json."""
+    told = ", signals over time in <code>signals.json</code>"
+    assert told in page
+    return re.sub(r"<tr><td[^>]*>signals\.json</td>.*\n", "", page.replace(told, ""))
+
+
+def test_signals_lie_next_to_the_page_and_go_with_them(tmp_path):
+    """As the charts would have them; a page without histories leaves none of an older one."""
+    report = charted()
+    write_report(report, tmp_path)
+    kept = json.loads((tmp_path / SIGNALS).read_text(encoding="utf-8"))
+    every = [i for s in report.sections for i in s.items if isinstance(i, History)]
+    assert list(kept) == ["waves", "odd", "odd-2"]
+    assert list(kept.values()) == [
+        json.loads(json.dumps(as_json(chart(history)))) for history in every
+    ]
+    write_report(without_histories(report), tmp_path)
+    assert not (tmp_path / SIGNALS).exists()
+
+
 def test_a_page_has_charts_only_if_they_are_asked_for():
-    """Else it is that of a report without any, the hash of report.json apart."""
+    """Else it is that of a report without any, but for hashes and the file of signals."""
     report = charted()
     still, bare = render_html(report), render_html(without_histories(report))
-    assert len(still) == len(bare)
-    assert re.sub(r"\b[0-9a-f]{64}\b", "", still) == re.sub(r"\b[0-9a-f]{64}\b", "", bare)
+    assert without_file(re.sub(r"\b[0-9a-f]{64}\b", "", still)) == re.sub(
+        r"\b[0-9a-f]{64}\b", "", bare
+    )
     assert "uPlot" not in still
     assert render_html(without_histories(report), interactive=True) == bare
     assert len(held(render_html(report, interactive=True))) == 3

@@ -430,7 +430,11 @@ def test_the_colour_says_whose_claim_fails():
     assert claim_status(paper) == ("refuted", "refuted")
     assert summary([paper, good]) == (
         "refuted",
-        "1 claim of the paper is refuted; 1 other holds (1 proved).",
+        "1 claim of the paper is refuted; of ours 1 holds (1 proved).",
+    )
+    theirs = dataclasses.replace(paper, holds=True)
+    assert summary([paper, theirs, theirs, good, good])[1] == (
+        "1 claim of the paper is refuted, 2 hold; of ours all 2 hold (2 proved)."
     )
     assert summary([paper, own, good]) == ("fail", "1 of 3 claims fails.")
     assert summary([paper, dataclasses.replace(paper, by="a rumour")])[1] == (

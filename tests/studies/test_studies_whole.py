@@ -76,7 +76,7 @@ READERS = {
 
 def parts_of(folder):
     """The files and the folders that a run has written."""
-    pages = {"index.html", "report.json"}
+    pages = {"index.html", "report.json", "signals.json"}
     return sorted(
         path.relative_to(folder).as_posix()
         for path in folder.rglob("*")
@@ -368,7 +368,9 @@ def test_a_run_that_goes_on_is_not_taken_for_whole(copied, done):
     assert again.plain() == load_result(done).plain()
     now, before = (read_json(folder / "contents.json") for folder in (copied, done))
     assert now == before | {"page": {}}
-    assert [text[-3:] for text in verify(copied).problems] == ["py'", "py'"]
+    assert [text[-3:] for text in verify(copied).problems] == [
+        "py'"
+    ] * 3  # index.html, report.json, signals.json
     assert nlctl_here("report", copied).returncode == 1
     assert verify(copied).has_page
     assert verify(copied).is_whole

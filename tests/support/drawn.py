@@ -1,18 +1,28 @@
 """What a reader could not see of a figure: words that are cut off or lie on curves."""
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import BarContainer
 from matplotlib.legend import Legend
 
+from nlctl.analysis.report.svg import LETTERS
+
 EDGE = 0.01  # inches: half the width of a line
 
 
 def hidden(figure):
-    """Return a sentence for each text that is cut off and each that lies on a curve or another."""
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    """Return a sentence for each text that is cut off and each that lies on a curve or another.
+
+    Letters are as large as on a page.
+    """
+    with mpl.rc_context({"font.size": LETTERS}):
+        return _hidden(figure, FigureCanvasAgg(figure).get_renderer())
+
+
+def _hidden(figure, renderer):
     figure.draw(renderer)
     told = [] if _inside(figure.get_tightbbox(renderer), figure) else ["something is cut off"]
     for ax in figure.axes:
@@ -27,6 +37,14 @@ def hidden(figure):
         for a, b in combinations(places, 2)
         if places[a].shrunk(0.9, 0.8).overlaps(places[b].shrunk(0.9, 0.8))
     ]
+    ticks = [axis.get_ticklabels() for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+    for texts in ticks:
+        shown = [t for t in texts if t.get_visible() and t.get_text()]
+        told += [
+            f"the tick {_name(a)} runs into {_name(b)}"
+            for a, b in pairwise(shown)
+            if a.get_window_extent(renderer).overlaps(b.get_window_extent(renderer))
+        ]
     return told
 
 

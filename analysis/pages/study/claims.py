@@ -68,6 +68,7 @@ def claims(result: Result, prefix: str = "") -> list[Claim]:
             holds=bool(finding.holds),
             status=finding.answer,
             evidence=f"{prefix}{finding.key}",
+            ids=asked[finding.key].id,
             **_measured(finding, asked[finding.key]),
         )
         for finding in result.claims

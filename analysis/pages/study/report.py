@@ -24,6 +24,7 @@ from .claims import claims, verdict
 from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
+from .traceability import traceability
 
 if TYPE_CHECKING:
     from ...studies.finding import Finding
@@ -102,6 +103,7 @@ def study_sections(
     asked = [
         Section(key="study_asked", title="What was asked", items=[*setup_items(result, published)])
     ]
+    asked += traceability(result, prefix)
     if published is not None and published.items:
         items = [*published.items]
         title = "The loop as published"

@@ -20,6 +20,7 @@ from ...studies.page.text import clipped, margin_text, status_text, violate
 from . import text as text
 from .claims import refusal
 from .histories import Histories
+from .traceability import has_ids
 
 if TYPE_CHECKING:
     from ...studies.result import Result
@@ -48,11 +49,12 @@ def setup_items(result: Result, published: Published | None = None) -> Iterator[
         text=f"Loop: {study.loop}{about}.{changed} Runs last {study.time.end:g} s. All random "
         f"numbers follow from the seed {study.study.seed}."
     )
+    ids = has_ids(result)
     yield Table(
         caption=text.SPEC,
-        columns=("requirement", "formula", "until (s)", "meaning"),
+        columns=("id",) * ids + ("requirement", "formula", "until (s)", "meaning"),
         rows=[
-            (key, row["formula"], row["until"], row["meaning"])
+            (study.spec[key].id,) * ids + (key, row["formula"], row["until"], row["meaning"])
             for key, row in result.requirements.iterrows()
         ],
     )

@@ -16,7 +16,7 @@ from .. import TAIL, CaseRun, checks
 from .. import figures as histories
 from ..burst import Burst
 from . import text as text
-from .claims import paper_claims, paper_verdict, proof_claims
+from .claims import number_claims, paper_claims, paper_verdict, proof_claims, theorem_claims
 from .closing import closing_sections, metric_table
 from .proof import Evidence, lyapunov_sections
 from .record import LV_2017, found_of
@@ -48,7 +48,12 @@ def paper_report(
         LV_2017,
         verdict=paper_verdict(runs, compared, far or {}),
         lead=_lead(runs, (far or {}).get("2")),
-        claims=[*paper_claims(runs, compared), *proof_claims(proofs or {}, far or {}, burst)],
+        claims=[
+            *paper_claims(runs),
+            *theorem_claims(proofs or {}, far or {}, burst),
+            *number_claims(compared),
+            *proof_claims(proofs or {}),
+        ],
         sections=[
             *sections,
             *([] if sampling is None else [sampling_section(sampling)]),

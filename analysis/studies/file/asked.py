@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from .field_types import Names, Strict
+from .field_types import Id, Names, Strict
 
 __all__ = ["Asked", "Varied"]
+
+
+def _listed(value: object) -> Any:
+    return (value,) if isinstance(value, str) else value
+
+
+Ids = Annotated[tuple[Id, ...], BeforeValidator(_listed)]
 
 
 class Asked(Strict):
@@ -42,6 +49,9 @@ class Asked(Strict):
         description="Name of its folder: lower-case letters, digits, hyphens; by default the kind.",
     )
     title: str = Field("", description="Its heading in the report.")
+    id: Ids = Field(
+        (), description="Ids of the requirements that its claim answers: one, or a list."
+    )
     kind: str
     definition: ClassVar[Any] = None
     """The `Kind` of the table, once a file has named it."""

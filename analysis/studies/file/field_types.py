@@ -6,12 +6,13 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Confidence", "Flag", "Names", "Number", "Pair", "Size", "Strict", "Whole"]
+__all__ = ["Confidence", "Flag", "Id", "Names", "Number", "Pair", "Size", "Strict", "Whole"]
 
 # strict: "0.3" and true are no numbers
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Whole = Annotated[int, Field(strict=True)]
 Names = tuple[str, ...]
+Id = Annotated[str, Field(pattern=r"^[^\s,;]*$", max_length=60)]
 Pair = tuple[Number, Number]
 Flag = Annotated[bool, Field(strict=True)]
 Confidence = Annotated[float, Field(strict=True, gt=0, lt=1)]

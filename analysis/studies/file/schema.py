@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 from nlctl.arguments import ATOL, RTOL
 
 from .asked import Asked
-from .field_types import Number, Pair, Size, Strict, Whole
+from .field_types import Id, Number, Pair, Size, Strict, Whole
 
 __all__ = [
     "About",
@@ -69,6 +69,7 @@ class Rule(Strict):
     formula: str = Field(description="For example 'always from 10 s on |e| <= 0.15'.")
     meaning: str = Field("", description="In words.")
     until: Number | None = Field(None, description="Where windows end (s); the end of the run.")
+    id: Id = Field("", description="Its id where requirements are kept, such as 'REQ-12'.")
 
 
 def _rule(value: object) -> Any:

@@ -40,6 +40,7 @@ from ..file.errors import KeyPath, Problem
 from ..file.schema import RESERVED, Faulty, Study
 from ..kind import Setup
 from ..resolve import check_complete, loop_function, option, uncertain
+from .ids import id_problems
 
 __all__ = ["checked_experiment"]
 
@@ -124,6 +125,7 @@ def _check_tables(study: Study, known: Mapping[str, Collection[str]], notes: _No
     if not (known["space"] or study.choices):
         notes.add(("space",), "needs at least one quantity, if there are no choices")
     notes.attempt(("time",), times, study)
+    notes.problems += id_problems(study, whole=set(known["spec"]) == set(study.spec))
 
 
 def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:

@@ -14,8 +14,8 @@ from .contents import CONTENTS, check_whole, sealed_record
 
 __all__ = ["PAGE_FILES", "check_page", "is_run", "page_problems", "recorded_page", "recorded_print"]
 
-_PAGE, _PRINT = ("index.html", "report.json"), "report.pdf"
-PAGE_FILES = (*_PAGE, _PRINT)
+_PAGE, _SIGNALS, _PRINT = ("index.html", "report.json"), "signals.json", "report.pdf"
+PAGE_FILES = (*_PAGE, _SIGNALS, _PRINT)
 _PARTS = ("study.toml", "run.json", "results.json", CONTENTS)
 
 
@@ -30,7 +30,8 @@ def recorded_page(folder: Path) -> Iterator[None]:
     with locked(folder, RunFolderError):
         content = check_whole(folder)
         yield
-        made = {name: file_digest(folder / name) for name in _PAGE}
+        files = (*_PAGE, *(name for name in (_SIGNALS,) if (folder / name).exists()))
+        made = {name: file_digest(folder / name) for name in files}
         is_same = made[_PAGE[0]] == content["page"].get(_PAGE[0])
         before = content["page"] if is_same else {}  # a print of another page is none of this one
         write_json(folder / CONTENTS, content | {"page": before | made})

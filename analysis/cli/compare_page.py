@@ -1,0 +1,59 @@
+"""The page of ``nlctl compare A B --out DIR``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..pages.compared import Compared
+    from ..report.document import Report
+
+__all__ = ["compose_comparison"]
+
+
+def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
+    """Compose the page of two reports or runs, which have been checked."""
+    from ..pages.compared import comparison
+    from ..studies import origin_differences
+    from ..studies.differences import long_table_differences
+
+    both = (first, second)
+    are_runs = all((path / "results.json").exists() for path in both)
+    others = []
+    if are_runs:
+        others = [*long_table_differences(first, second, rtol)]
+        if told := origin_differences(first, second):
+            others.insert(0, f"The runs were not computed from the same: {told}")
+    command = ["nlctl", "compare", *(path.as_posix() for path in both)]
+    command += ["--rtol", f"{rtol:g}"] * (rtol > 0) + ["--out", out.as_posix()]
+    return comparison(
+        *(_compared(path) for path in both),
+        rtol=rtol,
+        common=are_runs,
+        others=others,
+        command=shlex.join(command),
+    )
+
+
+def _compared(path: Path) -> Compared:
+    """Return what is compared; a run without a page has what its page would say without figures."""
+    from ..pages.compared import Compared
+    from ..report.compare import read_report
+
+    if path.is_dir() and not (path / "report.json").exists():
+        return Compared(name=path.as_posix(), content=_of_run(path))
+    folder = path if path.is_dir() else path.parent
+    return Compared(name=path.as_posix(), content=read_report(path), folder=folder)
+
+
+def _of_run(folder: Path) -> Mapping[str, Any]:
+    import json
+
+    from ..pages.study.report import study_report
+    from ..report.render import render_json
+    from ..studies import load_result
+
+    return json.loads(render_json(study_report(load_result(folder))))

@@ -1,0 +1,348 @@
+"""Two reports as a page: which claims, figures and numbers changed, and signals of both."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nlctl.wording import counted
+
+from .. import figures
+from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figure_changes
+from ..report.compare import ABSENT, Difference, differences
+from ..report.document import (
+    Claim,
+    Figure,
+    Headline,
+    Item,
+    Paragraph,
+    Report,
+    Section,
+    Table,
+    versions,
+)
+from ..report.outline import sort_key, summary
+
+__all__ = ["Compared", "comparison"]
+
+LISTED = 100  # numbers of a table
+DRAWN = 4  # signals of a figure
+_CLAIM_COLUMNS = (
+    "before", "after", "claim", "found before", "found after", "limit before", "limit after",
+)  # fmt: skip
+_NUMBER_COLUMNS = (
+    "number", "before", "after", "after − before", "share of the larger", "tolerance",
+)  # fmt: skip
+_LINE = re.compile(r"^numbers\.(study\.)?(tables|running estimate)\b")  # of a table of a study
+_TOLD_APART = ("title", "verdict", "question", "revision", "date")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """A report that is compared.
+
+    Attributes
+    ----------
+    name : str
+        As the command names it.
+    content : mapping
+        What is in its ``report.json``.
+    folder : Path, optional
+        Where its page lies, with its signals; None where it was made for this comparison.
+    """
+
+    name: str
+    content: Mapping[str, Any]
+    folder: Path | None = None
+
+
+def comparison(
+    first: Compared,
+    second: Compared,
+    *,
+    rtol: float = 0.0,
+    common: bool = False,
+    others: Sequence[str] = (),
+    command: str = "",
+) -> Report:
+    """Compose the page; `others` are differences that the reports lack, such as of long tables."""
+    found = differences(first.content, second.content, rtol, common=common)
+    claims = claim_changes(first.content["claims"], second.content["claims"])
+    numbers, words = _sorted_out(found)
+    pictures = [
+        *figure_changes([c.content for c in (first, second)], [first.folder, second.folder])
+    ]
+    curves = [*_signal_items(curves_of(first.folder), curves_of(second.folder), rtol)]
+    sections = [
+        _claims_section(claims),
+        _numbers_section(numbers, rtol),
+        _signals_section(curves),
+        _figures_section(pictures),
+        _words_section(words, others),
+        _compared_section(first, second),
+    ]
+    count = len(numbers) + len(words) + len(others) + sum(c.is_changed for c in claims)
+    return Report(
+        title=_title(first, second),
+        question="what does the second report say that the first did not?",
+        verdict=_verdict(claims, numbers, pictures, curves),
+        headline=_headline(claims, count, len(pictures)),
+        claims=[],
+        sections=sections,
+        command=command,
+        provenance=versions(),
+        numbers={"differences": count, "rtol": rtol},
+    )
+
+
+def _title(first: Compared, second: Compared) -> str:
+    titles = dict.fromkeys(str(c.content["title"]) for c in (first, second))
+    return f"Compared: {', and '.join(titles)}"
+
+
+def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headline:
+    """Return what became of the claims, or that nothing differs."""
+    moved: dict[tuple[str, str], list[ClaimChange]] = {}
+    for change in claims:
+        if change.statuses[0] != change.statuses[1]:
+            moved.setdefault(change.statuses, []).append(change)
+    if not moved:
+        same = (
+            f"All {counted(len(claims), 'claim')} end as before"
+            if len(claims) > 1
+            else ("The claim ends as before" if claims else "Neither report makes a claim")
+        )
+        return Headline(look="neutral" if count else "pass", text=f"{same}{_differ(count)}.")
+    told = [f"{counted(len(c), 'claim')}: {_moved(*s)}" for s, c in moved.items()]
+    worst = max(change.worse for change in claims)
+    looks = {2: "fail", 1: "caution", 0: "neutral"}
+    return Headline(look=looks.get(worst, "pass"), text=f"{'; '.join(told)}.")
+
+
+def _differ(count: int) -> str:
+    return f"; {counted(count, 'difference')}" if count else ", and nothing differs"
+
+
+def _moved(before: str, after: str) -> str:
+    """Return a change of status in words."""
+    if before == "new":
+        return f"new: {after}"
+    return f"gone, once: {before}" if after == "gone" else f"{before} → {after}"
+
+
+def _verdict(
+    claims: Sequence[ClaimChange],
+    numbers: Sequence[Difference],
+    pictures: Sequence[tuple[str, str, str]],
+    curves: Sequence[Item],
+) -> str:
+    """Return the claims that became worse, and how much else differs."""
+    worse = [f"{c.ids + ': ' if c.ids else ''}{c.text}" for c in claims if c.worse > 0]
+    told = [f"Worse: {'; '.join(worse)}."] * bool(worse)
+    other = [what for *_, what in pictures if not what.endswith("as before")]
+    told.append(
+        f"{counted(len(numbers), 'number')} and {counted(len(other), 'figure')} of "
+        f"{len(pictures)} differ."
+    )
+    if not curves:
+        told.append("No signals over time are there of both.")
+    return " ".join(told)
+
+
+def _sorted_out(found: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
+    """Return differences of numbers, those with the largest share first, and the others.
+
+    Those of claims are in their own table.
+    """
+    numbers, words = [], []
+    for one in found:
+        if not one.where.startswith("claim '"):
+            (numbers if _both_numbers(one) else words).append(one)
+    return sorted(numbers, key=lambda d: -np.nan_to_num(_share(d), nan=np.inf)), words
+
+
+def _both_numbers(one: Difference) -> bool:
+    return bool(sort_key(one.first) and sort_key(one.second))
+
+
+def _share(one: Difference) -> float:
+    """Return how far two numbers are apart, as a share of the larger one."""
+    a, b = float(sort_key(one.first)), float(sort_key(one.second))
+    scale = max(abs(a), abs(b))
+    return abs(a - b) / scale if np.isfinite(scale) and scale else np.nan
+
+
+def _claims_section(claims: Sequence[ClaimChange]) -> Section:
+    changed = [change for change in claims if change.is_changed]
+    kept = [change for change in claims if not change.is_changed]
+    items: list[Item] = []
+    if changed:
+        items.append(_claims_table("Claims that changed, those that became worse first.", changed))
+    else:
+        items.append(Paragraph(text="No claim changed." if claims else "There are no claims."))
+    if kept:
+        items.append(_claims_table("Claims that are as before.", kept, folded=bool(changed)))
+    return Section(key="claim_changes", title="Claims", items=items)
+
+
+def _claims_table(caption: str, claims: Sequence[ClaimChange], folded: bool = False) -> Table:
+    ids = any(change.ids for change in claims)
+    return Table(
+        caption=caption,
+        columns=("id",) * ids + _CLAIM_COLUMNS,
+        rows=[
+            (
+                *(change.ids,) * ids, *change.statuses, change.text,
+                *(_of(c, "measured") for c in (change.first, change.second)),
+                *(_of(c, "limit") for c in (change.first, change.second)),
+            )
+            for change in claims
+        ],
+        status=("before", "after"),
+        folded=folded,
+    )  # fmt: skip
+
+
+def _of(claim: Claim | None, field: str) -> str:
+    return "" if claim is None else str(getattr(claim, field))
+
+
+def _numbers_section(numbers: Sequence[Difference], rtol: float) -> Section:
+    """Return the numbers that differ: first those that stand alone, then cells of tables."""
+    close = f"further apart than {rtol:g} of the larger" if rtol else "that are not equal"
+    lines = [one for one in numbers if _LINE.search(one.where)]
+    main = [one for one in numbers if not _LINE.search(one.where)]
+    items: list[Item] = []
+    if main:
+        items.append(_numbers_table(f"Numbers {close}", main, rtol, folded=False))
+    if lines:
+        items.append(_numbers_table(f"Lines of tables {close}", lines, rtol, folded=True))
+    none = f"No two numbers are {close.removeprefix('that are ')}."
+    return Section(key="number_changes", title="Numbers", items=items or [Paragraph(text=none)])
+
+
+def _numbers_table(
+    caption: str, numbers: Sequence[Difference], rtol: float, *, folded: bool
+) -> Table:
+    more = f" The first {LISTED} of {len(numbers)}; nlctl compare prints all."
+    return Table(
+        caption=f"{caption}, the largest share first.{more * (len(numbers) > LISTED)}",
+        columns=_NUMBER_COLUMNS,
+        rows=[_number_row(one, rtol) for one in numbers[:LISTED]],
+        folded=folded,
+    )
+
+
+def _number_row(one: Difference, rtol: float) -> tuple[Any, ...]:
+    a, b = float(sort_key(one.first)), float(sort_key(one.second))
+    return _place(one.where), one.first, one.second, b - a, _share(one), rtol
+
+
+def _place(where: str) -> str:
+    """Return the place of a number in words: which section, which row, which column."""
+    cell = re.fullmatch(r"section '(.*)', table (\d+), row '(.*)', column '(.*)'", where)
+    if cell is None:
+        return where.removeprefix("numbers.")
+    section, table, row, column = cell.groups()
+    return f"{section}, {row}: {column}" + f" (table {table})" * (table != "1")
+
+
+def _signal_items(
+    first: Mapping[str, Curves], second: Mapping[str, Curves], rtol: float
+) -> Iterator[Item]:
+    """Yield an overlay of each chart that both pages have, and how far its signals are apart."""
+    for key in (key for key in first if key in second):
+        one, other = first[key], second[key]
+        apart = {n: one.largest_difference(other, n) for n in one.signals if n in other.signals}
+        names = sorted(apart, key=lambda n: -np.nan_to_num(_range_share(one, n, apart[n][0])))
+        if not names:
+            continue
+        both = [(c.time, {n: c.signals[n] for n in names[:DRAWN]}) for c in (one, other)]
+        caption = f"{key.removesuffix('-history')}: {', '.join(names[:DRAWN])} before and after."
+        yield Figure(
+            key=f"overlaid-{key}",
+            caption=caption,
+            description=f"{caption} Largest differences: "
+            + "; ".join(f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:DRAWN]),
+            figure=figures.overlaid(*both, unit=one.unit),
+        )
+        yield Table(
+            caption="How far the signals are apart at most, and when; to 6 digits.",
+            columns=("signal", "largest difference", "at (s)", "share of its range before",
+                     "tolerance"),
+            rows=[(n, *apart[n], _range_share(one, n, apart[n][0]), rtol) for n in names],
+            folded=True,
+        )  # fmt: skip
+
+
+def _range_share(curves: Curves, name: str, apart: float) -> float:
+    samples = curves.signals[name]
+    known = samples[np.isfinite(samples)]
+    span = float(np.ptp(known)) if known.size else 0.0
+    return apart / span if span else (0.0 if apart == 0 else np.nan)
+
+
+def _signals_section(curves: Sequence[Item]) -> Section:
+    none = "No chart of signals over time is next to both pages (signals.json)."
+    return Section(
+        key="signal_changes",
+        title="Signals of both over time",
+        items=list(curves) or [Paragraph(text=none)],
+    )
+
+
+def _figures_section(pictures: Sequence[tuple[str, str, str]]) -> Section:
+    other = [row for row in pictures if not row[2].endswith("as before")]
+    items: list[Item] = [Paragraph(text="Every figure is as before.")]
+    if other:
+        items = [
+            Table(caption="Figures that differ.", columns=("figure", "caption", "is"), rows=other)
+        ]
+    elif not pictures:
+        items = [Paragraph(text="There are no figures.")]
+    return Section(key="figure_changes", title="Figures", items=items)
+
+
+def _words_section(words: Sequence[Difference], others: Sequence[str]) -> Section:
+    rows = [(_place(d.where), d.first, d.second) for d in words[:LISTED]]
+    items: list[Item] = []
+    if rows:
+        more = f" The first {LISTED} of {len(words)}." * (len(words) > LISTED)
+        items.append(
+            Table(
+                caption=f"Words, and what only one report has ({ABSENT} in the other).{more}",
+                columns=("place", "before", "after"),
+                rows=rows,
+            )
+        )
+    items += [Paragraph(text=f"{text}.") for text in others]
+    return Section(
+        key="word_changes",
+        title="What else differs",
+        items=items or [Paragraph(text="Nothing else differs.")],
+        folded=len(rows) > 10,
+    )
+
+
+def _compared_section(first: Compared, second: Compared) -> Section:
+    both = (first, second)
+    told = [summary([Claim(**c) for c in one.content["claims"]])[1] for one in both]
+    rows = [("report", *(one.name for one in both)), ("claims", *told)]
+    rows += [(key, *(str(c.content.get(key, "")) for c in both)) for key in _TOLD_APART]
+    made = [dict(one.content.get("provenance", {})) for one in both]
+    rows += [
+        (key, *(str(one.get(key, "")) for one in made))
+        for key in dict.fromkeys([*made[0], *made[1]])
+        if made[0].get(key) != made[1].get(key)
+    ]
+    table = Table(
+        caption="What was compared, and what made each of them that differs.",
+        columns=("what", "before", "after"),
+        rows=[row for row in rows if any(row[1:])],
+    )
+    return Section(key="compared", title="The two reports", items=[table])

@@ -1,0 +1,156 @@
+"""Which claims of a report changed in another one, which figures, and which signals: as data."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..json_values import from_json
+from .document import Claim
+from .drawings import drawings
+from .history import SIGNALS
+from .outline import claim_status
+
+__all__ = ["RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
+
+RANK = {"pass": 0, "proved": 0, "checked": 0, "neutral": 1, "caution": 1, "refuted": 2, "fail": 2}
+GONE, NEW = "gone", "new"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClaimChange:
+    """One claim in two reports; None where a report lacks it."""
+
+    first: Claim | None
+    second: Claim | None
+
+    @property
+    def statuses(self) -> tuple[str, str]:
+        """What became of it in both."""
+        before = NEW if self.first is None else claim_status(self.first)[0]
+        return before, GONE if self.second is None else claim_status(self.second)[0]
+
+    @property
+    def worse(self) -> int:
+        """How much worse it is: from shown to refuted 2, from refuted to shown -2."""
+        ranks = [1 if c is None else RANK[claim_status(c)[1]] for c in (self.first, self.second)]
+        return ranks[1] - ranks[0]
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether its status, what was measured, its limit or its words differ."""
+        return self.first != self.second
+
+    @property
+    def text(self) -> str:
+        """The claim; both texts where they differ."""
+        texts = dict.fromkeys(c.text for c in (self.first, self.second) if c is not None)
+        return " → ".join(texts)
+
+    @property
+    def ids(self) -> str:
+        """Ids of its requirements."""
+        every = [i for c in (self.first, self.second) if c is not None for i in c.ids]
+        return ", ".join(dict.fromkeys(every))
+
+
+def claim_changes(
+    first: Sequence[Mapping[str, Any]], second: Sequence[Mapping[str, Any]]
+) -> list[ClaimChange]:
+    """Return the claims of two reports, those that became worse first.
+
+    Claims belong together that say the same, or else have their evidence at the same place.
+    """
+    one, other = ([Claim(**claim) for claim in claims] for claims in (first, second))
+    found, left = [], list(other)
+    alone = []
+    for claim in one:
+        same = next((c for c in left if c.text == claim.text), None)
+        if same is None:
+            alone.append(claim)
+            continue
+        left.remove(same)
+        found.append(ClaimChange(first=claim, second=same))
+    for claim in alone:
+        same = next((c for c in left if c.evidence and c.evidence == claim.evidence), None)
+        if same is not None:
+            left.remove(same)
+        found.append(ClaimChange(first=claim, second=same))
+    found += [ClaimChange(first=None, second=claim) for claim in left]
+    return sorted(
+        found, key=lambda change: (-change.worse, change.statuses[0] == change.statuses[1])
+    )
+
+
+def figure_changes(
+    reports: Sequence[Mapping[str, Any]], folders: Sequence[Path | None]
+) -> Iterator[tuple[str, str, str]]:
+    """Yield key, caption and what became of every figure of two reports."""
+    one, other = (_figures(report) for report in reports)
+    drawn = [{} if folder is None else drawings(folder / "index.html") for folder in folders]
+    for key in dict.fromkeys([*one, *other]):
+        caption = (other.get(key) or one[key])["caption"]
+        if key not in one or key not in other:
+            yield key, caption, NEW if key in other else GONE
+        elif all(key in pictures for pictures in drawn):
+            is_same = drawn[0][key] == drawn[1][key]
+            yield key, caption, "as before" if is_same else "drawn differently"
+        else:
+            is_same = one[key]["description"] == other[key]["description"]
+            yield key, caption, "described as before" if is_same else "described differently"
+
+
+def _figures(report: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the figures of a report.json by key, the one at its top first."""
+    lead = report.get("lead")
+    items = [item for section in report["sections"].values() for item in section["items"]]
+    figures = [item for item in items if item["kind"] == "figure"]
+    return ({} if lead is None else {"lead": lead}) | {item["key"]: item for item in figures}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves:
+    """Signals of one chart of a page: times (s), samples by name, and their unit."""
+
+    time: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    unit: str = ""
+
+    def largest_difference(self, other: Curves, name: str) -> tuple[float, float]:
+        """Return how far a signal is from the same of another run at most (1), and when (s)."""
+        start, end = max(self.time[0], other.time[0]), min(self.time[-1], other.time[-1])
+        every = np.union1d(self.time, other.time)
+        both = every[(every >= start) & (every <= end)]
+        if not both.size:
+            return np.nan, np.nan
+        apart = np.abs(
+            np.interp(both, self.time, self.signals[name])
+            - np.interp(both, other.time, other.signals[name])
+        )
+        if np.all(np.isnan(apart)):
+            return np.nan, np.nan
+        at = int(np.nanargmax(apart))
+        return float(apart[at]), float(both[at])
+
+
+def curves_of(folder: Path | None) -> dict[str, Curves]:
+    """Return the charts next to a page by key; nothing where there are none, or none to be read."""
+    try:
+        charts = {} if folder is None else json.loads((folder / SIGNALS).read_text("utf-8"))
+        return {key: _curves(from_json(chart)) for key, chart in charts.items()}
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return {}
+
+
+def _curves(chart: Mapping[str, Any]) -> Curves:
+    time, *samples = (
+        np.array([np.nan if x is None else x for x in row], dtype=float) for row in chart["data"]
+    )
+    return Curves(
+        time=time, signals=dict(zip(chart["names"], samples, strict=True)), unit=str(chart["unit"])
+    )
