@@ -29,6 +29,7 @@ extensions = [
     "formulas",
     "docstrings",
     "public",
+    "block_pages",
 ]
 root_doc = "index"
 exclude_patterns = ["auto/**/*.py", "auto/**/*.ipynb", "gallery", "tutorials", "how-to/*.py"]
@@ -74,6 +75,8 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "image_srcset": ["2x"],
     "nested_sections": False,
+    "backreferences_dir": "auto/used",  # which scripts use a name: its page says so
+    "doc_module": ("nlctl",),
     "reset_modules": ("matplotlib", "strict.warnings_are_errors", "strict.labels_fit"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)
