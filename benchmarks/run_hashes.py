@@ -76,7 +76,7 @@ def noted(function: Callable[..., Any], lines: list[str], name: str) -> Callable
 
 def gallery() -> Iterator[str]:
     """Yield lines for the runs of the gallery's scripts."""
-    for script in sorted(GALLERY.glob("*.py")):
+    for script in sorted(GALLERY.rglob("*.py")):
         lines: list[str] = []
         right = {k: getattr(nlctl, k) for k in ("input_output_response", "ensemble_response")}
         for name, function in right.items():

@@ -112,7 +112,8 @@ def block_page(folder, group, name):
     page += [f".. public:: {home}", "", f"   {name}", ""]
     if made is not None:
         page += [*signals(made), *(equations(made) if isinstance(thing, type) else [])]
-    return [*page, f".. minigallery:: {home}.{name}", "   :add-heading: In the gallery", ""]
+    gallery = [f".. minigallery:: {home}.{name}", "   :add-heading: In the gallery"]
+    return [*page, *gallery, "   :heading-level: -", ""]
 
 
 def replace(path, lines):

@@ -67,7 +67,9 @@ def test_no_line_of_the_tables_is_left_out():
 
 def test_the_extras_of_the_installation_are_those_of_the_project():
     """Each is in the table."""
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     told = re.findall(r"^\| (`[^|]+) \|", text("start/installation"), flags=re.MULTILINE)
     assert {name for row in told for name in re.findall(r"`(\w+)`", row)} == set(extras)
 
