@@ -195,8 +195,8 @@ def list_(
         str | None,
         typer.Argument(
             help="A block, whose parameters are shown; controllers: which one is for which plant; "
-            "kinds: the kinds of analysis of a study, or one of them; path/to/file.py:NAME: a block "
-            "or a kind of your own, whose code is run."
+            "kinds: the kinds of analysis of a study, or one of them; path/to/file.py:NAME: a "
+            "block or a kind of your own, whose code is run."
         ),
     ] = None,
 ) -> None:

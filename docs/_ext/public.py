@@ -10,6 +10,7 @@ from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
 import nlctl
+from nlctl.analysis.controller_guide import GUIDES, rows_of
 
 
 def entry(module, name):
@@ -79,18 +80,25 @@ class Controllers(SphinxDirective):
     """``.. controllers::``: which controller is for which plant, from its records."""
 
     def run(self):
-        from nlctl.analysis.controller_guide import GUIDES, rows_of
+        lines = [".. list-table::", "   :header-rows: 1", "   :widths: 24 40 18 8 10", ""]
+        heads = ("controller", "what has to be known", "proved here", "states", "time")
+        for row in [heads, *map(overview, GUIDES)]:
+            lines += [f"   {'*' if k == 0 else ' '} - {cell}" for k, cell in enumerate(row)]
+        lines.append("")
+        for guide in GUIDES:
+            lines += [guide.name, "-" * len(guide.name), ""]
+            lines += [".. code-block:: python", "", f"   {guide.code}", ""]
+            told = {key: words for key, words in rows_of(guide).items() if key != "code"}
+            lines += [f":{key}: {_text(words)}" for key, words in told.items()]
+            lines.append("")
+        return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
 
-        rows = [{"controller": f"**{guide.name}**", **rows_of(guide)} for guide in GUIDES]
-        lines = [".. list-table::", "   :header-rows: 1", "   :class: controllers", ""]
-        heads = [key for key in rows[0] if key != "code"]
-        lines += [f"   {'*' if k == 0 else ' '} - {head}" for k, head in enumerate(heads)]
-        for row in rows:
-            code = f"``{row.pop('code')}``"
-            cells = [row.pop("controller"), *map(_text, row.values())]
-            cells[0] += f"\n\n       {code}"
-            lines += [f"   {'*' if k == 0 else ' '} - {cell}" for k, cell in enumerate(cells)]
-        return self.parse_text_to_nodes("\n".join(lines))
+
+def overview(guide):
+    """Return the cells of a controller in the table of all."""
+    proof = f":doc:`{guide.proof} </explanation/certificates>`" if guide.proof else "–"
+    time = "–" if guide.time is None else f"{guide.time:g}"
+    return f"`{guide.name}`_", _text(guide.known), proof, str(guide.states), time
 
 
 class Citation(SphinxDirective):

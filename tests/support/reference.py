@@ -16,7 +16,7 @@ SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
 
 
 def documented_names():
-    """Yield the package that offers it and the name, page after page, then the blocks' own pages."""
+    """Yield the package that offers it and the name, page after page, then blocks."""
     for page in sorted((ROOT / "docs" / "reference").glob("*.rst")):
         for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
             yield from ((home, name) for name in names.split())
