@@ -43,12 +43,11 @@ def heading(title, sign="="):
 
 
 def group_page(group, lines):
-    """Return the page of a group: a table of links, and the pages below it."""
+    """Return the page of a group: links with what each is, and the pages below it."""
     page = heading(TITLES.get(group, group.capitalize()))
-    page += [".. list-table::", "   :widths: 30 70", ""]
     for name, told in lines.items():
-        page += [f"   * - :doc:`{name} <../{name}>`", f"     - {escaped(told)}"]
-    page += ["", ".. toctree::", "   :hidden:", ""]
+        page += [f":doc:`{name} <../{name}>`", f"    {escaped(told)}", ""]
+    page += [".. toctree::", "   :hidden:", ""]
     return page + [f"   ../{name}" for name in lines]
 
 

@@ -3,7 +3,8 @@
 import re
 from pathlib import Path
 
-from docutils.nodes import reference
+from sphinx.addnodes import pending_xref
+from sphinx.transforms.post_transforms import SphinxPostTransform
 
 INCLUDED = re.compile(r"\{include\} \.\./\.\./(\S+)")
 
@@ -17,16 +18,21 @@ def pages(folder):
     return found
 
 
-def resolve(app, env, node, content):
-    """Return a link to the page of a file, None where it has none."""
-    document = pages(app.srcdir).get(node.get("reftarget", ""))
-    if document is None:
-        return None
-    uri = app.builder.get_relative_uri(node["refdoc"], document)
-    return reference("", "", *content.children, internal=True, refuri=uri)
+class RootFiles(SphinxPostTransform):
+    """Turn links to files of the root into links to their pages, before MyST looks for them."""
+
+    default_priority = 4
+
+    def run(self, **_):
+        shown = pages(self.app.srcdir)
+        for node in list(self.document.findall(pending_xref)):
+            document = shown.get(node.get("reftarget", ""))
+            if document and node["reftype"] == "myst":
+                node.attributes |= {"refdomain": "std", "reftype": "doc", "refexplicit": True}
+                node["reftarget"] = f"/{document}"
 
 
 def setup(app):
-    """Resolve what Sphinx and MyST do not find."""
-    app.connect("missing-reference", resolve)
+    """Look at all links."""
+    app.add_post_transform(RootFiles)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

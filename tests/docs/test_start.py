@@ -5,6 +5,7 @@ import importlib
 import linecache
 import re
 import tomllib
+import zlib
 
 import matplotlib as mpl
 import pytest
@@ -94,3 +95,14 @@ def test_every_variable_of_the_environment_is_on_the_page_and_no_other():
     told = re.findall(r"^\| `([A-Z_]+)` \|", text("reference/configuration"), flags=re.MULTILINE)
     assert sorted(told) == sorted(set(read_variables()))
     assert "NLCTL_CACHE_DIR" in told
+
+
+@each_row("library", ["control", "numpy", "scipy"])
+def test_the_stored_inventories_have_names_that_there_are(library):
+    """So that a link leads to a page; `docs/inventories/make.py` makes them again."""
+    packed = (DOCS / "inventories" / f"{library}.inv").read_bytes().partition(b"zlib.\n")[2]
+    names = [line.split()[0] for line in zlib.decompress(packed).decode().splitlines()]
+    assert len(names) > 5
+    for name in names:
+        home, _, last = name.rpartition(".")
+        assert hasattr(importlib.import_module(home), last), name
