@@ -246,7 +246,7 @@ def rows_of(guide: ControllerGuide) -> dict[str, str]:
     """
     costs = f"{counted(guide.states, 'state')}, {counted(guide.parameters, 'parameter')}"
     if guide.time is not None:
-        costs += f"; a run takes {guide.time:g} times as long as with PID" * (guide.time != 1)
+        costs += f"; time of a run, with PID as 1: {guide.time:g}"
     return {
         "plant": guide.plant,
         "measured": ", ".join(guide.measured),

@@ -30,7 +30,7 @@ def linked_types(folder):
     found = {}
     for path in sorted(folder.glob("*.inv")):
         kinds = InventoryFile.loads(path.read_bytes(), uri="").data
-        found |= {name: name for names in kinds.values() for name in names}
+        found |= {name: f":py:obj:`{name}`" for names in kinds.values() for name in names}
     return found
 
 
