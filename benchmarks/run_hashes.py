@@ -18,7 +18,6 @@ import contextlib
 import hashlib
 import io
 import itertools
-import os
 import runpy
 import sys
 import warnings
@@ -76,13 +75,13 @@ def noted(function: Callable[..., Any], lines: list[str], name: str) -> Callable
 
 def gallery() -> Iterator[str]:
     """Yield lines for the runs of the gallery's scripts."""
-    for script in sorted(GALLERY.glob("*.py")):
+    for script in sorted(GALLERY.rglob("*.py")):
         lines: list[str] = []
         right = {k: getattr(nlctl, k) for k in ("input_output_response", "ensemble_response")}
         for name, function in right.items():
             setattr(nlctl, name, noted(function, lines, script.stem))
         try:
-            with contextlib.redirect_stdout(io.StringIO()):
+            with contextlib.chdir(script.parent), contextlib.redirect_stdout(io.StringIO()):
                 runpy.run_path(str(script))
         except Exception as error:
             lines.append(f"{script.stem} {type(error).__name__}: {error}".splitlines()[0])
@@ -115,7 +114,6 @@ def loops() -> Iterator[str]:
 def main() -> int:
     """Print all lines."""
     warnings.simplefilter("ignore")
-    os.chdir(GALLERY)
     for line in itertools.chain(loops(), gallery()):
         print(line, flush=True)
     return 0

@@ -13,6 +13,8 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 matplotlib.use("agg")
 
+from linked import linked_types  # noqa: E402
+
 from nlctl._version import __version__  # noqa: E402
 
 project = "nlctl"
@@ -23,22 +25,37 @@ version = release = __version__
 extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
     "numpydoc",
     "myst_parser",
     "sphinx_gallery.gen_gallery",
     "formulas",
     "docstrings",
     "public",
+    "block_pages",
+    "root_files",
+    "linked",
 ]
 root_doc = "index"
 exclude_patterns = ["auto/**/*.py", "auto/**/*.ipynb", "gallery", "tutorials", "how-to/*.py"]
-exclude_patterns += ["how-to/GALLERY_HEADER.rst", "data"]
+exclude_patterns += ["how-to/GALLERY_HEADER.rst", "data", "inventories"]
 
 autodoc_typehints = "none"  # types stand in the docstrings
 autosummary_generate = False
 numpydoc_show_class_members = False
 # numpydoc refers to each attribute of a docstring, and those are not pages of their own
 nitpick_ignore_regex = [("py:obj", r"\w+")]
+# inventories that are kept here: docs/inventories/make.py says what is in them
+OTHERS = {
+    "control": "https://python-control.readthedocs.io/en/0.10.2/",
+    "numpy": "https://numpy.org/doc/stable/",
+    "scipy": "https://docs.scipy.org/doc/scipy/",
+}
+intersphinx_mapping = {k: (url, f"inventories/{k}.inv") for k, url in OTHERS.items()}
+intersphinx_cache_limit = -1
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"  # but for these
+numpydoc_xref_aliases = linked_types(HERE / "inventories")
 myst_heading_anchors = 3
 myst_enable_extensions = ["deflist", "dollarmath"]
 suppress_warnings = ["config.cache"]  # functions among sphinx-gallery's settings
@@ -56,6 +73,7 @@ html_theme_options = {
     "navbar_end": ["theme-switcher"],
     "footer_start": ["copyright"],
     "footer_end": [],
+    "header_links_before_dropdown": 7,
     "navigation_with_keys": False,
     "show_toc_level": 2,
 }
@@ -74,6 +92,8 @@ sphinx_gallery_conf = {
     "matplotlib_animations": False,
     "image_srcset": ["2x"],
     "nested_sections": False,
+    "backreferences_dir": "auto/used",  # which scripts use a name: its page says so
+    "doc_module": ("nlctl",),
     "reset_modules": ("matplotlib", "strict.warnings_are_errors", "strict.labels_fit"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 __all__ = ["show", "show_all"]
 
-_KINDS = "kinds"
+_KINDS, _CONTROLLERS = "kinds", "controllers"
 _WIDEST = 120  # characters of a table that no terminal shows
 HELP = """
 nlctl list NAME shows signals and parameters of a block, or the arguments of a
-function, nlctl list kinds the kinds of analysis of a study, nlctl list
-file.py:NAME one of your own."""
+function, nlctl list controllers which controller is for which plant, nlctl list
+kinds the kinds of analysis of a study, nlctl list file.py:NAME one of your own."""
 
 
 def show_all() -> None:
@@ -48,11 +48,13 @@ def show_all() -> None:
 
 
 def show(name: str) -> None:
-    """Print a block, a function that makes some, a kind of analysis, or the kinds."""
+    """Print a block, a function that makes some, a kind of analysis, the kinds or controllers."""
     if ":" in name:
         from ..studies.resolve import named
 
         return _show(name, named(name, Path.cwd()))
+    if name == _CONTROLLERS:
+        return _show_controllers()
     blocks = [block for group in block_summaries().values() for block in group]
     functions = [made for group in function_summaries().values() for made in group]
     known = {each.lower(): each for each in (*functions, *blocks)}
@@ -73,7 +75,8 @@ def show(name: str) -> None:
         from nlctl.names import unknown
 
         papers = paper_summaries()
-        raise unknown("block", name, [*blocks, *functions, *kinds, *papers, _KINDS])
+        names = [*blocks, *functions, *kinds, *papers, _KINDS, _CONTROLLERS]
+        raise unknown("block", name, names)
     return _show_kind(name, kinds[name])
 
 
@@ -105,6 +108,17 @@ def _show_group(title: str, lines: dict[str, str], width: int) -> None:
         line = Text(f"  {name:<{width}}  {told}")
         cut = {"no_wrap": True, "overflow": "ellipsis"} if console.is_terminal else {}
         console.print(line, soft_wrap=not console.is_terminal, **cut)
+
+
+def _show_controllers() -> None:
+    """Print which controller is for which plant."""
+    from ..controller_guide import GUIDES, rows_of
+
+    console = _console()
+    for guide in GUIDES:
+        console.print(f"[bold]{guide.name}[/bold]", highlight=False)
+        for key, told in rows_of(guide).items():
+            console.print(Text(f"  {key:<9} {told}"), soft_wrap=True)
 
 
 def _show_block(name: str, record: type) -> None:

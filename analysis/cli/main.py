@@ -194,8 +194,9 @@ def list_(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="A block, whose parameters are shown; kinds: the kinds of analysis of a study, or "
-            "one of them; path/to/file.py:NAME: a block or a kind of your own, whose code is run."
+            help="A block, whose parameters are shown; controllers: which one is for which plant; "
+            "kinds: the kinds of analysis of a study, or one of them; path/to/file.py:NAME: a "
+            "block or a kind of your own, whose code is run."
         ),
     ] = None,
 ) -> None:

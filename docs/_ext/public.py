@@ -2,10 +2,15 @@
 
 import importlib
 import inspect
+from pathlib import Path
+from types import GenericAlias
 
 import typer
 from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
+
+import nlctl
+from nlctl.analysis.controller_guide import GUIDES, rows_of
 
 
 def entry(module, name):
@@ -14,7 +19,7 @@ def entry(module, name):
     full = f"{module}.{name}"
     if inspect.ismodule(thing):
         return [f".. automodule:: {full}"]
-    if not callable(thing):
+    if not callable(thing) or isinstance(thing, GenericAlias):
         return [f".. py:data:: {full}"]
     if not inspect.isclass(thing):
         return [f".. autofunction:: {full}"]
@@ -50,6 +55,91 @@ class Public(SphinxDirective):
         for name in " ".join(self.content).split():
             lines += [*entry(module, name), ""]
         return self.parse_text_to_nodes("\n".join(lines))
+
+
+class Inside(SphinxDirective):
+    """``.. inside:: module``: what a package offers that `nlctl` does not.
+
+    ``:without:`` has the names that another directive documents.
+    """
+
+    required_arguments = 1
+    option_spec = {"without": directives.unchanged}
+
+    def run(self):
+        home = importlib.import_module(self.arguments[0])
+        elsewhere = {*nlctl.__all__, *self.options.get("without", "").split()}
+        names = [name for name in home.__all__ if name not in elsewhere]
+        lines = []
+        for name in names:
+            lines += [*entry(self.arguments[0], name), ""]
+        return self.parse_text_to_nodes("\n".join(lines))
+
+
+class Controllers(SphinxDirective):
+    """``.. controllers::``: which controller is for which plant, from its records."""
+
+    def run(self):
+        lines = [".. list-table::", "   :header-rows: 1", "   :widths: 24 40 18 8 10", ""]
+        heads = ("controller", "what has to be known", "proved here", "states", "time")
+        for row in [heads, *map(overview, GUIDES)]:
+            lines += [f"   {'*' if k == 0 else ' '} - {cell}" for k, cell in enumerate(row)]
+        lines.append("")
+        for guide in GUIDES:
+            lines += [guide.name, "-" * len(guide.name), ""]
+            lines += [".. code-block:: python", "", f"   {guide.code}", ""]
+            told = {key: words for key, words in rows_of(guide).items() if key != "code"}
+            lines += [f":{key}: {_text(words)}" for key, words in told.items()]
+            lines.append("")
+        return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
+
+
+def overview(guide):
+    """Return the cells of a controller in the table of all."""
+    proof = f":doc:`{guide.proof} </explanation/certificates>`" if guide.proof else "–"
+    time = "–" if guide.time is None else f"{guide.time:g}"
+    return f"`{guide.name}`_", _text(guide.known), proof, str(guide.states), time
+
+
+class Citation(SphinxDirective):
+    """``.. citation::``: BibTeX of what ``CITATION.cff`` says, software first."""
+
+    def run(self):
+        import yaml
+
+        path = Path(self.env.srcdir).parent / "CITATION.cff"
+        self.env.note_dependency(str(path))
+        cited = yaml.safe_load(path.read_text(encoding="utf-8"))
+        entries = [bibtex(cited, f"nlctl-{cited['version']}")]
+        entries += [bibtex(one, _key(one)) for one in cited["references"]]
+        lines = [".. code-block:: bibtex", "", *_indented("\n\n".join(entries))]
+        return self.parse_text_to_nodes("\n".join(lines))
+
+
+def _indented(text):
+    return [f"   {line}" for line in text.splitlines()]
+
+
+def _key(cited):
+    return f"{cited['authors'][0]['family-names']}{cited['year']}".lower()
+
+
+def bibtex(cited, key):
+    """Return an entry of BibTeX for one of the Citation File Format."""
+    people = [
+        (one.get("name") and f"{{{one['name']}}}") or f"{one['family-names']}, {one['given-names']}"
+        for one in cited["authors"]
+    ]
+    year = cited.get("year") or str(cited["date-released"])[:4]
+    fields = {"author": " and ".join(people), "title": f"{{{cited['title']}}}", "year": year}
+    for ours, theirs in (("version", "version"), ("doi", "doi"), ("collection-title", "booktitle")):
+        if ours in cited:
+            fields[theirs] = cited[ours]
+    if "start" in cited:
+        fields["pages"] = f"{cited['start']}--{cited['end']}"
+    kind = "software" if cited.get("type") == "software" else "inproceedings"
+    body = ",\n".join(f"  {name} = {{{value}}}" for name, value in fields.items())
+    return f"@{kind}{{{key},\n{body}\n}}"
 
 
 def described(schema, name):
@@ -128,6 +218,9 @@ class CommandLine(SphinxDirective):
 def setup(app):
     """Make the directives known."""
     app.add_directive("public", Public)
+    app.add_directive("inside", Inside)
+    app.add_directive("controllers", Controllers)
+    app.add_directive("citation", Citation)
     app.add_directive("study-keys", StudyKeys)
     app.add_directive("command-line", CommandLine)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

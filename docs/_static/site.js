@@ -7,6 +7,11 @@ function reachable() {
 }
 addEventListener("load", () => {
   reachable();
+  // what opens the pages below another is called by that one's name
+  for (const summary of document.querySelectorAll("summary:has(.toctree-toggle)")) {
+    const link = summary.closest("li")?.querySelector("a");
+    if (link) summary.setAttribute("aria-label", `below ${link.textContent.trim()}`);
+  }
   // its own words are its name
   for (const button of document.querySelectorAll(".search-button__button")) button.removeAttribute("aria-label");
 });

@@ -279,7 +279,8 @@ def _local_names() -> Iterator[dict[Expr, str]]:
         if event != "return" or frame.f_code.co_filename.startswith(_OWN):
             return  # (also what dataclasses write: "<string>")
         for name, value in frame.f_locals.items():
-            if isinstance(value, Tracer) and value.values.size == 1 and value.origin is None:
+            scalar = isinstance(value, Tracer) and value.values.size == 1 and value.origin is None
+            if scalar and name != "_":  # which names what is not used under it
                 found.setdefault(value.only, name)
 
     sys.setprofile(noted)

@@ -6,19 +6,20 @@ import os
 import re
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
 import pytest
 from extras import needed, needed_program
 from places import ROOT
-from reference import documented_names
+from reference import documented_names, our_modules
 from rows import each_row
 
-from nlctl.analysis.catalogue import block_records
+from nlctl.analysis.catalogue import block_records, function_summaries
 from nlctl.analysis.report.browser import BROWSERS
 
 DOCS = ROOT / "docs"
-GALLERY = sorted((DOCS / "gallery").glob("*.py"))
+GALLERY = sorted((DOCS / "gallery").rglob("*.py"))
 SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.py")])
 PUBLIC = [
     *(
@@ -41,18 +42,29 @@ def text(path):
 PAGES = (
     *("index", "auto/tutorials/index", "auto/tutorials/t7_from_simulink", "auto/gallery/index"),
     *("how-to/index", "explanation/paper", "reference/blocks", "reference/study-files"),
-    *("studies", "glossary", "explanation/actuators"),
+    *("studies", "glossary", "explanation/actuators", "start/which-controller"),
+    *("start/quick-start", "start/from-matlab", "reference/configuration", "project/release-notes"),
+    *("auto/blocks/DeadZone", "auto/blocks/mrac", "auto/blocks/groups/controllers"),
+    *("reference/inside", "project/citing"),
 )
 
 
-@each_row("script", [path.name for path in GALLERY])
+@each_row("script", GALLERY)
 def test_a_script_of_the_gallery_is_short_and_asserts(script):
     """Under 60 lines, and what it asserts is not a constant."""
-    source = text(DOCS / "gallery" / script)
+    source = text(script)
     assert len(source.splitlines()) < 60
     asserted = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Assert)]
     assert asserted
     assert not any(isinstance(node.test, ast.Constant) for node in asserted)
+
+
+def test_every_script_of_the_gallery_has_a_theme():
+    """It lies in a folder whose header says what the theme is."""
+    themes = {path.parent.relative_to(DOCS / "gallery").as_posix() for path in GALLERY}
+    assert "." not in themes, "move the script into the folder of its theme"
+    headers = [text(DOCS / "gallery" / theme / "GALLERY_HEADER.rst") for theme in themes]
+    assert all(len(header.splitlines()) >= 4 for header in headers)
 
 
 def test_every_block_is_in_the_gallery():
@@ -70,10 +82,29 @@ def test_every_page_that_is_executed_asserts_something():
 
 
 @each_row("module", PUBLIC)
-def test_every_public_name_is_in_the_reference(module):
+def test_every_name_of_these_modules_is_in_the_reference(module):
     """And nothing else: the lists of the pages are the modules' own."""
     told = [name for home, name in documented_names() if home == module]
     assert sorted(told) == sorted(importlib.import_module(module).__all__)
+
+
+def test_every_public_name_is_in_the_reference():
+    """Of each package with an `__all__`: where it is, or under the name by which it is offered."""
+    told = set(documented_names())
+    known = {id(getattr(importlib.import_module(home), name)) for home, name in told}
+    inside = re.compile(r"^\.\. inside:: (\S+)$", re.MULTILINE)
+    whole = {home for path in DOCS.glob("reference/*.rst") for home in inside.findall(text(path))}
+    missing = []
+    for place in filter(lambda each: each.ispkg and each.name not in whole, our_modules()):
+        home = importlib.import_module(place.name)
+        named = {f"{place.name}.{name}": name for name in getattr(home, "__all__", ())}
+        missing += [
+            full
+            for full, name in named.items()
+            if (place.name, name) not in told and id(getattr(home, name)) not in known
+        ]
+    assert missing == []
+    assert len(told) > 350
 
 
 def built(folder, *options):
@@ -99,6 +130,24 @@ def site(tmp_path_factory):
 def test_the_site_builds_without_a_warning(site):
     """Links, names and formulas."""
     assert "<math" in text(site / "explanation" / "paper.html")
+
+
+@pytest.mark.docs
+def test_every_block_has_its_page(site):
+    """With its picture, and what it is called."""
+    for name in [*block_records(), *chain(*function_summaries().values())]:
+        page = text(site / "auto" / "blocks" / f"{name}.html")
+        assert f"<h1>{name}" in page
+    for name in ("DeadZone", "mrac", "Genesio"):
+        page = text(site / "auto" / "blocks" / f"{name}.html")
+        assert f'{name}.svg" alt="{name}:' in page or f"{name}.svg" in page
+
+
+@pytest.mark.docs
+def test_names_of_other_libraries_lead_to_their_pages(site):
+    """By inventories that are kept here; nothing is fetched when the site is built."""
+    page = text(site / "auto" / "blocks" / "mrac.html")
+    assert "python-control.readthedocs.io" in page
 
 
 @pytest.mark.docs

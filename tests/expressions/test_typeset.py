@@ -47,6 +47,7 @@ def test_no_symbol_has_two_subscripts():
             continue
         for line in (*shown.equations, *shown.where):
             assert not re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}_", line), (name, line)
+            assert " _" not in line, (name, line)  # a placeholder is not a symbol
 
 
 def test_a_profiler_changes_no_formula_and_goes_on():

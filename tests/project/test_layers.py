@@ -33,6 +33,7 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",
+        "nlctl.analysis.controller_guide",
         "nlctl.analysis.metrics",
         "nlctl.analysis.intervals",
     ]

@@ -9,16 +9,20 @@ from places import ROOT
 
 import nlctl
 import nlctl.analysis
+from nlctl.analysis import catalogue
 
 PUBLIC = re.compile(r"^\.\. public:: (\S+)\n\n((?: +.*\n?)+)", re.MULTILINE)
 SECTION = r"^{}\n-+\n((?:.+\n?|\n(?!\w+\n-+\n))*)"
 
 
 def documented_names():
-    """Yield the package that offers it and the name, page after page."""
+    """Yield the package that offers it and the name, page after page, then blocks."""
     for page in sorted((ROOT / "docs" / "reference").glob("*.rst")):
         for home, names in PUBLIC.findall(page.read_text(encoding="utf-8")):
             yield from ((home, name) for name in names.split())
+    for groups in (catalogue.block_summaries(), catalogue.function_summaries()):
+        for group, lines in groups.items():
+            yield from (("nlctl" if n in nlctl.__all__ else f"nlctl.{group}", n) for n in lines)
 
 
 def functions(package):

@@ -18,7 +18,7 @@ import numpy as np
 
 from nlctl.analysis.robustness import clopper_pearson
 
-sys.path.append("../data")
+sys.path.append("../../data")
 from ainncs import CASES
 
 RUNS = 200
