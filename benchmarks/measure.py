@@ -60,7 +60,7 @@ def available(problem: Problem, names: Iterable[str], say: Callable[[str], objec
 
     What is left out is told with the reason.
     """
-    found = []
+    usable = []
     for name in names:
         module = importlib.import_module(f"competitors.{COMPETITORS[name]}")
         try:
@@ -71,10 +71,10 @@ def available(problem: Problem, names: Iterable[str], say: Callable[[str], objec
         for solver in solvers:
             difference = wrong_equations(problem, solver)
             if difference < SAME * problem.nodes:  # false for NaN
-                found.append(solver)
+                usable.append(solver)
             else:
                 say(f"refused {solver.name}: its equations differ from nlctl's by {difference:.1e}")
-    return found
+    return usable
 
 
 def single_runs(problem: Problem, solvers: Iterable[Solver], rounds: int) -> list[Row]:

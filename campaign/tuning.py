@@ -90,17 +90,17 @@ def evolved_gains(
         excess = np.fmin(np.maximum(largest / limit - 1, 0), LOST)
         return np.where(excess > 0, _REFUSED * (1 + excess), mean)
 
-    found = differential_evolution(
+    optimum = differential_evolution(
         costs, np.log(np.array(list(bounds.values()))), maxiter=generations, popsize=10, tol=1e-6,
         polish=False, vectorized=True, updating="deferred", rng=seed,
     )  # fmt: skip
-    if not found.fun < _REFUSED:
+    if not optimum.fun < _REFUSED:
         raise ParameterError(
             f"no gains keep {limited.key} <= {limit:g} within these bounds: widen them"
         )
-    gains = {name: float(value) for name, value in zip(names, np.exp(found.x), strict=True)}
-    largest = outcomes(found.x[:, None])[1]
-    return EvolvedGains(gains=gains, cost=float(found.fun), limited=float(largest[0]), runs=runs)
+    gains = {name: float(value) for name, value in zip(names, np.exp(optimum.x), strict=True)}
+    largest = outcomes(optimum.x[:, None])[1]
+    return EvolvedGains(gains=gains, cost=float(optimum.fun), limited=float(largest[0]), runs=runs)
 
 
 def split_samples(

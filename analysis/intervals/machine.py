@@ -106,12 +106,12 @@ def code_for(
     """Return code for sign f <= bound; None for a function that has none, or on no such machine."""
     if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
         return None
-    known = function.codes if isinstance(function, Readable) else {}
+    codes = function.codes if isinstance(function, Readable) else {}
     key = (len(box.names), sign)
-    if key not in known:
+    if key not in codes:
         code = _made(function, *key)
-        known[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
-    code = known[key]
+        codes[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
+    code = codes[key]
     return None if code is None else CodedClaim(code=code, bound=bound)
 
 
@@ -132,8 +132,8 @@ def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
     if isinstance(function, Readable):
         if sides not in function.read:
             graph = UnroundedGraph({"x": sides})
-            found = function.expressions(graph, side_leaves(graph, sides))
-            function.read[sides] = graph, found
+            expressions = function.expressions(graph, side_leaves(graph, sides))
+            function.read[sides] = graph, expressions
         return function.read[sides]
     return expressions_of(function, sides)
 
@@ -168,29 +168,29 @@ def _agrees(code: BoxCode, function: Any, box: Box, sign: int) -> bool:
 
 def _point(box: Box, k: int) -> list[float]:
     """Return one of a sequence of points in a box."""
-    found = []
+    point = []
     for i, (a, b) in enumerate(box.cell):
         share = (0.5 + (k + 1) * _GOLDEN ** (i + 1)) % 1.0
         low = a if np.isfinite(a) else min(b, 0.0) - _LARGE if np.isfinite(b) else -_LARGE
         high = b if np.isfinite(b) else max(low, 0.0) + _LARGE
-        found.append(float(min(max(low + share * (high - low), a), b)))
-    return found
+        point.append(float(min(max(low + share * (high - low), a), b)))
+    return point
 
 
 def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
     return np.array(box.low, dtype=float), np.array(box.high, dtype=float)
 
 
-def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
+def decided_by_code(claim: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
     """Return what becomes of the claim; the same whatever the number of processors."""
     low, high = _ends(box)
     threads = os.cpu_count() or 1
-    return decide_claim(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
+    return decide_claim(claim.code, low, high, claim.bound, max_boxes=max_boxes, threads=threads)
 
 
 def supremum_by_code(
-    found: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
+    claim: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
 ) -> Supremum:
     """Return the supremum of the least of the numbers."""
     low, high = _ends(box)
-    return enclose_supremum(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)
+    return enclose_supremum(claim.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)

@@ -242,8 +242,8 @@ class Sum(NumPyFunctions):
 
     def _function(self, name: str, *others: Sum, data: tuple[Any, ...] = ()) -> Sum:
         atom = Atom(name, tuple(argument.key() for argument in (self, *others)), data)
-        own = frozenset([] if name in EVERYWHERE else [atom])
-        partial = own.union(self.partial, *(argument.partial for argument in others))
+        undefined = frozenset([] if name in EVERYWHERE else [atom])
+        partial = undefined.union(self.partial, *(argument.partial for argument in others))
         return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)
 
 

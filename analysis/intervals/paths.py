@@ -101,9 +101,9 @@ def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], wha
     """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:
-        known = decisions.known(key)
-        decisions.used += not possible <= known
-        possible = possible & known
+        so_far = decisions.known(key)
+        decisions.used += not possible <= so_far
+        possible = possible & so_far
     if possible <= holds:
         return True
     if not possible & holds:

@@ -58,11 +58,11 @@ class Written(NumPyFunctions):
         self.place = place
 
     def _node(self, *node: Any) -> Written:
-        found = next((i for i, known in enumerate(self.nodes) if known == list(node)), None)
-        if found is None:
-            found = len(self.nodes)
+        place = next((i for i, other in enumerate(self.nodes) if other == list(node)), None)
+        if place is None:
+            place = len(self.nodes)
             self.nodes.append(list(node))
-        return Written(self.nodes, found)
+        return Written(self.nodes, place)
 
     def lifted(self, number: Any) -> Any:  # type: ignore[override]
         """Return a number as an entry of the same list; NotImplemented for what is none."""

@@ -150,11 +150,11 @@ def examine(
     box = _visited(runs) if box is None else box
     sides = [name for name in box.names if name != "u"]
     weights = None if isinstance(W, str) and W == "tightest" else W
-    found = constants(
+    proved = constants(
         loop, box.only(*sides).times("u", -U_MAX, U_MAX), W=weights, k=k, start=fixed[0],
         params=fixed[1],
     )  # fmt: skip
-    return Examination(loop=loop, runs=runs, constants=found)
+    return Examination(loop=loop, runs=runs, constants=proved)
 
 
 def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:

@@ -112,8 +112,8 @@ def wetting(x: Any, u: Any) -> Any:
 def read(ways: Any, ratios: Any, way: Any) -> Any:
     """Return what was sent at a way: straight between what is stored, the newest last."""
     parts = np.clip((way - ways[:-1]) / np.diff(ways), 0.0, 1.0)
-    known = np.where(way >= ways[0], 0.0, np.nan)  # never a guess
-    return ratios[0] + np.sum(parts * np.diff(ratios)) + known
+    after_first = np.where(way >= ways[0], 0.0, np.nan)  # never a guess
+    return ratios[0] + np.sum(parts * np.diff(ratios)) + after_first
 
 
 @nlctl.record
@@ -202,17 +202,17 @@ def decided(x: Any, u: Any) -> dict[str, Any]:
     power = np.where(angle >= np.where(power > 0.5, 50.0, 70.0), 1.0, 0.0)
     failed = np.maximum(np.where(measured <= -1.0, 1.0, 0.0), failed)
     feedforward = (failed > 0.5) | (normal < 0.5) | (power > 0.5)
-    wanted = np.where((normal > 0.5) & (power > 0.5), POWER_RATIO, RATIO)
+    ratio = np.where((normal > 0.5) & (power > 0.5), POWER_RATIO, RATIO)
     air = pumped(pressure, speed)
-    error = measured - wanted
+    error = measured - ratio
     integral = np.where(feedforward, integral, integral + 0.01 * 0.14 * error)
     trim = np.where(feedforward, 1.0, np.maximum(1.0 + 0.04 * error + integral, 0.0))
     pressure = pressure + 0.01 * 0.41328 * (flow - air)
     return {
         "states": (seconds, normal, power, failed, pressure, integral),
         "outputs": (
-            np.clip(air / wanted * trim, 0.13, 1.66),
-            wanted,
+            np.clip(air / ratio * trim, 0.13, 1.66),
+            ratio,
             np.where(feedforward, 1.0, 0.0),
         ),
     }
@@ -259,8 +259,8 @@ def engine(**given: Any) -> Any:
 
     def looked(record: Any, name: str, offset: float) -> Any:
         is_discrete = getattr(record, "discrete", False)
-        made = nlctl.block(record, name, dt=LOOK if is_discrete else None)
-        return nlctl.sampled(made, LOOK, offset=offset)
+        system = nlctl.block(record, name, dt=LOOK if is_discrete else None)
+        return nlctl.sampled(system, LOOK, offset=offset)
 
     parts = {
         "intake": Intake(), "controller": looked(Controller(), "controller", LOOK),

@@ -154,8 +154,8 @@ def wrong_equations(problem: Problem, solver: Solver, points: int = 50) -> float
         t = rng.uniform(0, 20)
         x = rng.normal(0, 1, problem.x0.size)
         expected = problem.compiled.dynamics(t, x)
-        found = np.asarray(solver.rhs(t, x))
-        worst = max(worst, float(np.max(np.abs(found - expected) / (1 + np.abs(expected)))))
+        rates = np.asarray(solver.rhs(t, x))
+        worst = max(worst, float(np.max(np.abs(rates - expected) / (1 + np.abs(expected)))))
     return worst
 
 

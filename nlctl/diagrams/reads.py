@@ -28,16 +28,16 @@ def may_read(block: Any, key: str) -> bool:
 
 def texts_of(function: Any) -> frozenset[str]:
     """Return all text constants that a function reaches: in code, in what it reads around it."""
-    found: set[str] = set()
+    texts: set[str] = set()
     waiting, seen = [function], set()
     while waiting and len(seen) < _MOST:
         thing = waiting.pop()
         if isinstance(thing, str):
-            found.add(thing)
+            texts.add(thing)
         elif id(thing) not in seen:
             seen.add(id(thing))
             waiting.extend(_reached(thing))
-    return frozenset(found)
+    return frozenset(texts)
 
 
 def _reached(thing: object) -> Iterator[Any]:

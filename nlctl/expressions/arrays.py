@@ -73,10 +73,10 @@ class Tracer:
     methods: ClassVar[Callable[[Tracer, str], Any] | None] = None  # what finds those of arrays
 
     def __getattr__(self, name: str) -> Any:
-        found = None if name.startswith("__") else Tracer.methods
-        if found is None:
+        method = None if name.startswith("__") else Tracer.methods
+        if method is None:
             raise AttributeError(name)
-        return found(self, name)  # pyright: ignore[reportCallIssue]
+        return method(self, name)  # pyright: ignore[reportCallIssue]
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -201,8 +201,8 @@ class Tracer:
     def _place(self, key: Any) -> range | None:
         """Return where a part of one dimension lies in the origin."""
         whole = self.place if self.origin is not None else range(self.length)
-        known = whole is not None and (self.origin is not None or self.axis is not None)
-        is_part = known and isinstance(key, slice) and self.ndim == 1
+        is_contiguous = whole is not None and (self.origin is not None or self.axis is not None)
+        is_part = is_contiguous and isinstance(key, slice) and self.ndim == 1
         return whole[key] if is_part and whole is not None else None
 
     def _at(self, key: Any) -> Tracer:
@@ -246,18 +246,18 @@ class Tracer:
     def reshape(self, *shape: Any, order: Any = "C") -> Tracer:
         """Return the array in another shape."""
         several = len(shape) == 1 and isinstance(shape[0], tuple | list)
-        wanted = tuple(operator.index(n) for n in (shape[0] if several else shape))
+        target = tuple(operator.index(n) for n in (shape[0] if several else shape))
         if order != "C":  # NumPy knows what is a view; of a long array it cannot be written to
-            return self._part(self.elements().reshape(wanted, order=order), None, 1)
-        if self.ndim == 1 and wanted in ((-1,), (self.size,)):
+            return self._part(self.elements().reshape(target, order=order), None, 1)
+        if self.ndim == 1 and target in ((-1,), (self.size,)):
             return self
         if self.axis is not None and self.ndim > 1:
-            return self._part(self.elements().reshape(wanted), None, 1)._as_long_if_many()
+            return self._part(self.elements().reshape(target), None, 1)._as_long_if_many()
         if self.axis is not None:
-            return self._in_rows(wanted)
-        place = self.place if self.ndim == len(wanted) == 1 else None
-        found = self._part(self.cells.reshape(wanted), None, 1, place)
-        return found._as_long_if_many()
+            return self._in_rows(target)
+        place = self.place if self.ndim == len(target) == 1 else None
+        array = self._part(self.cells.reshape(target), None, 1, place)
+        return array._as_long_if_many()
 
     def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
         """Return a long array as a small matrix."""
@@ -274,9 +274,9 @@ class Tracer:
     def as_long(self) -> Tracer:
         """Return elements of a small matrix as a long array of one dimension."""
         pieces = [(e, 1) for e in self.cells.flat]
-        made = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
-        made.watched = (self.values, tuple(self.values.flat))
-        return made
+        array = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
+        array.watched = (self.values, tuple(self.values.flat))
+        return array
 
     def pieces(self) -> list[tuple[Expr, int]]:
         """Return the elements in order, each expression with its number of elements."""

@@ -89,14 +89,14 @@ def numpy_function(op: str) -> Any:
 
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
-    found: dict[Expr, None] = {}
+    nodes: dict[Expr, None] = {}
     waiting = list(exprs)
     while waiting:
         expr = waiting.pop()
-        if expr not in found:
-            found[expr] = None
+        if expr not in nodes:
+            nodes[expr] = None
             waiting.extend(expr.args if expr not in known else ())
-    return tuple(sorted(found, key=lambda e: e.index))
+    return tuple(sorted(nodes, key=lambda e: e.index))
 
 
 class OpenCondition(BaseException):  # (what is traced may catch exceptions)
@@ -252,11 +252,11 @@ class Graph:
         values = [a.value for a in args]
         if name == "remainder" and values[1] in (0, None):
             raise Untraceable("a remainder by 0, or by an integer that depends on the state")
-        known = None not in values
-        value = int(numpy_function(name)(*values)) if known else None
+        is_constant = None not in values
+        value = int(numpy_function(name)(*values)) if is_constant else None
         if all(a.op == "const" for a in args):
             return self.const(value)
-        simple = None if known else self._simplified(name, *args)
+        simple = None if is_constant else self._simplified(name, *args)
         sizes = {a.size for a in args if a.size is not None}
         return simple or self.node(
             name, *args, size=max(sizes, default=None), kind="i", value=value
@@ -299,10 +299,10 @@ class Graph:
             if a.size is None and all(arg.op == "concat" for arg in args[1:]):
                 return self._choice_of_pieces(*args)
             return args[2] if is_const[0] else self._inner_select(*args)
-        for this, other, known in ((a, b, is_const[-1]), (b, a, is_const[0])):
+        for this, other, is_number in ((a, b, is_const[-1]), (b, a, is_const[0])):
             neutral = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}.get(name)
-            turned = this is b and name in ("div", "sub") and len(args) == 2
-            if known and not turned and neutral is not None and other.data == neutral:
+            is_reversed = this is b and name in ("div", "sub") and len(args) == 2
+            if is_number and not is_reversed and neutral is not None and other.data == neutral:
                 return this
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)

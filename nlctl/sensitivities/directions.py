@@ -86,20 +86,20 @@ def rows_replaced(
     graph: Graph, pieces: Sequence[SomeRows], instead: Mapping[int, Expr]
 ) -> list[SomeRows]:
     """Return pieces with other numbers in some of their rows."""
-    found: list[SomeRows] = []
+    replaced: list[SomeRows] = []
     row = 0
     for expr, size in pieces:
         inside = sorted(k - row for k in instead if row <= k < row + size)
         at = 0
         for k in inside:
             if k > at:
-                found.append(_part(graph, expr, at, k - at))
-            found.append((instead[row + k], 1))
+                replaced.append(_part(graph, expr, at, k - at))
+            replaced.append((instead[row + k], 1))
             at = k + 1
         if at < size:
-            found.append(_part(graph, expr, at, size - at) if at else (expr, size))
+            replaced.append(_part(graph, expr, at, size - at) if at else (expr, size))
         row += size
-    return found
+    return replaced
 
 
 def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
@@ -130,8 +130,8 @@ def _leading(graph: Graph, op: str, args: Sequence[Expr], direction: Direction) 
     pair = list(map(graph.number, args))
     if op == "absolute":
         pair.append(graph.op("neg", pair[0]))
-    made = slopes(graph, pair, direction, {})
-    rates = [graph.const(0.0) if rate is None else rate for rate in made]
+    changes = slopes(graph, pair, direction, {})
+    rates = [graph.const(0.0) if rate is None else rate for rate in changes]
     order = "lt" if op == "minimum" else "gt"
     ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
     first = graph.op("or", graph.op(order, *pair), ahead)

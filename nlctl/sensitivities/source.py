@@ -44,7 +44,7 @@ class EquationParts:
 
     Attributes
     ----------
-    found : Equations
+    equations : Equations
     extended : Extended
     program : Program
         Of the diagram itself.
@@ -63,7 +63,7 @@ class EquationParts:
         Parameters near which the equations are looked at.
     """
 
-    found: Equations
+    equations: Equations
     extended: Extended
     program: Program
     inputs: int
@@ -77,7 +77,7 @@ class EquationParts:
     @property
     def graph(self) -> Graph:
         """Where the expressions are kept."""
-        return self.found.graph
+        return self.equations.graph
 
     @property
     def carried(self) -> dict[int, Expr]:
@@ -89,18 +89,18 @@ class EquationParts:
     def flow(self) -> list[SomeRows]:
         """The derivatives of the states; memories stand still."""
         still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
-        return rows_replaced(self.graph, self.found.pieces("dx"), still)
+        return rows_replaced(self.graph, self.equations.pieces("dx"), still)
 
     @cached_property
     def arriving(self) -> list[SomeRows]:
         """What arrives at the delays."""
-        return _behind(self.graph, self.found.pieces("y"), len(self.extended.schedule.outputs)
+        return _behind(self.graph, self.equations.pieces("y"), len(self.extended.schedule.outputs)
                        - self.extended.lines)  # fmt: skip
 
     @cached_property
     def jumps(self) -> list[Expr]:
         """The operations at which the flow may jump."""
-        inside = [e for each in self.found.fixed_points.values() for e in each]
+        inside = [e for fixed_point in self.equations.fixed_points.values() for e in fixed_point]
         if jumping(inside):
             raise CompileError(
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
@@ -111,7 +111,7 @@ class EquationParts:
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     def time(
-        self, pieces: Sequence[SomeRows], time: Expr | None = None, known: bool = True
+        self, pieces: Sequence[SomeRows], time: Expr | None = None, inputs_move: bool = True
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states.
 
@@ -119,7 +119,7 @@ class EquationParts:
         count as 0.
         """
         first = self.extended.schedule.ninputs - self.extended.schedule.rates
-        lines = range(self.inputs, first if known else self.inputs)
+        lines = range(self.inputs, first if inputs_move else self.inputs)
         outside = from_time(self.graph, time, self.inputs, first, lines)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
@@ -138,7 +138,7 @@ class EquationParts:
 
     def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
         """Return the derivatives of expressions along a direction, None where they are 0."""
-        return slopes(self.graph, exprs, direction, self.found.fixed_points)
+        return slopes(self.graph, exprs, direction, self.equations.fixed_points)
 
     def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
         """Return expressions with others in the places of some states."""
@@ -146,7 +146,7 @@ class EquationParts:
 
     def leaves(self, exprs: Iterable[Expr], instead: Mapping[int, Expr]) -> dict[Expr, Expr]:
         """Return what stands for the leaves of expressions that read some states."""
-        found = {}
+        replacements = {}
         for leaf in needed(exprs):
             if leaf.op != "leaf" or leaf.data[0] != "x":
                 continue
@@ -155,37 +155,37 @@ class EquationParts:
             if not any(row in instead for row in rows):
                 continue
             parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
-            found[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
-        return found
+            replacements[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+        return replacements
 
 
-def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> EquationParts:
+def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray) -> EquationParts:
     """Return what a diagram computes."""
     program = compiled.program
-    found = equations(made.schedule, made.layout, p, program.meetings)
-    graph, first = found.graph, program.switching + found.conditions.rows
-    rows = _single(graph, found.results["g"])
+    computed = equations(extended_program.schedule, extended_program.layout, p, program.meetings)
+    graph, first = computed.graph, program.switching + computed.conditions.rows
+    rows = _single(graph, computed.results["g"])
     del graph.lengths["x"]  # there are more of them now
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
     return EquationParts(
-        found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
+        equations=computed, extended=extended_program, program=program, inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
-        committed=list(_single(graph, found.results["m"]).values()),
+        committed=list(_single(graph, computed.results["m"]).values()),
         switched=frozenset(jump), owners=tuple(owners), p=p,
     )  # fmt: skip
 
 
 def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Expr]:
     """Return the expression of each row of some results."""
-    found: dict[int, Expr] = {}
+    single: dict[int, Expr] = {}
     for row, array in results:
         for expr, size in array.pieces():
-            found |= {row + k: graph.item(expr, k) for k in range(size)}
+            single |= {row + k: graph.item(expr, k) for k in range(size)}
             row += size
-    return found
+    return single
 
 
 def _jumps(node: Node) -> bool:
@@ -195,23 +195,23 @@ def _jumps(node: Node) -> bool:
         return True
     try:
         given = traced_arguments(graph, system, slots_of(system))
-        made = trace(graph, system.spec.commit, lambda: given)
+        committed = trace(graph, system.spec.commit, lambda: given)
     except Untraceable as error:
         raise CompileError(
             f"block '{node.path}' has a memory that is not an expression ({error}): its "
             "derivatives are not known; take differences of runs"
         ) from None
-    return may_jump([e for e, _ in made.pieces()])
+    return may_jump([e for e, _ in committed.pieces()])
 
 
 def _behind(graph: Graph, pieces: Sequence[SomeRows], first: int) -> list[SomeRows]:
     """Return the rows of pieces from one on."""
-    found, row = [], 0
+    rest_of_pieces, row = [], 0
     for expr, size in pieces:
         cut = min(max(first - row, 0), size)
         if cut < size:
             rest = size - cut
             part = graph.item(expr, cut) if rest == 1 else graph.part(expr, cut, 1, rest)
-            found.append((part if expr.size else expr, rest))
+            rest_of_pieces.append((part if expr.size else expr, rest))
         row += size
-    return found
+    return rest_of_pieces

@@ -134,13 +134,13 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
     floor, high, trial = low, fits, fits
     refuted, reason = None, "the box: take a larger one"
     while True:
-        found = _fall(V, trial, floor, box, max_boxes)
-        boxes += found.boxes
-        if found.holds:
+        fall = _fall(V, trial, floor, box, max_boxes)
+        boxes += fall.boxes
+        if fall.holds:
             low = trial
         else:
-            high, refuted = trial, found.point[: V.motion.order] if found.holds is False else None
-            reason = "V' >= 0 at a point" if found.holds is False else "undecided: raise max_boxes"
+            high, refuted = trial, fall.point[: V.motion.order] if fall.holds is False else None
+            reason = "V' >= 0 at a point" if fall.holds is False else "undecided: raise max_boxes"
         if low >= fits or high - low <= tol * low:
             break
         trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))

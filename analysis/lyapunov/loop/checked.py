@@ -71,9 +71,9 @@ def read_checked(
         loop = overridden(loop, params)
     roles = read_roles(loop, pieces, content.key)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
-    for part, wanted in kinds.items():
+    for part, records in kinds.items():
         if part in roles.places:  # a network may be left out
-            check_kind(roles.places[part], wanted)
+            check_kind(roles.places[part], records)
     check_chain(roles.places["plant"])
     begins = read_starts(
         loop,
@@ -98,5 +98,5 @@ def _states(loop: Any, roles: Roles, part: str) -> tuple[str, ...]:
 
 def _compared_at(loop: Any, starts: Starts) -> list[tuple[float, np.ndarray]]:
     """Return times and states: around the loop's own start, and the corners of all starts."""
-    found = points_around(initial_state(loop))
-    return found if starts.is_point else found + [(0.0, x) for x in starts.points()]
+    points = points_around(initial_state(loop))
+    return points if starts.is_point else points + [(0.0, x) for x in starts.points()]

@@ -70,9 +70,9 @@ def loop_content(
 
 def _is_plain(system: Any) -> bool:
     """Whether a system computes what its class, its maps and its record say, and nothing else."""
-    own = {name: value for name, value in vars(system).items() if name not in _RECORDS}
-    update, output = own.pop("updfcn", None), own.pop("outfcn", None)
-    if any(callable(value) for value in own.values()):  # in the place of a method
+    fields = {name: value for name, value in vars(system).items() if name not in _RECORDS}
+    update, output = fields.pop("updfcn", None), fields.pop("outfcn", None)
+    if any(callable(value) for value in fields.values()):  # in the place of a method
         return False
     if type(system) is Block:
         spec = system.spec

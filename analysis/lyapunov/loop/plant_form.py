@@ -98,10 +98,10 @@ def check_chain(plant: Place) -> None:
     update = [(i, f"{states[i]}'", i + 1) for i in range(n - 1)]
     output = [(outputs.index(s), s, states.index(s)) for s in states if s in outputs]
     output += [(outputs.index("y"), "y", 0)]
-    for what, function, wanted in (
+    for what, function, coordinates in (
         ("update", system.updfcn, update), ("output", system.outfcn, output)
     ):  # fmt: skip
-        for i, name, k in wanted:
+        for i, name, k in coordinates:
             if not _is_coordinate(plant, function, i, k):
                 raise DiagramError(
                     f"the proof is about plants (1), with {name} = {states[k]}; the {what} "

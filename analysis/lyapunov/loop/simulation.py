@@ -139,9 +139,9 @@ def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
             f"got {states.shape[0]}"
         )
     start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
-    own = own_parameters(loop, response)
+    params = own_parameters(loop, response)
     return Member(
-        start=start, params=own, times=np.asarray(response.time, dtype=float), expected=response
+        start=start, params=params, times=np.asarray(response.time, dtype=float), expected=response
     )
 
 
@@ -222,8 +222,8 @@ def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native
 def _check_reproduced(member: Member, signals: Signals) -> None:
     if member.expected is None:
         return
-    told = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
-    r, again = np.asarray(told["r"]), signals["r"]
+    outputs = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
+    r, again = np.asarray(outputs["r"]), signals["r"]
     far = np.abs(r[: again.size] - again)
     if not np.all(far <= _AGREE * np.max(np.abs(r))):
         at = float(signals.t[int(np.argmax(far))])

@@ -112,15 +112,15 @@ def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrea
 
     fastest = min(form.mu, 2 * float(Gamma * sigma))
     a = _best_rate(lambda a: float(alpha_0(arb(a))) / a, fastest)
-    found = alpha_0(arb(a))
-    ultimate = found / a
+    drive_at_a = alpha_0(arb(a))
+    ultimate = drive_at_a / a
     return Decrease(
         level=V_0.max(ultimate),
         error=ultimate,
         weights=ultimate,
         mean=(drive.sqrt() + (drive + leak / 2).sqrt()) ** 2,
         falls=True,
-        alpha_0=upper(found),
+        alpha_0=upper(drive_at_a),
         alpha_1=a,
         how="max{V(0), alpha_0/alpha_1}",
         end="V -> alpha_0/alpha_1 or less",
@@ -129,10 +129,10 @@ def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrea
 
 def _best_rate(cost: Callable[[float], float], fastest: float) -> float:
     """Return a rate between 0 and the fastest; any is as good for the proof."""
-    found: Any = minimize_scalar(
+    minimum: Any = minimize_scalar(
         lambda share: cost(share * fastest), bounds=(1e-3, 1 - 1e-3), method="bounded"
     )
-    return float(found.x * fastest)
+    return float(minimum.x * fastest)
 
 
 def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
@@ -154,13 +154,13 @@ def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
 
     rough = float((q / mu * h_0**2 + (widest + W / 2) ** 2 / Gamma).upper())
     if rough == 0:
-        found = arb(0)
+        V_e = arb(0)
     else:
-        found = arb(enclose(largest, Box.of(share=(0.0, 1.0)), tol=_FINE * rough).high)
-    level = V_0.max(found)
+        V_e = arb(enclose(largest, Box.of(share=(0.0, 1.0)), tol=_FINE * rough).high)
+    level = V_0.max(V_e)
     return Decrease(
         level=level,
-        error=found,
+        error=V_e,
         weights=level,
         mean=q * h_0**2,
         how="max{V(0), V_e}, V_e the largest V at which V' > 0 is possible",

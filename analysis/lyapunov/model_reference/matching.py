@@ -81,8 +81,8 @@ class Matching:
         value = loop.form.largest(E)
         ends = zip(loop.W_hat_0, self.W, strict=True)
         error = sum((max((exact(w) - W) ** 2 for w in side) for side, W in ends), Fraction(0))
-        found = Fraction(int(value.p), int(value.q)) + error / self.Gamma
-        return found if level is None else min(found, exact(level))
+        largest = Fraction(int(value.p), int(value.q)) + error / self.Gamma
+        return largest if level is None else min(largest, exact(level))
 
     @property
     def weights_at_start(self) -> arb:
@@ -214,15 +214,15 @@ def _taken_away(
     weights = [Fraction(0)] * len(psi)
     rows: list[tuple[Any, Sum, list[Fraction]]] = []
     for i, one in enumerate(psi):
-        own = [Fraction(int(i == j)) for j in range(len(psi))]
+        combination = [Fraction(int(i == j)) for j in range(len(psi))]
         for product, row, made_of in rows:
             factor = one.coefficient(product)
             one = one - factor * row
-            own = [a - factor * b for a, b in zip(own, made_of, strict=True)]
+            combination = [a - factor * b for a, b in zip(combination, made_of, strict=True)]
         if one.terms:
             pivot = next((p for p in one.terms if p in target.terms), next(iter(one.terms)))
             scale = 1 / one.coefficient(pivot)
-            rows.append((pivot, one * scale, [scale * a for a in own]))
+            rows.append((pivot, one * scale, [scale * a for a in combination]))
     for product, row, made_of in rows:
         factor = target.coefficient(product)
         shorter = target - factor * row

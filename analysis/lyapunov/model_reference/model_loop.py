@@ -169,20 +169,20 @@ def _checked_orders(roles: Roles) -> int:
         "error": len(roles.spec("error").K),
     }
     if len(set(orders.values())) > 1:
-        told = ", ".join(f"{roles.paths[part]} {n}" for part, n in orders.items())
-        raise DiagramError(f"the proof needs plant, model and error of one order, got {told}")
+        listed = ", ".join(f"{roles.paths[part]} {n}" for part, n in orders.items())
+        raise DiagramError(f"the proof needs plant, model and error of one order, got {listed}")
     return orders["plant"]
 
 
 def _regressor(basis: Place, order: int) -> Regressor:
     """Return the basis block's own function of the signals that it takes."""
-    known = (*coordinate_names(order), *model_state_names(order), "yd")
+    arguments = (*coordinate_names(order), *model_state_names(order), "yd")
     names, p = declared(basis, "inputs"), current_parameters(basis.system)
-    strange = [name for name in names if name not in known]
+    strange = [name for name in names if name not in arguments]
     if strange or basis.system.nstates:
         what = f"takes {', '.join(strange)}" if strange else "has states"
         raise DiagramError(
-            f"the proof is about a regressor of {', '.join(known)} without memory, and block "
+            f"the proof is about a regressor of {', '.join(arguments)} without memory, and block "
             f"'{basis.path}' {what}: use such a regressor"
         )
     output = on_intervals(basis.path, basis.system.outfcn)
@@ -210,10 +210,10 @@ def _bound_of_command(place: Place, x0: Sides) -> float:
     def yd(point: tuple[Any, ...]) -> Any:
         return output(point[0], (), (), p)[declared(place, "outputs").index("yd")]
 
-    found = enclose(yd, wide, max_boxes=1).magnitude
-    if not np.isfinite(found):
+    bound = enclose(yd, wide, max_boxes=1).magnitude
+    if not np.isfinite(bound):
         raise DiagramError(
             f"no bound of yd of block '{place.path}' for all t >= 0 is found in interval "
             "arithmetic: write it with functions that are bounded for all t, such as np.sin"
         )
-    return found
+    return bound

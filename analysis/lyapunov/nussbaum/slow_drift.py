@@ -340,10 +340,10 @@ def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
     """
     if not (balance.p > 0 and balance.q > 0):
         return None
-    wanted = balance.p / balance.q
-    if wanted >= abs(lobe.extremum):
+    gain = balance.p / balance.q
+    if gain >= abs(lobe.extremum):
         return None
-    return root(lambda z: abs(N(z)) - wanted, lobe.low, lobe.place)
+    return root(lambda z: abs(N(z)) - gain, lobe.low, lobe.place)
 
 
 def _rest(
@@ -353,14 +353,14 @@ def _rest(
 
     A fit in which the drift does not stop counts as the lobe's upper end.
     """
-    found = []
+    rests = []
     for part in np.array_split(np.arange(rates.size), BLOCKS):
         rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
-        found.append(lobe.high if rest is None else rest)
+        rests.append(lobe.high if rest is None else rest)
     rest = _rest_of(_fitted(rates, inverse), N, lobe)
-    if rest is None and min(found) == lobe.high:
+    if rest is None and min(rests) == lobe.high:
         return None, None
-    return rest, (min(found), max(found))
+    return rest, (min(rests), max(rests))
 
 
 def _forecast(

@@ -152,8 +152,8 @@ class Demand:
 def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
     """Bound what the plant asks of the controller while |r| <= C."""
     errors = error_bounds(loop.lambdas, loop.e0, arb(C))
-    wanted = reference_bounds(loop.reference)
-    reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))
+    commands = reference_bounds(loop.reference)
+    reach = tuple(upper(e + y) for e, y in zip(errors, commands, strict=False))
     low, names = tuple(-a for a in reach), coordinate_names(len(reach))
     box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
 
@@ -199,6 +199,6 @@ def _terms(rate: Acceleration) -> tuple[Readable, Readable]:
 def feedforward(loop: FilteredLoop, need: Demand) -> arb:
     """Bound |Y_d| of (18) by the errors and the n-th derivative of the reference."""
     A = [abs(arb(a)) for a in reversed(loop.lambdas)]
-    wanted = reference_bounds(loop.reference)
-    own = (a * e for a, e in zip(A, need.errors[1:], strict=True))
-    return arb(wanted[len(A) + 1]) + sum(own, arb(0))
+    commands = reference_bounds(loop.reference)
+    error_terms = (a * e for a, e in zip(A, need.errors[1:], strict=True))
+    return arb(commands[len(A) + 1]) + sum(error_terms, arb(0))

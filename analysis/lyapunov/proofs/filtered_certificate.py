@@ -75,8 +75,8 @@ class FilteredCertificate(Certificate):
             **states,
         }
         for raised, wider in _WIDER:
-            found = demand(loop, self.split, need.C * (1 + raised)) if raised else need
-            yield {"premises": premises, "proof": _proof(loop, found, Fraction(wider))}
+            region = demand(loop, self.split, need.C * (1 + raised)) if raised else need
+            yield {"premises": premises, "proof": _proof(loop, region, Fraction(wider))}
 
 
 def _equation(loop: FilteredLoop) -> list[list[Any]]:

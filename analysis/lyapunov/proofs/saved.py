@@ -41,13 +41,13 @@ def save_certificate(
     """Write the first of some attempts that the recheck answers with yes."""
     why = "there is nothing to be written"
     try:
-        for made in attempts():
+        for attempt in attempts():
             content = {
                 "format": FORMAT[0],
                 "version": FORMAT[1],
                 "kind": kind,
                 "loop": name,
-                **made,
+                **attempt,
             }
             try:
                 bounds = proved_bounds(content)

@@ -104,7 +104,7 @@ class Tally:
 
     def count(self, numbers: range, margins: np.ndarray) -> None:
         """Take a chunk's margins ``spec`` in."""
-        insort(self.ranges, numbers, key=lambda known: known.start)
+        insort(self.ranges, numbers, key=lambda done: done.start)
         self.done += len(numbers)
         self._beyond[numbers.start] = len(numbers), int(np.count_nonzero(violates(margins)))
         while self.runs in self._beyond:

@@ -236,12 +236,12 @@ def _check_seals(path: Path, frame: pd.DataFrame) -> None:
 
 def _ranges(store: ChunkStore) -> list[range]:
     """Return the rows of every chunk file, in order."""
-    found = []
+    ranges = []
     for path in sorted(store.chunks.glob("*.parquet")):
         name = re.fullmatch(r"(\d+)-(\d+)", path.stem)
         if name:
-            found.append(range(int(name[1]), int(name[2]) + 1))
-    return sorted(found, key=lambda numbers: numbers.start)
+            ranges.append(range(int(name[1]), int(name[2]) + 1))
+    return sorted(ranges, key=lambda numbers: numbers.start)
 
 
 def _path(store: ChunkStore, numbers: range) -> Path:

@@ -220,8 +220,8 @@ class _Plane:
         chosen = []
         for cell in cells:
             points = (*_corners(cell), *_edges(cell))
-            known = [self.margins[point] for point in points if point in self.margins]
-            margins = np.clip(known, -1.0, 1.0)
+            computed = [self.margins[point] for point in points if point in self.margins]
+            margins = np.clip(computed, -1.0, 1.0)
             low, high = float(np.min(margins)), float(np.max(margins))
             least = float(np.min(np.abs(margins)))
             if cell[2] > 1 and (low <= 0 < high or least < CLOSE * (high - low)):

@@ -105,16 +105,16 @@ class Violation:
         """
         low, high = rounded_down(self.singly[0]), rounded_up(self.singly[1])
         confidence = f"confidence {100 * self.confidence:.10g} %"
-        told = f"With {confidence} the probability of a violation is"
+        text = f"With {confidence} the probability of a violation is"
         if self.lower > 0 and self.upper < 1:
-            return f"{told} between {low} and {high}"
+            return f"{text} between {low} and {high}"
         sides = {f"at most {high}": self.singly[1] < 1, f"at least {low}": self.singly[0] > 0}
         first, *rest = [text for text, is_there in sides.items() if is_there] or ["at most 1"]
         if self.lower > 0 and rest:  # the side that was asked for comes first
             first, rest = rest[0], [first]
         both = f"(both together: {max(0.0, 200 * self.confidence - 100):.10g} %)"
-        told = f"{told} {first}"
-        return told + "".join(f"; with the same confidence, {other} {both}" for other in rest)
+        text = f"{text} {first}"
+        return text + "".join(f"; with the same confidence, {other} {both}" for other in rest)
 
 
 def rounded_up(value: float) -> str:

@@ -285,8 +285,8 @@ def sobol_indices(
 
     def indices(rows: np.ndarray) -> np.ndarray:
         parts = {"f_A": f_a[rows][None], "f_B": f_b[rows][None], "f_AB": f_ab[..., rows]}
-        made = stats.sobol_indices(func=parts, n=n)
-        return np.stack([made.first_order, made.total_order])
+        sobol = stats.sobol_indices(func=parts, n=n)
+        return np.stack([sobol.first_order, sobol.total_order])
 
     s1, st = indices(np.arange(n))
     interval = stats.bootstrap(

@@ -34,7 +34,7 @@ class _Cell:
         return bool(scalar(self.graph, self.expr))
 
 
-def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     function = getattr(operator, name)
 
     def method(self: _Cell, *other: Any) -> Any:
@@ -44,8 +44,8 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
             other = (other[0][()],)
         mine = scalar(self.graph, self.expr)
         theirs = [scalar(self.graph, v.expr) if isinstance(v, _Cell) else v for v in other]
-        found = function(*theirs, mine) if turned else function(mine, *theirs)
-        return _Cell(self.graph, found.only)
+        result = function(*theirs, mine) if reflected else function(mine, *theirs)
+        return _Cell(self.graph, result.only)
 
     return method
 
@@ -59,7 +59,7 @@ def _function(name: str) -> Callable[[_Cell], _Cell]:
 
 for _name in ("add", "sub", "mul", "truediv", "pow", "mod"):
     setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
-    setattr(_Cell, f"__r{_name}__", _operator(f"__{_name}__", turned=True))
+    setattr(_Cell, f"__r{_name}__", _operator(f"__{_name}__", reflected=True))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne", "neg", "abs", "and", "or", "xor", "invert"):
     setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
 for _name in ("sqrt", "exp", "log", "sin", "cos", "tan", "arctan", "floor", "ceil", "rint"):

@@ -79,8 +79,8 @@ class ComplexPair(Special):
     def __pow__(self, exponent: Any) -> ComplexPair:
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
-        found = paired(self.graph, 1.0)
-        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), found)
+        unity = paired(self.graph, 1.0)
+        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
     def _text(self, *_: Any) -> Any:
         raise Untraceable("a complex number in the place of a real one")
@@ -191,9 +191,9 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: ComplexPair, *other: Any) -> Any:
-        operands = (*other, self) if turned else (self, *other)
+        operands = (*other, self) if reflected else (self, *other)
         return self.operation(self.graph, name, operands)
 
     return method
@@ -201,7 +201,7 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
 
 for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
     setattr(ComplexPair, f"__{_name}__", _operator(_op))
-    setattr(ComplexPair, f"__r{_name}__", _operator(_op, turned=True))
+    setattr(ComplexPair, f"__r{_name}__", _operator(_op, reflected=True))
 for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
     setattr(ComplexPair, f"__{_name}__", _operator(_op))
 

@@ -204,8 +204,8 @@ def dot(graph: Graph, a: Any, b: Any) -> Any:
 def atleast_1d(graph: Graph, *values: Any) -> Any:
     """Return numbers as arrays."""
     arrays = [traced(graph, v) for v in values]
-    found = [a if a.shape else a.reshape(1) for a in arrays]
-    return found[0] if len(found) == 1 else tuple(found)
+    arrays_of_one = [a if a.shape else a.reshape(1) for a in arrays]
+    return arrays_of_one[0] if len(arrays_of_one) == 1 else tuple(arrays_of_one)
 
 
 @of(np.ravel)
