@@ -123,7 +123,14 @@ def rows(problem: Problem) -> list[tuple[str, ...]]:
     others = [evolution(problem, compiled, tuned, seed) for seed in SEEDS]
     before, end = tuned.margin_before, float(np.median([other[-1] for other in others]))
     cost, k = cost_of_derivatives(compiled, tuned), len(tuned.names)
-    about = (problem.name, f"{k}", f"{before:.3f}", f"{searched[-1]:.3f}", f"{end:.3f}", f"{cost:.1f}")
+    about = (
+        problem.name,
+        f"{k}",
+        f"{before:.3f}",
+        f"{searched[-1]:.3f}",
+        f"{end:.3f}",
+        f"{cost:.1f}",
+    )
     table = []
     for share in (*SHARES, None):
         target = before + (share or 0.0) * (end - before)

@@ -114,10 +114,13 @@ def controllers_text(record: pd.DataFrame, example: str) -> str:
     """
     of_example: Any = record[record["example"] == example]
     cells = [
-        _cell(row, ok) for row, ok in zip(of_example.to_dict("records"), meets_the_spec(of_example), strict=True)
+        _cell(row, ok)
+        for row, ok in zip(of_example.to_dict("records"), meets_the_spec(of_example), strict=True)
     ]
     labels = list(dict.fromkeys(of_example["controller"]))
-    table = of_example.assign(cell=cells).pivot(index="actuator", columns="controller", values="cell")
+    table = of_example.assign(cell=cells).pivot(
+        index="actuator", columns="controller", values="cell"
+    )
     rows = ((name, *table.loc[name, labels]) for name in table.index)
     return markdown_table(("actuator", *labels), rows)
 
@@ -152,7 +155,8 @@ def actuator_errors(
         of_controller: Any = record[record["controller"] == label]
         colour, marker = _DOTS[place], _MARKERS[place]
         lines = [
-            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2) for name in of_controller["actuator"]
+            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2)
+            for name in of_controller["actuator"]
         ]
         aside = _BEYOND + 0.16 * (place - (len(labels) - 1) / 2)
         error = of_controller["error"].fillna(10**aside).to_numpy()

@@ -30,7 +30,9 @@ def tuned_baselines(
     by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
     cost, limited = by_key["iae"], by_key["peak_u"]
     published = compiled_loop(build(sensor=sensor(example)))
-    published_gains = {"law.beta": np.array([part_of(published_controller(example), "law").spec.beta])}
+    published_gains = {
+        "law.beta": np.array([part_of(published_controller(example), "law").spec.beta])
+    }
     row = ensemble_response(
         published, times, params=published_gains, metrics=(limited,), **TOLERANCES
     ).table.iloc[0]

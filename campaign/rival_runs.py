@@ -44,7 +44,10 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
                 | dict(zip(KEY, loop_key(example, label, actuator), strict=True))
                 | {"samples": finding.numbers["samples"]}
                 | {key: int(of_controller[key]) for key in ("violations", "failed")}
-                | {key: of_controller[f"median {key}"] for key in ("late_rms", "iae", "peak_u", "energy")}
+                | {
+                    key: of_controller[f"median {key}"]
+                    for key in ("late_rms", "iae", "peak_u", "energy")
+                }
                 | dict(zip(("less", "less_low", "less_high"), tuple(less)[:3], strict=True))
             )
     return pd.DataFrame(rows)
@@ -57,9 +60,12 @@ def rivals_text(record: pd.DataFrame, example: str) -> str:
     """
     of_example: Any = record[record["example"] == example]
     cells = [
-        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}" for r in of_example.to_dict("records")
+        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}"
+        for r in of_example.to_dict("records")
     ]
-    table = of_example.assign(cell=cells).pivot(index="controller", columns="actuator", values="cell")
+    table = of_example.assign(cell=cells).pivot(
+        index="controller", columns="actuator", values="cell"
+    )
     labels = list(dict.fromkeys(of_example["controller"]))
     rows = ((label, *table.loc[label, list(RIVAL_ACTUATORS)]) for label in labels)
     return markdown_table(("controller", *RIVAL_ACTUATORS.values()), rows)

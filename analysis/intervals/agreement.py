@@ -133,7 +133,9 @@ def _compare(
     if values is None or len(values) != len(balls):
         what = "raises an error" if values is None else f"returns {counted(len(values), 'number')}"
         if all(_value(ball).is_finite() for ball in balls):
-            raise refusal(f"with floats {at_floats} it {what}, and with balls it gives {len(balls)}")
+            raise refusal(
+                f"with floats {at_floats} it {what}, and with balls it gives {len(balls)}"
+            )
         return
     thin = _at_point(function, floats) if n < _AT_POINTS else None
     for i, (value, ball) in enumerate(zip(values, balls, strict=True)):

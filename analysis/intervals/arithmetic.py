@@ -81,7 +81,7 @@ class Ball(NumPyFunctions):
 
         Parameters
         ----------
-        known : bool, optional
+        is_known : bool, optional
             Whether no value is below 0.
 
         Returns

@@ -174,7 +174,9 @@ def closed_set(constants: Constants, gains: Gains, reach: StateReach, *, Q: floa
     W = _given(constants)
     least, C_0, sides = 0.0, abs(float(gains.r_0)), reach(abs(float(gains.r_0)))
     for _ in range(_STEPS):
-        C_0 = max(least_bound(constants.parts, constants.split, gains, sides, constants.box["v"], W), C_0)
+        C_0 = max(
+            least_bound(constants.parts, constants.split, gains, sides, constants.box["v"], W), C_0
+        )
         wider = reach(C_0)
         least = min(a - b for a, b in zip(sides, wider, strict=True))
         if not max(wider) <= FARTHEST:
@@ -190,7 +192,12 @@ def closed_set(constants: Constants, gains: Gains, reach: StateReach, *, Q: floa
 
 
 def _candidates(
-    sides: tuple[float, ...], constants: Constants, gains: Gains, reach: StateReach, W: Any, Q: float
+    sides: tuple[float, ...],
+    constants: Constants,
+    gains: Gains,
+    reach: StateReach,
+    W: Any,
+    Q: float,
 ) -> Iterator[Closure]:
     """Yield boxes around the least one that could close, with their proved constants."""
     names = coordinate_names(len(sides))

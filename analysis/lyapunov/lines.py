@@ -233,7 +233,9 @@ def _literal_lines(run: MemberRun, constants: Constants, given: Premises) -> lis
         samples = counted(margin.t.size, "sample")
         evidence = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
         if margin.equation == "(10)":
-            evidence += f"; no network of x has an eps* below {forcing_bound(constants.parts.plant):.4g}"
+            evidence += (
+                f"; no network of x has an eps* below {forcing_bound(constants.parts.plant):.4g}"
+            )
         line = _line(margin, run.signals, "checked", evidence)
         premise = f"d* = {printed.d:.4g}, eps* = {printed.eps:.4g}"
         lines.append(

@@ -70,7 +70,9 @@ class Record:
     def numbers(self, name: str, count: int | None = None) -> list[Fraction]:
         """Return a list of numbers, `count` of them."""
         listed = self[name]
-        need(isinstance(listed, list) and count in (None, len(listed)), f"{name} is of another size")
+        need(
+            isinstance(listed, list) and count in (None, len(listed)), f"{name} is of another size"
+        )
         return [read_rational(text) for text in listed]
 
     def interval(self, name: str) -> Interval:

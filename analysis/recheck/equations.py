@@ -117,7 +117,9 @@ def _of_two(operation: str, one: _Slopes, two: _Slopes) -> _Slopes:
     if operation == "*":
         slopes_of_product = [a * y_0 + x * b for a, b in both]
         if len(both) == 1:  # of one coordinate the slope is unique, and both ways enclose it
-            slopes_of_product = [m.meet(a * y + x_0 * b) for m, (a, b) in zip(slopes_of_product, both, strict=True)]
+            slopes_of_product = [
+                m.meet(a * y + x_0 * b) for m, (a, b) in zip(slopes_of_product, both, strict=True)
+            ]
         return here, there, slopes_of_product
     if operation == "/":
         return here, there, [(a - there * b) / y for a, b in both]

@@ -120,7 +120,8 @@ def told_of_filter(whole: Record) -> str:
         f"{begins(premise.record('starts'))}. Premises: {whole['kind']}; "
         f"{states_text(premise, states)}; "
         f"x{len(lambdas) + 1}' = {WrittenEquation(premise['equation'])}; yd = {' + '.join(sines)}; "
-        f"{split_text(premise.record('actuator'))}; lambda = {[float(a) for a in lambdas]}; {numbers}"
+        f"{split_text(premise.record('actuator'))}; lambda = {[float(a) for a in lambdas]}; "
+        f"{numbers}"
     )
 
 

@@ -37,7 +37,9 @@ def _times(a: SumOfProducts, b: SumOfProducts) -> SumOfProducts:
             for atom, n in two:
                 powers[atom] = powers.get(atom, 0) + n
             product = tuple(sorted(powers.items(), key=repr))
-            result = plus(result, {product: c}, d) if product in result else result | {product: c * d}
+            result = (
+                plus(result, {product: c}, d) if product in result else result | {product: c * d}
+            )
     return plus({}, result, Fraction(1))
 
 

@@ -231,7 +231,10 @@ def reference_model_bounds(whole: Record) -> dict[str, Fraction]:
             level, end = fall(loop, D, stage, loop.V_0)
             need(level < C, f"V <= {float(level):.6g} is below C = {float(C):.6g}")
             errors = loop.form.errors(level)
-            bounds = {f"|E_{i + 1}|": e for i, e in enumerate(errors)} | {"|W_hat|": W_hat, "|u|": u}
+            bounds = {f"|E_{i + 1}|": e for i, e in enumerate(errors)} | {
+                "|W_hat|": W_hat,
+                "|u|": u,
+            }
         else:
             need(all_falls and end < C, f"V falls below C = {float(C):.6g}")
             end = min(end, fall(loop, D, stage, Fraction(0))[1])

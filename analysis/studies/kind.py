@@ -154,8 +154,8 @@ class Ground:
         whole = self.prepared.experiment.space
         if not names:
             return whole
-        own = dict(zip(self.study.space, whole.quantities, strict=True))
-        return replace(whole, quantities=tuple(own[name] for name in names), choices=())
+        by_name = dict(zip(self.study.space, whole.quantities, strict=True))
+        return replace(whole, quantities=tuple(by_name[name] for name in names), choices=())
 
 
 def _nothing(asked: Any, setup: Setup) -> int:
@@ -395,10 +395,10 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
 def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
     """Run one analysis."""
-    found = asked.definition.run(asked, ground)
-    if found is None:
+    finding = asked.definition.run(asked, ground)
+    if finding is None:
         return None
-    return _headed(key, asked, found)
+    return _headed(key, asked, finding)
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
@@ -406,7 +406,7 @@ def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Find
 
     What the study claims of it is neither shown nor refuted.
     """
-    found = made(
+    finding = made(
         asked,
         f"Not answered: {error}.",
         claim=asked.claim or "the analysis has an answer",
@@ -415,8 +415,8 @@ def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Find
         runs=runs,
         is_answered=False,
     )
-    return _headed(key, asked, found)
+    return _headed(key, asked, finding)
 
 
-def _headed(key: str, asked: Asked, found: Finding) -> Finding:
-    return replace(found, key=key, title=asked.title or key.replace("-", " ").capitalize())
+def _headed(key: str, asked: Asked, finding: Finding) -> Finding:
+    return replace(finding, key=key, title=asked.title or key.replace("-", " ").capitalize())

@@ -44,8 +44,8 @@ def origin_of(setup: Setup, prepared: Prepared) -> dict[str, Any]:
     every = [p.system for _, p in prepared.loops]
     for key, asked in keyed(study).items():
         if (experiment := asked.definition.experiment) is not None:
-            own = experiment(asked, setup)
-            for labels, diagram in diagrams(own.space, own.build):
+            widened = experiment(asked, setup)
+            for labels, diagram in diagrams(widened.space, widened.build):
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
@@ -64,8 +64,8 @@ def unseen_notes(origin: Mapping[str, Any]) -> list[str]:
     """Return what the keys of a run do not see, one sentence for each block."""
     return [
         f"What '{block}' computes depends on what no key can see, so that a change of it would "
-        f"not be noticed: {'; '.join(told)}."
-        for block, told in origin.get("unseen", {}).items()
+        f"not be noticed: {'; '.join(reasons)}."
+        for block, reasons in origin.get("unseen", {}).items()
     ]
 
 
@@ -91,8 +91,10 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
 def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
     """Return in words how a diagram differs from those of a record; nothing if it does not."""
     now = from_json(as_json(loop_facts(diagram)))
-    found = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
-    return difference_text(min(found, key=len, default=["the study kept no record of its loop"]))
+    differences = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
+    return difference_text(
+        min(differences, key=len, default=["the study kept no record of its loop"])
+    )
 
 
 def plain_study(study: Study) -> dict[str, Any]:
@@ -114,8 +116,8 @@ def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> st
 
 def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return what else differs, in words; nothing if nothing does."""
-    found = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
-    return difference_text(found)
+    differences = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
+    return difference_text(differences)
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
@@ -136,10 +138,10 @@ def _diagrams(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str
         if name not in old or name not in new:
             yield f"the diagram '{name}' is {'new' if name in new else 'gone'}"
             continue
-        found = list(fact_differences(old[name], new[name]))
+        differences = list(fact_differences(old[name], new[name]))
         moved = values_differ(before["values"][name], now["values"][name])
-        if moved and not found:
-            found = [f"the value of {moved[0]} at the same point"]
-        if not found and old[name] != new[name]:
-            found = ["the compiled program"]
-        yield from found
+        if moved and not differences:
+            differences = [f"the value of {moved[0]} at the same point"]
+        if not differences and old[name] != new[name]:
+            differences = ["the compiled program"]
+        yield from differences

@@ -72,9 +72,9 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
     if not isinstance(content, dict):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
     if content.get("format") != RUN_FORMAT:
-        known = str(content.get("format", "none"))[:20]
+        written_format = str(content.get("format", "none"))[:20]
         raise RunFolderError(
-            f"'{path}' has the format {known!a}, and this nlctl reads {RUN_FORMAT}: read "
+            f"'{path}' has the format {written_format!a}, and this nlctl reads {RUN_FORMAT}: read "
             "it with the nlctl that wrote it, or run the study again in another folder with --out"
         )
     if content.pop(SEAL, None) != digest_of(content):

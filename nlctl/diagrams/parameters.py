@@ -166,7 +166,9 @@ def samplings(system: Any) -> list[tuple[Any, Any]]:
         Path and owner of the parameters, one for each clock.
     """
     every = [sampling_of(leaf.system) for leaf in leaves(system)]
-    by_identity: dict[int, Any] = {id(sampling): sampling for sampling in every if sampling is not None}
+    by_identity: dict[int, Any] = {
+        id(sampling): sampling for sampling in every if sampling is not None
+    }
     owners = system.params.owners if isinstance(system.params, Parameters) else {}
     paths = {id(owner): name.rpartition(".")[0] for name, owner in owners.items()}
     return [(paths.get(key, sampling.name), sampling) for key, sampling in by_identity.items()]

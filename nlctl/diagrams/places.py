@@ -131,16 +131,16 @@ def supplied_blocks(system: Any, how: Supplied | None = None) -> list[Block]:
     supplied: dict[int, Block] = {}
     for leaf in leaves(system):
         inner = within(leaf.system)
-        kind_of_supply = supplied_of(inner)
-        if kind_of_supply is None or how not in (None, kind_of_supply):
+        supply = supplied_of(inner)
+        if supply is None or how not in (None, supply):
             continue
         kind = type(inner.spec).__name__
         if inner is not leaf.system or not ct.isctime(system) or inner.dt not in (0, None):
-            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {kind_of_supply.continuous}")
+            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {supply.continuous}")
         if id(inner) in supplied:
             raise DiagramError(
-                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {kind_of_supply.shared} for "
-                "both: make a block of each"
+                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {supply.shared} "
+                "for both: make a block of each"
             )
         supplied[id(inner)] = inner
     return list(supplied.values())

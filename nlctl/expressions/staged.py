@@ -124,7 +124,9 @@ class StagedObject:
         attribute = inspect.getattr_static(type(real), name, None)
         if name in getattr(real, "__dict__", {}) and not isinstance(attribute, property):
             return stage.instead(getattr(real, name))  # its own is what Python finds first
-        if isinstance(attribute, property | functools.cached_property) and not is_of_a_library(real):
+        if isinstance(attribute, property | functools.cached_property) and not is_of_a_library(
+            real
+        ):
             getter = attribute.fget if isinstance(attribute, property) else attribute.func
             return stage.copied(getter)(self)
         if isinstance(attribute, FunctionType) and not is_of_a_library(real):
@@ -192,7 +194,9 @@ class StagedParent:
             return functools.partial(stage.copied(attribute), thing)
         if isinstance(attribute, property):
             return stage.copied(attribute.fget)(thing)
-        return stage.instead(attribute.__func__ if isinstance(attribute, staticmethod) else attribute)
+        return stage.instead(
+            attribute.__func__ if isinstance(attribute, staticmethod) else attribute
+        )
 
 
 _REDUCING = {"add": np.sum, "multiply": np.prod, "maximum": np.max, "minimum": np.min,

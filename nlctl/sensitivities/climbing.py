@@ -93,15 +93,15 @@ class _SettledError(Exception):
 
 def lower_cost(worth_of: WorthOf, start: np.ndarray) -> None:
     """Go where the cost is as low as margins allow."""
-    patient, first = _Patient(worth_of), worth_of(start)
+    cached, first = _Patient(worth_of), worth_of(start)
     scale = abs(first.cost) or 1.0 if np.isfinite(first.cost) else 1.0
     within: Any = {
-        "type": "ineq", "fun": lambda x: patient(x).parts - _ROOM, "jac": lambda x: patient(x).slopes
+        "type": "ineq", "fun": lambda x: cached(x).parts - _ROOM, "jac": lambda x: cached(x).slopes
     }  # fmt: skip
     try:
         minimize(
-            lambda x: patient(x).cost / scale if np.isfinite(patient(x).cost) else -LOST_MARGIN, start,
-            jac=lambda x: patient(x).cost_slopes / scale, method="SLSQP",
+            lambda x: cached(x).cost / scale if np.isfinite(cached(x).cost) else -LOST_MARGIN,
+            start, jac=lambda x: cached(x).cost_slopes / scale, method="SLSQP",
             bounds=[(0.0, 1.0)] * start.size, constraints=[within] if first.parts.size else [],
             options={"ftol": 1e-6, "maxiter": 1000},
         )  # fmt: skip

@@ -82,7 +82,11 @@ class _Run:
         met = [level for level, v in zip(levels, values, strict=True) if np.all(v == 0.0)]
         zero, without = source.graph.const(0.0), []
         for name, seed in zip(self.names, self.differentiated.saltation.seeds, strict=True):
-            moves = [e or zero for level in met for e in self.differentiated.saltation.change(level, seed)]
+            moves = [
+                e or zero
+                for level in met
+                for e in self.differentiated.saltation.change(level, seed)
+            ]
             if any(np.any(v != 0.0) for v in self._at_start(moves)):
                 without.append(name)
         if not without:
@@ -96,7 +100,9 @@ class _Run:
         wide = np.zeros((self.differentiated.extended.schedule.ninputs, 1))
         wide[: u.shape[0], 0] = u[:, 0]
         arrays = {"t": times[:1, None], "x": start[:, None], "u": wide, "p": p[:, None]}
-        return evaluate_expressions(exprs, arrays, searches_of(self.differentiated.sides.source.equations))
+        return evaluate_expressions(
+            exprs, arrays, searches_of(self.differentiated.sides.source.equations)
+        )
 
     def _lack(self, time: float, why: str) -> NoDerivative:
         """Return it with the names of what happens then."""
@@ -120,7 +126,9 @@ class _Run:
         conditions, happened = self.compiled.equations.conditions, self.trajectory.happened
         labels = row_labels(self.compiled, conditions)
         first = self.compiled.program.switching + conditions.rows
-        watching = len(self.differentiated.saltation.turning) + bool(self.differentiated.sides.source.carried)
+        watching = len(self.differentiated.saltation.turning) + bool(
+            self.differentiated.sides.source.carried
+        )
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):
             if first <= row < first + watching:

@@ -103,11 +103,13 @@ def with_its_derivatives(
     )  # fmt: skip
     outputs = len(combinations) + len(kept)
     schedule = with_derivatives(compiled, extended_program, places.size, outputs * (1 + by), by)
-    differentiated = replace(compiled, schedule=schedule, program=maker.program(), original=None, apart=None)
+    differentiated = replace(
+        compiled, schedule=schedule, program=maker.program(), original=None, apart=None
+    )
     differentiated.__dict__["equations"] = maker.equations()
     return Differentiated(
-        compiled=differentiated, places=places, extended=extended_program, sides=sides, outputs=outputs,
-        saltation=maker.saltation,
+        compiled=differentiated, places=places, extended=extended_program, sides=sides,
+        outputs=outputs, saltation=maker.saltation,
     )  # fmt: skip
 
 
@@ -186,7 +188,9 @@ class _Maker:
     def equations(self) -> Equations:
         """Return what the program computes."""
         equations = self.source.equations
-        located = tuple(replace(condition, bends=False) for condition in equations.conditions.located)
+        located = tuple(
+            replace(condition, bends=False) for condition in equations.conditions.located
+        )
         results: dict[str, list[tuple[int, Tracer]]] = {
             "dx": self._flow(),
             "g": self._switching(),
@@ -209,7 +213,9 @@ class _Maker:
         graph = self.source.graph
         changes = self.source.slopes([e for e, _ in pieces], self.seeds[j])
         zero = graph.const(0.0)
-        return [(zero if e is None else e, size) for e, (_, size) in zip(changes, pieces, strict=True)]
+        return [
+            (zero if e is None else e, size) for e, (_, size) in zip(changes, pieces, strict=True)
+        ]
 
     def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
         """Return pieces as arrays with their rows."""

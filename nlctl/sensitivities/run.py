@@ -142,7 +142,11 @@ def _start(
 
 
 def _sides_at(
-    differentiated: Differentiated, run: RunWithDerivatives, u: np.ndarray, start: np.ndarray, p: np.ndarray
+    differentiated: Differentiated,
+    run: RunWithDerivatives,
+    u: np.ndarray,
+    start: np.ndarray,
+    p: np.ndarray,
 ) -> np.ndarray:
     """Return the sides on which a run begins, behind all that happens at once."""
     compiled, varied = differentiated.compiled, variations(differentiated.compiled, run.times)
@@ -159,7 +163,9 @@ def _sides_at(
     return np.concatenate(parts)
 
 
-def _audit(compiled: Compiled, integrated: Trajectory, p: np.ndarray, run: RunWithDerivatives) -> None:
+def _audit(
+    compiled: Compiled, integrated: Trajectory, p: np.ndarray, run: RunWithDerivatives
+) -> None:
     """Compare the equations with python-control's at points of the run, as any run is."""
     count, rates = compiled.system.ninputs or 0, compiled.schedule.rates
     count_with_lines = count + len(compiled.schedule.lines)
@@ -167,8 +173,8 @@ def _audit(compiled: Compiled, integrated: Trajectory, p: np.ndarray, run: RunWi
     if rates:
         inputs = np.concatenate([inputs, integrated.inputs[len(integrated.inputs) - count :]])
     trial = Trial(
-        time=integrated.time, states=integrated.states[: compiled.system.nstates or 0], inputs=inputs, p=p,
-        params=run.params, width=1,
+        time=integrated.time, states=integrated.states[: compiled.system.nstates or 0],
+        inputs=inputs, p=p, params=run.params, width=1,
     )  # fmt: skip
     audit(compiled, trial, run.audit)
 
@@ -203,11 +209,17 @@ def _response(
         row_of_signal = signal.state if is_state else row
         values[i] = source[row_of_signal]
         for j in range(len(quantities)):
-            place = places.derivative(j) + row_of_signal if is_state else count * (1 + j) + row_of_signal
+            place = (
+                places.derivative(j) + row_of_signal
+                if is_state
+                else count * (1 + j) + row_of_signal
+            )
             derivatives[i, j] = source[place] / scale[j]
         row += not is_state
     for lack in lacks:
-        behind = integrated.time > lack.time if lack.time == times[0] else integrated.time >= lack.time
+        behind = (
+            integrated.time > lack.time if lack.time == times[0] else integrated.time >= lack.time
+        )
         without = [q.name in lack.with_respect_to for q in quantities]
         derivatives[:, np.outer(without, behind)] = np.nan
     rest = ((0, 0), (0, times.size - integrated.time.size))
@@ -216,5 +228,6 @@ def _response(
     return SensitivityResponse(
         time=times, signals=tuple(s.name for s in signals),
         with_respect_to=tuple(q.name for q in quantities), values=values,
-        derivatives=derivatives, scale=scale, missing=tuple(lacks), statistics=integrated.statistics,
+        derivatives=derivatives, scale=scale, missing=tuple(lacks),
+        statistics=integrated.statistics,
     )  # fmt: skip

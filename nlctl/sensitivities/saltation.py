@@ -219,7 +219,7 @@ class Saltation:
                 zero = graph.const(0.0)
                 sizes = (size for _, size in self.source.flow)
                 flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
-            forward = self.source.time(flowing, inputs_move=False)
+            forward = self.source.time(flowing, delays_move=False)
             (rate,) = self.source.slopes([change], forward)
             if rate is not None:
                 derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
@@ -235,7 +235,7 @@ class Saltation:
         """
         graph, source = self.source.graph, self.source
         zero = graph.const(0.0)
-        forward = source.time(source.flow, inputs_move=False)
+        forward = source.time(source.flow, delays_move=False)
         (rate,) = self.source.slopes([become], forward)
         (bend,) = self.source.slopes([rate or zero], forward)
         if bend is None:
@@ -379,7 +379,7 @@ class Saltation:
         (rate,) = self.source.slopes([level], forward)
         if rate is None:
             return None, Cause(met=met, moves=[], grazes=graph.const(False))
-        (bend,) = self.source.slopes([rate], source.time(flow, inputs_move=False))
+        (bend,) = self.source.slopes([rate], source.time(flow, delays_move=False))
         noise = self._noise(extent)
         bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
         least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)

@@ -149,7 +149,11 @@ def with_derivatives(
     arriving = []
     for j in range(-1, by):
         for row in direct:
-            reached = [extended_program.line(other, int(i)) for i in np.flatnonzero(row) for other in {-1, j}]
+            reached = [
+                extended_program.line(other, int(i))
+                for i in np.flatnonzero(row)
+                for other in {-1, j}
+            ]
             arriving.append({lines[k]: 1.0 for k in reached})
     return replace(
         extended_program.schedule,

@@ -171,6 +171,8 @@ def _timed(exprs: Sequence[Expr]) -> set[Expr]:
     for node in needed(exprs):
         is_time = node.op == "leaf" and node.data[0] == "t"
         moved = [a for a in node.args if a.varies]
-        if is_time or (moved and all(a in timed for a in moved) and node.op not in ("call", "solve")):
+        if is_time or (
+            moved and all(a in timed for a in moved) and node.op not in ("call", "solve")
+        ):
             timed.add(node)
     return timed

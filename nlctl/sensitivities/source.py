@@ -111,15 +111,14 @@ class EquationParts:
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     def time(
-        self, pieces: Sequence[SomeRows], time: Expr | None = None, inputs_move: bool = True
+        self, pieces: Sequence[SomeRows], time: Expr | None = None, delays_move: bool = True
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states.
 
-        By `time`, 1 if it is None.  If the rates of delayed signals need not be `known`, they
-        count as 0.
+        By `time`, 1 if it is None.  The rates of delayed signals count as 0 unless `delays_move`.
         """
         first = self.extended.schedule.ninputs - self.extended.schedule.rates
-        lines = range(self.inputs, first if inputs_move else self.inputs)
+        lines = range(self.inputs, first if delays_move else self.inputs)
         outside = from_time(self.graph, time, self.inputs, first, lines)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
@@ -155,7 +154,9 @@ class EquationParts:
             if not any(row in instead for row in rows):
                 continue
             parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
-            replacements[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+            replacements[leaf] = (
+                self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+            )
         return replacements
 
 
@@ -170,7 +171,8 @@ def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
     return EquationParts(
-        equations=computed, extended=extended_program, program=program, inputs=compiled.system.ninputs or 0,
+        equations=computed, extended=extended_program, program=program,
+        inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
         committed=list(_single(graph, computed.results["m"]).values()),

@@ -265,9 +265,10 @@ class Runs:
             params, start = _split(dict(zip(problem.names, values, strict=True)) | dict(sample))
             try:
                 run = sensitivity_response(
-                    problem.diagram, problem.times, problem.inputs, {**problem.initial_state, **start},
-                    of=signals, with_respect_to=list(problem.names),
-                    params={**problem.params, **params}, **problem.how,
+                    problem.diagram, problem.times, problem.inputs,
+                    {**problem.initial_state, **start}, of=signals,
+                    with_respect_to=list(problem.names), params={**problem.params, **params},
+                    **problem.how,
                 )  # fmt: skip
             except (CompileError, AlgebraicLoopError) as error:
                 self.why = str(error)

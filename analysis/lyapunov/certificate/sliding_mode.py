@@ -119,7 +119,9 @@ def _begin(loop: Any, options: ProofOptions) -> Subject:
     filtered = FilteredLoop(**as_filtered(read))
     actuator, K, tol = read.roles.spec("actuator"), filtered.law.K, options.tol
     split = disturbed(decompose(actuator, k=options.k, u_max=K, tol=tol), read.disturbance)
-    return Subject(loop=filtered, start=abs(filtered.r_0), actuator=actuator, split=split, u_max=K, tol=tol)
+    return Subject(
+        loop=filtered, start=abs(filtered.r_0), actuator=actuator, split=split, u_max=K, tol=tol
+    )
 
 
 def _region(subject: Subject, level: arb) -> Demand:

@@ -155,7 +155,9 @@ def _check_functions_are_own(place: Place) -> None:
     pairs = [("output", system.outfcn)] + ([("update", system.updfcn)] if system.nstates else [])
     for name, used in pairs:
         declared_function = getattr(system.spec, name)
-        if getattr(used, "__code__", used) is not getattr(declared_function, "__code__", declared_function):
+        if getattr(used, "__code__", used) is not getattr(
+            declared_function, "__code__", declared_function
+        ):
             raise DiagramError(
                 f"block '{place.path}' has another {name} function than its record "
                 f"{type(system.spec).__name__}, which the proof reads: make the block of a record "

@@ -67,7 +67,7 @@ def check_same(
     what = [*(f"d/dt {name}" for name in names), *(f"output '{label}'" for label in shared)]
     one, other = _named(given, params), _named(understood, read_params)
 
-    def told(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
+    def as_given(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
         rates, outputs = one(t, x, u)
         return (np.concatenate([rates, outputs[rows]]),)
 

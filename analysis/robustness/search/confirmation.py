@@ -134,7 +134,11 @@ def confirm(
     replays = []
     for experiment in (study, *(replace(tighter, method=method) for method in _OTHERS)):
         row_result = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
-        replays.append(_replay("native", experiment, row_result["status"], row_result["time"], row_result["spec"]))
+        replays.append(
+            _replay(
+                "native", experiment, row_result["status"], row_result["time"], row_result["spec"]
+            )
+        )
     if python_control:
         replays.append(_in_python_control(prepared, tighter, table))
     table_of_replays = pd.DataFrame(replays)

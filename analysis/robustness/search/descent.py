@@ -89,7 +89,9 @@ def test_signals(space: Space) -> np.ndarray:
     return np.array(signals_found)
 
 
-def _descend(search: Found, derivatives: FirstOrderOf, reasons: dict[str, None], first: int) -> None:
+def _descend(
+    search: Found, derivatives: FirstOrderOf, reasons: dict[str, None], first: int
+) -> None:
     """Go down from the worst row since the first one, by linear programs in shrinking boxes."""
     if not search.left or not np.isfinite(search.margins[first:]).any():
         return

@@ -252,7 +252,7 @@ def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
             continue
         else:
             contents = {f"module {source}": _source(_module_places(source)[0]).read_bytes()}
-        yield from (statement(key, told, content) for told, content in contents.items())
+        yield from (statement(key, place, content) for place, content in contents.items())
 
 
 def check_place(name: str) -> None:
@@ -286,13 +286,13 @@ def _module_places(name: str) -> list[Path]:
     """Return the file or the folders of a top-level module, without importing it."""
     top = name.partition(".")[0]
     try:
-        found = importlib.util.find_spec(top)
+        spec = importlib.util.find_spec(top)
     except (ImportError, ValueError):  # of a module that hides where it is from
-        found = None
-    if found is None:
+        spec = None
+    if spec is None:
         raise ParameterError(f"there is no module '{top}'")
-    folders = list(found.submodule_search_locations or ())
-    return [Path(p) for p in folders] or [Path(found.origin or top)]
+    folders = list(spec.submodule_search_locations or ())
+    return [Path(p) for p in folders] or [Path(spec.origin or top)]
 
 
 def _source(place: Path) -> Path:
@@ -303,13 +303,13 @@ def _source(place: Path) -> Path:
 @functools.cache
 def _built_on() -> frozenset[str]:
     """Return the top-level modules of python-control, and of packages that need it or nlctl."""
-    found = {"control"}
+    modules = {"control"}
     for name, packages in metadata.packages_distributions().items():
         needed = (need for p in packages for need in metadata.distribution(p).requires or ())
         plain = {re.split(r"[^\w.-]", need)[0].lower() for need in needed if "extra ==" not in need}
         if plain & set(MAKERS):
-            found.add(name)
-    return frozenset(found)
+            modules.add(name)
+    return frozenset(modules)
 
 
 @functools.cache
@@ -351,10 +351,12 @@ def check_loop_function(function: Any, name: str) -> None:
     waits = inspect.iscoroutinefunction(plain) or inspect.isgeneratorfunction(plain)
     if not isinstance(plain, FunctionType) or waits or inspect.isasyncgenfunction(plain):
         raise ParameterError(f"'{name}' needs a function that returns a diagram, got {plain!r}")
-    told = _annotation(plain)
-    if told and all(_outermost(part) in NO_DIAGRAMS for part in told.split("|")):
-        raise ParameterError(f"'{name}' needs a function that returns a diagram, it returns {told}")
-    if not DIAGRAMS & set(re.findall(r"\w+", told)) and not _uses_makers(plain, set()):
+    annotation = _annotation(plain)
+    if annotation and all(_outermost(part) in NO_DIAGRAMS for part in annotation.split("|")):
+        raise ParameterError(
+            f"'{name}' needs a function that returns a diagram, it returns {annotation}"
+        )
+    if not DIAGRAMS & set(re.findall(r"\w+", annotation)) and not _uses_makers(plain, set()):
         raise ParameterError(
             f"nothing shows that '{name}' returns a diagram, so it is not called: neither it nor "
             "what it calls uses control or nlctl. Annotate it: def "
@@ -399,8 +401,8 @@ def _uses_makers(thing: object, seen: set[int]) -> bool:
     if isinstance(thing, type):
         return any(_uses_makers(part, seen) for part in vars(thing).values() if callable(part))
     if not isinstance(thing, FunctionType):
-        own = type(thing).__module__.partition(".")[0]
-        return own not in sys.stdlib_module_names and _uses_makers(type(thing), seen)
+        module = type(thing).__module__.partition(".")[0]
+        return module not in sys.stdlib_module_names and _uses_makers(type(thing), seen)
     names = _names(thing.__code__)
     reached = [thing.__globals__[name] for name in names if name in thing.__globals__]
     reached += [cell.cell_contents for cell in thing.__closure__ or () if _is_filled(cell)]

@@ -66,10 +66,10 @@ def _check_printable(value: object, place: str) -> None:
     elif isinstance(value, list):
         for part in value:
             _check_printable(part, place)
-    elif isinstance(value, str) and (found := _CONTROL.search(value)):
+    elif isinstance(value, str) and (character := _CONTROL.search(value)):
         raise ValueError(
-            f"has a control character, U+{ord(found[0]):04X}, in {place!a}: texts have lines, tabs "
-            "and characters that can be printed"
+            f"has a control character, U+{ord(character[0]):04X}, in {place!a}: texts have lines, "
+            "tabs and characters that can be printed"
         )
 
 

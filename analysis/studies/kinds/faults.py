@@ -77,14 +77,14 @@ class Faults(Asked):
 
     @property
     def claim(self) -> str:
-        told = ", ".join(self.tolerates)
-        return f"the spec holds under each of: {told}" if told else ""
+        names = ", ".join(self.tolerates)
+        return f"the spec holds under each of: {names}" if names else ""
 
 
 def _faults(setup: Setup) -> dict[str, Fault]:
     """Return the faults of a study by name."""
     every = (faults_of(signal, faulty) for signal, faulty in setup.study.faults.items())
-    return {name: fault for found in every for name, fault in found.items()}
+    return {name: fault for faults in every for name, fault in faults.items()}
 
 
 def _faulty(
@@ -96,20 +96,20 @@ def _faulty(
 
 def _experiment(asked: Faults, setup: Setup) -> Experiment:
     """Return what the rows are run with: the loop of nominal options, its faults' onsets varied."""
-    own, faults = setup.experiment, _faults(setup)
-    options = {c.name: c.options[c.nominal] for c in own.space.choices}
+    base, faults = setup.experiment, _faults(setup)
+    options = {c.name: c.options[c.nominal] for c in base.space.choices}
     onsets = tuple(
         Uncertain(name=_onset(fault), bounds=(0.0, NEVER), nominal=NEVER, unit="s")
         for fault in faults.values()
     )
-    space = replace(own.space, quantities=(*own.space.quantities, *onsets), choices=())
-    watched = (*own.spec.requirements, *_detectors(asked, own))
+    space = replace(base.space, quantities=(*base.space.quantities, *onsets), choices=())
+    watched = (*base.spec.requirements, *_detectors(asked, base))
     times = tuple(ViolationTime(requirement=r) for r in watched)
     return replace(
-        own,
+        base,
         space=space,
-        build=partial(_faulty, own.build, options, tuple(faults.values())),
-        metrics=(*own.metrics, *times),  # type: ignore[arg-type]
+        build=partial(_faulty, base.build, options, tuple(faults.values())),
+        metrics=(*base.metrics, *times),  # type: ignore[arg-type]
     )
 
 
@@ -274,17 +274,17 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
 def _detection(asked: Faults, effects: pd.DataFrame) -> str:
     """Return how many single faults are detected, and whether before they violate the spec."""
     others = [k for k in effects if k.endswith(" violated at") and k[:-12] not in asked.detects]
-    found = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
+    detected = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
     violated = effects[others].to_numpy().min(axis=1)
     alone = ((effects["first"] != "") & (effects["second"] == "")).to_numpy()
     bad = alone & violates(effects["margin"])
-    count, early = int(np.isfinite(found[alone]).sum()), int((found < violated)[bad].sum())
+    count, early = int(np.isfinite(detected[alone]).sum()), int((detected < violated)[bad].sum())
     words = (
         f"{some_of(count, int(alone.sum()), 'single fault', 'is', 'are')} detected; of those that "
         f"violate the spec {early} of {int(bad.sum())} before they do."
     )
-    if np.isfinite(found[0]):
-        words += f" Without a fault there is a false alarm at {found[0]:g} s."
+    if np.isfinite(detected[0]):
+        words += f" Without a fault there is a false alarm at {detected[0]:g} s."
     return words
 
 

@@ -55,15 +55,15 @@ def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], l
     named = list(_named(data))
     problems = untrusted(named, grant)
     refused = {problem.place for problem in problems}
-    found: dict[str, Kind] = {}
+    kinds: dict[str, Kind] = {}
     for place, name in named:
-        if place in refused or name in found:
+        if place in refused or name in kinds:
             continue
         try:
-            found[name] = named_kind(name, grant)
+            kinds[name] = named_kind(name, grant)
         except UsageError as error:
             problems.append(Problem(place=place, message=str(error)))
-    return found, problems
+    return kinds, problems
 
 
 def _named(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:

@@ -30,10 +30,10 @@ def recorded_page(folder: Path) -> Iterator[None]:
     with locked(folder, RunFolderError):
         content = check_whole(folder)
         yield
-        made = {name: file_digest(folder / name) for name in _PAGE}
-        is_same = made[_PAGE[0]] == content["page"].get(_PAGE[0])
+        digests = {name: file_digest(folder / name) for name in _PAGE}
+        is_same = digests[_PAGE[0]] == content["page"].get(_PAGE[0])
         before = content["page"] if is_same else {}  # a print of another page is none of this one
-        write_json(folder / CONTENTS, content | {"page": before | made})
+        write_json(folder / CONTENTS, content | {"page": before | digests})
 
 
 @contextmanager

@@ -173,8 +173,8 @@ def shaped(path: Path, shape: type[_Shape], remedy: str = ANEW) -> dict[str, Any
     try:
         return shape.model_validate(content).model_dump(exclude_unset=True)
     except (ValidationError, RecursionError) as error:
-        told = "it is nested too deeply"
+        mistake = "it is nested too deeply"
         if isinstance(error, ValidationError):
             first = error.errors(include_url=False)[0]
-            told = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"[:200]
-        raise RunFolderError(f"'{path}' holds what no run writes ({told}): {remedy}") from error
+            mistake = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"[:200]
+        raise RunFolderError(f"'{path}' holds what no run writes ({mistake}): {remedy}") from error

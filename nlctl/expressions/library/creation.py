@@ -100,7 +100,11 @@ def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin:
         raise Untraceable("an array of integers and truth values")
     if dtype is not None:
         result = elementwise(graph, "add", result, 0.0)
-    return result.reshape((1,) * (ndmin - result.ndim) + result.shape) if result.ndim < ndmin else result
+    return (
+        result.reshape((1,) * (ndmin - result.ndim) + result.shape)
+        if result.ndim < ndmin
+        else result
+    )
 
 
 def _of_floats(graph: Graph, array: Tracer) -> Tracer:

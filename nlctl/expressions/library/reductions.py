@@ -359,7 +359,7 @@ def cov(graph: Graph, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = 
     away = [elementwise(graph, "sub", r, mean(graph, r)) for r in flat]
     count = float(flat[0].size - (ddof if ddof is not None else 0 if bias else 1))
     covariances = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
-              for b in away] for a in away]  # fmt: skip
+                    for b in away] for a in away]  # fmt: skip
     return traced(graph, covariances if len(away) > 1 else covariances[0][0])
 
 
@@ -368,8 +368,9 @@ def corrcoef(graph: Graph, x: Any, y: Any = None) -> Tracer:
     """Return the correlations of rows."""
     c = cov(graph, x, y)
     sizes = [elementwise(graph, "sqrt", c[i, i]) for i in range(len(c))]
-    correlations = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]), sizes[j])
-              for j in range(len(c))] for i in range(len(c))]  # fmt: skip
+    correlations = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]),
+                                 sizes[j]) for j in range(len(c))]
+                    for i in range(len(c))]  # fmt: skip
     low, high = -1.0, 1.0
     whole = elementwise(graph, "maximum", traced(graph, correlations), low)
     return elementwise(graph, "minimum", whole, high)
