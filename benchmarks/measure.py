@@ -58,7 +58,7 @@ class Row:
 def available(problem: Problem, names: Iterable[str], say: Callable[[str], object]) -> list[Solver]:
     """Return the solvers that can run here and integrate the right equations.
 
-    What is left out is told with the reason.
+    What is left out is reported with the reason.
     """
     usable = []
     for name in names:

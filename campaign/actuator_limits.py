@@ -81,7 +81,7 @@ def _latex(value: float) -> str:
 
 
 def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any]:
-    """Run an example with one actuator in the place of its own."""
+    """Run an example with one actuator instead of its own."""
     actuator, controller = actuators_of_the_table()[name], rival_controller(example, label)
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
     loop = paper.EXAMPLES[example](actuator=actuator, controller=controller)
@@ -135,7 +135,7 @@ def _cell(row: dict[str, Any], meets: bool) -> str:
 
 
 _DOTS = (*(colour for colour, _ in STYLES), *(colour for colour, _ in STYLES))
-_MARKERS = "osD^vP<>"  # colours repeat: the marker tells as well
+_MARKERS = "osD^vP<>"  # colours repeat: the marker distinguishes as well
 _BEYOND, _HALF = 2.3, 0.7  # log10: place of the runs that did not reach their end
 
 

@@ -239,7 +239,7 @@ class _Point:
         self.slope: float | None = None
 
     def inside(self, thing: Any) -> Any:
-        """Return an argument with floats in the place of balls."""
+        """Return an argument with floats instead of balls."""
         if thing is UNREAD:
             return 0.0
         if isinstance(thing, Slope):

@@ -56,7 +56,7 @@ class Ball(NumPyFunctions):
 
     Examples
     --------
-    An equation takes it in the place of a number, and its derivative comes along:
+    An equation takes it instead of a number, and its derivative comes along:
 
     >>> from flint import arb
     >>> from nlctl.analysis.intervals.arithmetic import Ball

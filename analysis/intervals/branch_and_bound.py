@@ -54,7 +54,7 @@ class Range:
         Extreme values that are attained (on boxes with an infinite side: that interval
         arithmetic gives at a point of the finite ones).
     boxes, undecided : int
-        Boxes looked at, and those left without a finite bound.
+        Boxes examined, and those left without a finite bound.
     seconds : float
     arithmetic : {"balls", "floats"}
         What proved it: python-flint's balls, or floats rounded outwards in machine code.
@@ -88,7 +88,7 @@ class Proof:
     holds : bool or None
         True: proved.  False: refuted, at the point `where`.  None: undecided.
     boxes, undecided : int
-        Boxes looked at, and those that stayed undecided.
+        Boxes examined, and those that stayed undecided.
     where : dict or None
         The point that refutes the claim, or the centre of an undecided box.
     value : float

@@ -109,13 +109,13 @@ def code_for(
     codes = function.codes if isinstance(function, Readable) else {}
     key = (len(box.names), sign)
     if key not in codes:
-        code = _made(function, *key)
+        code = _generated(function, *key)
         codes[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
     code = codes[key]
     return None if code is None else CodedClaim(code=code, bound=bound)
 
 
-def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
+def _generated(function: Any, sides: int, sign: int) -> BoxCode | None:
     """Return the code of sign f, None if it has none."""
     try:
         graph, results = _expressions(function, sides)
@@ -182,7 +182,7 @@ def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
 
 
 def decided_by_code(claim: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
-    """Return what becomes of the claim; the same whatever the number of processors."""
+    """Return the verdict on a claim; the same whatever the number of processors."""
     low, high = _ends(box)
     threads = os.cpu_count() or 1
     return decide_claim(claim.code, low, high, claim.bound, max_boxes=max_boxes, threads=threads)

@@ -279,7 +279,7 @@ def as_sum(x: Any) -> Any:
 
 
 def indeterminate(name: str) -> Sum:
-    """Return a symbol as a sum, which equations take in the place of a number.
+    """Return a symbol as a sum, which equations take instead of a number.
 
     Examples
     --------

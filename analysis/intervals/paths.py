@@ -51,7 +51,7 @@ class Decisions:
     used: int = 0
     orders: list[tuple[tuple[Any, Any], set[int]]] = field(default_factory=list, repr=False)
 
-    def known(self, key: tuple[Any, Any]) -> set[int]:
+    def possible(self, key: tuple[Any, Any]) -> set[int]:
         """Return the orders of two quantities that earlier answers leave."""
         for (a, b), orders in self.orders:
             if a is key[0] and (b is key[1] or _same_number(b, key[1])):
@@ -89,7 +89,7 @@ def take(decisions: Decisions) -> Iterator[Decisions]:
 
 @contextmanager
 def undecided() -> Iterator[None]:
-    """Answer nothing: a comparison that balls cannot decide raises, whoever follows branches."""
+    """Answer nothing: a comparison that balls cannot decide raises, whatever branch is followed."""
     token = _DECISIONS.set(None)
     try:
         yield
@@ -101,7 +101,7 @@ def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], wha
     """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:
-        so_far = decisions.known(key)
+        so_far = decisions.possible(key)
         decisions.used += not possible <= so_far
         possible = possible & so_far
     if possible <= holds:

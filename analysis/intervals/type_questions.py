@@ -1,7 +1,7 @@
 """What a function may not ask of its arguments: their type, text, identity, attributes.
 
 A run gives it floats, a proof balls, the compiler symbols.  A function that asks which of these it
-got may do one thing in a run and another in a proof, at points that no comparison looks at.  So
+got may do one thing in a run and another in a proof, at points that no comparison visits.  So
 its code is read before it is called, with all that it calls, and the question is named.
 """
 
@@ -84,7 +84,7 @@ def _question_of(thing: object) -> str | None:
     if isinstance(thing, types.CodeType):
         return _question_in(thing)
     module = thing.__name__ if isinstance(thing, types.ModuleType) else _module_of(thing)
-    return f"uses {module}, which tells types and objects apart" if module in _MODULES else None
+    return f"uses {module}, which distinguishes types and objects" if module in _MODULES else None
 
 
 def _module_of(thing: object) -> str:

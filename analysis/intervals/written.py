@@ -1,6 +1,6 @@
 """What a function does with numbers, written down as a list of operations.
 
-A `Written` is one entry of the list; an equation takes it in the place of a number, as it does a
+A `Written` is one entry of the list; an equation takes it instead of a number, as it does a
 ball.  Constants are the doubles of the equation, exactly.  What a comparison decides, and functions
 that are not in the list of `OPERATIONS`, cannot be written.
 """

@@ -39,7 +39,7 @@ from .premises import Premises, premises
 
 __all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
 
-FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not looked at
+FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
 NOT_CLOSED = (
     "that x stays in Omega, which (19) needs, is supposed and not shown: (36) holds only as far as "
@@ -100,7 +100,7 @@ class Closure:
 
 
 def closure(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants) -> Line:
-    """Return the line that tells whether \\|r\\| <= C_0 keeps the state in a box."""
+    """Return the line on whether \\|r\\| <= C_0 keeps the state in a box."""
     given = premises(constants, run.gains)
     C_0 = given.C_0(float(terms(run.signals, given).V[0]), float(np.max(run.signals["I"])))
     reach = _reach(run, given)
@@ -114,18 +114,21 @@ def closure(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants)
     names = coordinate_names(len(bounds))
     sides = [constants.box[x] for x in names]
     room = min(min(high, -low) - a for (low, high), a in zip(sides, bounds, strict=True))
-    here = f"C_0 = {C_0:.5g} gives {_told(bounds)}"
+    here = f"C_0 = {C_0:.5g} gives {_sides_text(bounds)}"
     if room >= 0:
         return _line("computed", room, f"on this box {here}")
     other = closed_set(constants, run.gains, reach, Q=float(np.max(run.signals["I"])))
     if other.status == "closes":
         v = "v in [{:.4g}, {:.4g}]".format(*constants.box["v"])
-        evidence = f"not on this box, where {here}, but on {_told(other.box)}, {v}, where C_0 = "
+        evidence = (
+            f"not on this box, where {here}, but on {_sides_text(other.box)}, {v}, where C_0 = "
+        )
         return _line("computed", other.room, f"{evidence}{other.C_0:.5g}")
     if other.status == "none closes":
         evidence = (
             f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{_weights(constants)}: each would "
-            f"hold {_told(other.box)}, where C_0 is {other.C_0:.4g} at least; on this box {here}"
+            f"hold {_sides_text(other.box)}, where C_0 is {other.C_0:.4g} at least; "
+            f"on this box {here}"
         )
         return _line("violated", other.room, evidence)
     return _line("undecided", room, f"does not close on this box: {here}; of others it is open")
@@ -143,7 +146,7 @@ def _line(status: Any, room: float, evidence: str) -> Line:
     )
 
 
-def _told(reach: Sequence[float]) -> str:
+def _sides_text(reach: Sequence[float]) -> str:
     names = coordinate_names(len(reach))
     return ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
 

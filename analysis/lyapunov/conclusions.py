@@ -42,13 +42,13 @@ class _Response:
 
 
 def slow_drift_of(run: MemberRun) -> SlowDrift | None:
-    """Return where the slow drift of zeta leads; None if the run does not tell."""
+    """Return where the slow drift of zeta leads; None if the run does not show it."""
     drift_or_reason = _slow_drift_or_reason(run)
     return None if isinstance(drift_or_reason, str) else drift_or_reason
 
 
 def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
-    """Return where the slow drift leads, or why that cannot be told."""
+    """Return where the slow drift leads, or why that is unknown."""
     length = run.signals.t[-1] - run.signals.t[0]
     if length < 6 * _WINDOW:
         return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"

@@ -154,8 +154,8 @@ class Conservatism:
             for c in self.comparisons
         ]
         lines.append(
-            f"second half: max |r| / lambda = {self.e_1:.5g}, a bound of limsup |e_1| if r goes on "
-            f"like that, and max |e_1| = {self.tail_max_e_1:.5g}"
+            f"second half: max |r| / lambda = {self.e_1:.5g}, a bound of limsup |e_1| if r "
+            f"continues like that, and max |e_1| = {self.tail_max_e_1:.5g}"
         )
         return "\n".join(lines)
 
@@ -178,7 +178,7 @@ def conservatism(
     Returns
     -------
     Conservatism
-        The terms of C_0, the run beside it, and bounds by direct comparison.
+        The terms of C_0, the run next to it, and bounds by direct comparison.
 
     Raises
     ------

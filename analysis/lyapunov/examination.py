@@ -35,7 +35,7 @@ U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
-    """Runs of the members; more than one are made anew at each iteration, one after the other.
+    """Runs of the members; more than one are repeated at each iteration, one after the other.
 
     Attributes
     ----------

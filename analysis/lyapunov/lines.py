@@ -149,7 +149,7 @@ class Line:
 
 
 def run_line(run: MemberRun) -> Line:
-    """Return the line that tells whether a run reached its horizon."""
+    """Return the line on whether a run reached its horizon."""
     horizon, reached = float(run.member.times[-1]), float(run.signals.t[-1])
     lost = run.lost is not None
     return Line(
@@ -165,7 +165,7 @@ def run_line(run: MemberRun) -> Line:
 
 
 def decay_line(run: MemberRun) -> Line:
-    """Return the line that tells whether V decays: every rate of (31) is positive."""
+    """Return the line on whether V decays: every rate of (31) is positive."""
     gains = run.gains
     rates = {"2 beta": 2 * gains.beta, "sigma_2 gamma": gains.sigma_2 * gains.gamma}
     if gains.W_hat_0:

@@ -147,7 +147,7 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     Returns
     -------
     Premises or None
-        With the printed numbers in the place of the derived ones.
+        With the printed numbers instead of the derived ones.
 
     Examples
     --------

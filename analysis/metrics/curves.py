@@ -1,7 +1,7 @@
 """What samples say of a signal between them: where a curve may be put through them, and which.
 
-A polynomial through samples says something only where the signal is smooth, and samples tell: each
-should lie where its neighbours say.  With up to 8 neighbours the *defect* of a sample is
+A polynomial through samples says something only where the signal is smooth, and samples show where:
+each should lie where its neighbours say.  With up to 8 neighbours the *defect* of a sample is
 
     r = y_k - p(t_k),     p the polynomial through the neighbours,
 

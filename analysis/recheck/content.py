@@ -1,4 +1,4 @@
-"""What stands in the file of a certificate, and the answer no."""
+"""What the file of a certificate holds, and the answer no."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class Filtered:
         self.Y_d = self.wanted[self.n] + sum(map(abs, error_terms), Fraction(0))
 
 
-def told_of_filter(whole: Record) -> str:
+def filter_text(whole: Record) -> str:
     """Return the starts, and what the reader compares with his loop, in words."""
     premise = whole.record("premises")
     gains, lambdas = premise.record("gains"), premise.numbers("lambdas")

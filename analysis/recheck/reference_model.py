@@ -80,7 +80,7 @@ class EnergyForm:
 
 
 class FollowedModel:
-    """A loop with a reference model, as it stands in the file."""
+    """A loop with a reference model, as the file has it."""
 
     def __init__(self, whole: Record) -> None:
         self.premise, self.proof = whole.record("premises"), whole.record("proof")
@@ -242,7 +242,7 @@ def reference_model_bounds(whole: Record) -> dict[str, Fraction]:
     return bounds | {"limsup |E_1|": loop.form.errors(end)[0]}
 
 
-def told_of_model(whole: Record) -> str:
+def model_text(whole: Record) -> str:
     """Return what the reader compares with his loop, in words."""
     premise = whole.record("premises")
     law, n = premise.record("weights"), len(premise.numbers("K"))

@@ -70,7 +70,7 @@ def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path)
 
 
 def labels(name: str, choices: Choices) -> Choice:
-    """Return a choice with its options as they stand in the file."""
+    """Return a choice with its options as the file has them."""
     for label in choices.weights:
         if label not in choices.options:
             raise unknown("option", label, choices.options, f"in the weights of '{name}'")

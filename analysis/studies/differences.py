@@ -133,7 +133,7 @@ def _table_differences(
     others = {finding.key: finding for finding in second.findings}
     for finding in first.findings:
         if finding.key not in others:
-            continue  # told with the findings
+            continue  # reported with the findings
         old, new = finding.tables, others[finding.key].tables
         for name in dict.fromkeys([*old, *new]):
             place = f"{finding.key}.{name}"

@@ -3,7 +3,7 @@
 study.toml           the study as it was run, with the settings of the command line
 run.json             where the files that it refers to are, and what all is computed from: `origin`
 rows/                the main table, see `nlctl.analysis.robustness.runs.store`
-KEY/finding.json     what one analysis found, its tables beside it in Parquet
+KEY/finding.json     what one analysis found, its tables next to it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
 contents.json        which files there are, with a key of each and of the page, see `whole`;
@@ -189,7 +189,7 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
     Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
-    note tells of those that have gone.
+    note names those that have gone.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
     if digest_of(as_json(result.plain())) != digest_of(as_json(content)):
         raise RunFolderError(
             f"'{folder / 'results.json'}' does not say what the parts of the run say: continue "
-            "with --resume, which makes it anew"
+            "with --resume, which makes it again"
         )
 
 
@@ -311,7 +311,7 @@ def received(folder: Path, *, trust: bool = False) -> Grant:
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
     """Return the own kinds that the study of a run names, and what is said of the others."""
     kinds, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
-    return kinds, [f"what it found is told without its figures: {p}" for p in problems]
+    return kinds, [f"what it found is reported without its figures: {p}" for p in problems]
 
 
 def _space(study: Study, quantities: pd.DataFrame) -> Space:

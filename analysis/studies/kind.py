@@ -1,7 +1,7 @@
 """What a kind of analysis is: one record, from its table in a study file to its part of the page.
 
 nlctl's own kinds are the modules of `nlctl.analysis.studies.kinds`.  A kind of one's own is a
-`Kind` in a file beside the study, or in an installed package; a study names it as it names its
+`Kind` in a file next to the study, or in an installed package; a study names it as it names its
 loop::
 
     [[analysis]]
@@ -93,7 +93,7 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
-    """What an analysis stands on while it runs.
+    """What an analysis uses while it runs.
 
     Attributes
     ----------
@@ -236,7 +236,7 @@ class Kind:
 
     Examples
     --------
-    A file ``failures.py`` beside the study has the kind, and the study names it.  A lag with
+    A file ``failures.py`` next to the study has the kind, and the study names it.  A lag with
     T = 0.5 s is at 1 - exp(-2) = 0.86 after 1 s, so that one corner of the box fails:
 
     >>> import tempfile
@@ -402,7 +402,7 @@ def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
-    """Return what stands in the place of an analysis that its `runs` or the loop do not admit.
+    """Return what replaces an analysis that its `runs` or the loop do not admit.
 
     What the study claims of it is neither shown nor refuted.
     """

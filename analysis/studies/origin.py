@@ -1,7 +1,7 @@
 """What results are computed from: study, equations, wiring, values, versions.
 
 The record is kept with a run (``run.json``), a key of it with every finding and all rows.  Whatever
-adds to a run or draws from it compares first: nothing is said of one loop beside the numbers of
+adds to a run or draws from it compares first: nothing is said of one loop next to the numbers of
 another one.
 """
 
@@ -76,7 +76,7 @@ def _compared_name(key: str, labels: Mapping[str, str]) -> str:
 def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared) -> str:
     """Return in words how the loops of a comparison differ from those of a record.
 
-    They are made anew when the comparison begins, hours later: what they read may have changed.
+    They are made again when the comparison begins, hours later: what they read may have changed.
     """
     end = float(prepared.experiment.timepts[-1])
     names = {_compared_name(key, labels): loop.system for labels, loop in prepared.loops}
@@ -98,7 +98,7 @@ def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
 
 
 def plain_study(study: Study) -> dict[str, Any]:
-    """Return a study as it stands in a record."""
+    """Return a study as a record has it."""
     return from_json(as_json(study.model_dump(mode="json", exclude_unset=True, exclude_none=True)))
 
 
@@ -121,7 +121,7 @@ def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what differs beside the diagrams."""
+    """Yield what differs besides the diagrams."""
     keys = dict.fromkeys([*before["study"], *now["study"]])
     changed = [key for key in keys if before["study"].get(key) != now["study"].get(key)]
     if changed:

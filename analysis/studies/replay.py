@@ -108,7 +108,7 @@ def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False)
     Returns
     -------
     Replay
-        What came out now beside the row of the folder, and what differs.
+        What came out now next to the row of the folder, and what differs.
 
     Raises
     ------

@@ -9,7 +9,7 @@ the model file is followed here.  Its controller is off for the first 0.001 s, w
 nothing.
 
 The exhaust is the one part that is not exact: its ratio arrives when gas that moves with 1/delay
-has gone a unit of way, with a delay that depends on the state.  Here it is looked at every 0.01 s,
+has gone a unit of way, with a delay that depends on the state.  Here it is read every 0.01 s,
 with the controller, and is straight in between (`Exhaust`); Simulink interpolates between its
 steps.
 """
@@ -118,7 +118,7 @@ def read(ways: Any, ratios: Any, way: Any) -> Any:
 
 @nlctl.record
 class Exhaust:
-    """Gas on its way, one unit long: what arrives at a look, and how it changes until the next."""
+    """Gas in transit, one unit long: what arrives at a look, and how it changes until the next."""
 
     inputs, outputs = ("ratio", "way", "pace"), ("arrives", "changes")
     states = (*(f"way{k}" for k in range(STORED)), *(f"ratio{k}" for k in range(STORED)))

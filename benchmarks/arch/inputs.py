@@ -1,6 +1,6 @@
-"""Inputs that are constant for a while, and tables that go on in straight lines.
+"""Inputs that are constant for a while, and tables that continue in straight lines.
 
-Plants of the competition take signals in pieces; their tables go on beyond their ends.
+Plants of the competition take signals in pieces; their tables continue beyond their ends.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Pieces:
     @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
-        """The value of the piece; it is looked at when a piece begins, and half of it is slack."""
+        """The value of the piece; it is read when a piece begins, and half of it is slack."""
         value = p.value[0]
         for k in range(1, len(p.value)):
             value = np.where(t >= (k - 0.5) * p.period, p.value[k], value)

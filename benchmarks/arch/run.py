@@ -40,7 +40,7 @@ suspect: 1.0 of a requirement that others needed many runs for."""
 
 
 @dataclass(frozen=True)
-class Found:
+class Outcome:
     """What the attempts of one row have come to."""
 
     simulations: tuple[int | None, ...]
@@ -68,7 +68,7 @@ def prepared(row: Row, loops: dict[Callable[[], Any], Prepared]) -> Prepared:
     return replace(loops[row.build], experiment=experiment)
 
 
-def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Found:
+def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Outcome:
     """Search a row again and again, each time with other random numbers."""
     counts, searchers, reasons, start = [], [], {}, time.perf_counter()
     for entropy in range(attempts):
@@ -85,7 +85,7 @@ def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Fou
         searchers += [] if first is None else [str(worst.searchers[first])]
         reasons |= dict.fromkeys(worst.without_derivative)
     seconds = time.perf_counter() - start
-    return Found(tuple(counts), tuple(searchers), seconds, tuple(reasons))
+    return Outcome(tuple(counts), tuple(searchers), seconds, tuple(reasons))
 
 
 def cell(result: tuple[int, float] | None) -> str:
@@ -103,7 +103,7 @@ def best_published(row: Row) -> float:
     return min(means, default=np.nan)
 
 
-def line(row: Row, outcome: Found, attempts: int) -> tuple[list[str], bool, bool]:
+def line(row: Row, outcome: Outcome, attempts: int) -> tuple[list[str], bool, bool]:
     """Return the cells of a row, whether all attempts falsified, and if the mean is the best."""
     falsified = outcome.falsified
     mean = float(np.mean(falsified)) if falsified else np.nan

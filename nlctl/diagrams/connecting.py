@@ -286,7 +286,7 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
 
 
 def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
-    """Return parts connected by maps in the place of a diagram: with its signals and parameters.
+    """Return parts connected by maps, to replace a diagram: with its signals and parameters.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from ..upstream.control_internals import current_parameters
 from ..upstream.systems import System
 from .third_party import declared_keys
 
-_MOST = 2000  # objects that are looked at
+_MOST = 2000  # objects that are visited
 _VALUES = (0.0, 0.25, 1.0)  # of states and inputs at which it is called
 _CONTAINERS = (tuple, list, set, frozenset)
 

@@ -1,6 +1,6 @@
 """What the parameters of a diagram hang on, to see at once that nothing has changed.
 
-To resolve them is python-control's work, block by block.  A run whose diagram stands as it stood at
+To resolve them is python-control's work, block by block.  A run whose diagram is unchanged since
 the run before takes what was resolved then.
 """
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .graph import SMALL, Expr, Graph, Untraceable
 
-_MOST = 2048  # elements of an array that are kept one by one
+_MOST = 2048  # elements of an array that are kept individually
 _TABLED = 256  # elements of a constant matrix beyond which each row is a table
 
 
@@ -34,7 +34,7 @@ def is_complex(value: object) -> bool:
 
 @dataclass(eq=False, repr=False)
 class Tracer:
-    """An array of expressions, in the place of an array of floats.
+    """An array of expressions, instead of an array of floats.
 
     One of its axes may be long: along it every cell is a vector (or a number that is repeated).
     Assigning to items changes it, as it changes an array.  A part of a short array is a view, as
@@ -338,7 +338,7 @@ def traced(graph: Graph, value: object) -> Tracer:
     if isinstance(value, Tracer):
         return value
     if isinstance(value, Special):
-        raise Untraceable(f"{type(value).__name__} in the place of an array")
+        raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, list | tuple):
         parts = [traced(graph, v) for v in value]
         if any(p.shape != parts[0].shape for p in parts):

@@ -32,7 +32,7 @@ SPECIAL = ("erf", "erfc")
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
-    """A function does what expressions cannot say: it is called as it stands instead."""
+    """A function does what expressions cannot say: it is called unchanged instead."""
 
 
 class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused)
@@ -137,7 +137,7 @@ class Graph:
         self._known: dict[Any, Expr] = {}
 
     def decided(self, condition: Expr) -> bool:
-        """Return whether a condition holds on this path; ask whoever traces if that is open."""
+        """Return whether a condition holds on this path; ask the tracer if that is open."""
         if condition.op == "const":
             return bool(condition.data)
         if condition in self.implied:

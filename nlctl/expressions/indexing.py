@@ -24,12 +24,12 @@ def _item(self: Tracer, key: Any) -> Any:
     if _is_mask(key):
         return Masked(self, key)
     if isinstance(key, Tracer) and key.shape:
-        return _each(self, key)
+        return _items_at(self, key)
     place = _open_place(key)
     return self.item_at(key) if place is None else _gathered(self, key, place)
 
 
-def _each(self: Tracer, places: Tracer) -> Tracer:
+def _items_at(self: Tracer, places: Tracer) -> Tracer:
     """Return elements at places that the state decides, one after the other."""
     items = [_item(self, k) for k in places.short().reshape(-1)]
     return traced(self.graph, items).reshape(places.shape + self.shape[1:])

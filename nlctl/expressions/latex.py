@@ -255,7 +255,7 @@ class LatexWriter:
 
 
 def _product(texts: list[str]) -> str:
-    """Return factors behind each other: a dot between numbers, a thin space beside words."""
+    """Return factors behind each other: a dot between numbers, a thin space next to words."""
     joined = texts[0]
     for text in texts[1:]:
         dot = text[:1].isdigit() or (text.startswith(r"\frac") and joined[-1:].isdigit())

@@ -31,7 +31,7 @@ def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
         elif all(quantities[arg].quotient is None for arg in node.args):
             quantities[node] = _Quantity(node, node)
         else:
-            quantities[node] = _made(graph, node, [quantities[arg] for arg in node.args])
+            quantities[node] = _quantity_of(graph, node, [quantities[arg] for arg in node.args])
     return _quotient(graph, quantities[result])
 
 
@@ -39,7 +39,7 @@ def _quotient(graph: Graph, quantity: _Quantity) -> Expr:
     return graph.const(0.0) if quantity.quotient is None else quantity.quotient()
 
 
-def _made(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
+def _quantity_of(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
     base = graph.op(node.op, *(part.base for part in parts))
 
     def quotient() -> Expr:

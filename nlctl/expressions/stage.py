@@ -1,6 +1,6 @@
-"""What a traced function finds in the place of NumPy, math and the builtins.
+"""What a traced function finds instead of NumPy, math and the builtins.
 
-Functions are not traced as they stand but as copies whose global names lead here.  What has no
+Functions are traced as copies whose global names lead here.  What has no
 place here refuses tracers, and the function is then called instead of traced.
 """
 
@@ -203,9 +203,9 @@ class Stage:
             return Ufunc(self.graph, real, self.for_numbers(real)) if is_written else (
                 self.for_numbers(real)
             )  # fmt: skip
-        return self._own(real) if self._is_known(real) else self.for_numbers(real)
+        return self._written(real) if self._is_known(real) else self.for_numbers(real)
 
-    def _own(self, real: Any) -> Callable[..., Any]:
+    def _written(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
 

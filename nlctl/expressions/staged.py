@@ -214,9 +214,9 @@ class Ufunc:
         if not holds_tracers([*arguments, *options.values()]):
             return self.plain(*arguments, **options)
         options = {k: unwrapped(v) for k, v in options.items()}
-        return of_ufunc(self.graph, self.real, self._own, arguments, options)
+        return of_ufunc(self.graph, self.real, self._written, arguments, options)
 
-    def _own(self, *arguments: Any) -> Any:
+    def _written(self, *arguments: Any) -> Any:
         if self.real in WRITTEN:
             return WRITTEN[self.real](self.graph, *arguments)
         name = UFUNC_OPERATIONS[self.real.__name__]

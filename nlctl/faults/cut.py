@@ -162,7 +162,7 @@ def _identifier(text: str) -> str:
 
 def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
     """Find the signal of a fault, and that of its condition."""
-    spot = _found(spots, fault.signal)
+    spot = _spot(spots, fault.signal)
     if fault.condition is None:
         return _Cut(fault=fault, spot=spot, watched=None)
     inside = f"{spot.diagram}." if spot.diagram else ""
@@ -173,7 +173,7 @@ def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
         for i, label in enumerate(part.input_labels):
             readable[label] = Spot(diagram="", side="external", position=i, label=label)
     try:
-        watched = _found(readable, fault.condition.signal)
+        watched = _spot(readable, fault.condition.signal)
     except UnknownNameError as error:
         raise UnknownNameError(
             f"{error} (the condition of a fault sees the signals of the diagram that the fault "
@@ -182,7 +182,7 @@ def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
     return _Cut(fault=fault, spot=spot, watched=watched)
 
 
-def _found(spots: Mapping[str, Spot], name: str) -> Spot:
+def _spot(spots: Mapping[str, Spot], name: str) -> Spot:
     """Return the signal that a name means: the full path, or the end of one; outputs first."""
     for side in ("external", "output", "input"):
         of_side = {n: s for n, s in spots.items() if s.side == side}

@@ -60,7 +60,7 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
     if op in _WHOLE:
         (z,) = numbers
         now = graph.op(op, z)
-        return _made(graph, now, z, [z], _within(graph, op, z, kept), kept)
+        return _side_of(graph, now, z, [z], _within(graph, op, z, kept), kept)
     if op in _QUOTIENTS:
         over, under = numbers
         z, rounding = graph.op("div", over, under), _QUOTIENTS[op]
@@ -69,11 +69,11 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
         now = graph.op("rint", graph.op("div", whole, under))  # as many as the operation takes off
         other = graph.op("sub", over, graph.op("mul", kept, under))
         value = graph.op("select", graph.op("eq", kept, now), rest, other)  # to the last digit
-        return _made(graph, now, z, [z], _within(graph, rounding, z, kept), value)
+        return _side_of(graph, now, z, [z], _within(graph, rounding, z, kept), value)
     return _of_sign(graph, op, numbers, kept)
 
 
-def _made(
+def _side_of(
     graph: Graph, now: Expr, level: Expr, parts: Sequence[Expr], margin: Expr, value: Expr
 ) -> Branch:
     extent = graph.const(0.0)
@@ -89,7 +89,7 @@ def _of_order(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bra
     way = graph.op("sub", graph.op("mul", graph.const(2.0), kept), one)
     margin = graph.op("mul", graph.op("mul", graph.const(_ORDERS[op]), way), level)
     value = graph.op("gt", kept, graph.const(0.5))
-    return _made(graph, now, level, numbers, margin, value)
+    return _side_of(graph, now, level, numbers, margin, value)
 
 
 def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Branch:
@@ -99,7 +99,7 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
     if op == "sign":
         at_zero = graph.op("neg", graph.op("absolute", level))
         margin = graph.op("select", graph.op("eq", kept, const(0.0)), at_zero, margin)
-        return _made(graph, graph.op("sign", level), level, [level], margin, kept)
+        return _side_of(graph, graph.op("sign", level), level, [level], margin, kept)
     below = graph.op("lt", level, const(0.0))
     now = graph.op("select", below, const(-1.0), const(1.0))
     if op == "heaviside":
@@ -111,7 +111,7 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
         left = graph.op("lt", other, const(0.0))
         angle = graph.op("arctan2", *numbers)
         value = graph.op("add", angle, graph.op("select", left, turned, const(0.0)))
-    return _made(graph, now, level, [level], margin, value)
+    return _side_of(graph, now, level, [level], margin, value)
 
 
 def _within(graph: Graph, rounding: str, z: Expr, kept: Expr) -> Expr:

@@ -53,12 +53,12 @@ def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
     """Return what gives some of the rows that expressions make up, and stands still behind them."""
     whole, rows = graph.joined(list(pieces)) if pieces else None, sum(size for _, size in pieces)
 
-    def found(start: int, step: int, size: int | None) -> Expr | None:
+    def rows_of(start: int, step: int, size: int | None) -> Expr | None:
         if whole is None or start >= rows:
             return None
         return graph.item(whole, start) if size is None else graph.part(whole, start, step, size)
 
-    return found
+    return rows_of
 
 
 def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: range) -> Direction:

@@ -42,9 +42,9 @@ class Fit:
     values : ndarray of shape (k,)
         The least squares.
     covariance : ndarray of shape (k, k)
-        From the Fisher matrix; infinite for what data do not tell.
+        From the Fisher matrix; infinite for what data do not determine.
     unidentifiable : tuple of str
-        Parameters that data do not tell, or not apart from each other.
+        Parameters that data do not determine, or not apart from each other.
     noise : float
         Standard deviation of the residuals, in units of `sigma`.
     freedom : int
@@ -234,10 +234,10 @@ def fit(
         search.residuals, start, derivatives, bounds, x_scale=np.where(start, abs(start), 1.0),
         xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=max_evaluations,
     )  # fmt: skip
-    return _found(search, optimum)
+    return _fit_of(search, optimum)
 
 
-def _found(search: _Search, optimum: Any) -> Fit:
+def _fit_of(search: _Search, optimum: Any) -> Fit:
     """Return what a search has led to."""
     residuals, jacobian = search.residuals(optimum.x), search.jacobian(optimum.x)
     freedom = residuals.size - optimum.x.size
@@ -306,7 +306,7 @@ class _Search:
         return self._last
 
     @property
-    def _known(self) -> np.ndarray:
+    def _has_datum(self) -> np.ndarray:
         return np.isfinite(np.stack(list(self.data.values())))
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
@@ -315,13 +315,13 @@ class _Search:
         try:
             values = self.response(x).values
         except (DivergedError, ParameterError):  # it ends before, or no block takes these values
-            return np.full(int(self._known.sum()), _LOST)
-        return np.nan_to_num((values - rows) / self.sigma[:, None], nan=_LOST)[self._known]
+            return np.full(int(self._has_datum.sum()), _LOST)
+        return np.nan_to_num((values - rows) / self.sigma[:, None], nan=_LOST)[self._has_datum]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return their derivatives; where there are none, 0."""
         derivatives = self.response(x).derivatives / self.sigma[:, None, None]
-        return np.nan_to_num(np.moveaxis(derivatives, 1, 2)[self._known])
+        return np.nan_to_num(np.moveaxis(derivatives, 1, 2)[self._has_datum])
 
 
 def _data(data: Any, times: np.ndarray, sigma: Any) -> dict[str, np.ndarray]:

@@ -97,7 +97,7 @@ def sensitivity_response(
     Warns
     -----
     InexactWarning
-        If a function is called as it stands: its derivatives are differences.
+        If a function is called unchanged: its derivatives are differences.
 
     Examples
     --------

@@ -73,7 +73,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     integrated = trajectory(differentiated.compiled, run.times, u, start, whole, run.settings)
     _audit(compiled, integrated, p, run)
     if integrated.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
-        _raise_own(compiled, run)
+        _raise_of_run(compiled, run)
     names = tuple(quantity.name for quantity in quantities)
     lacks = missing(differentiated, (compiled, names), integrated, (run.times, start, whole, u))
     return _response(differentiated, (signals, quantities), (run.times, integrated), scale, lacks)
@@ -179,7 +179,7 @@ def _audit(
     audit(compiled, trial, run.audit)
 
 
-def _raise_own(compiled: Compiled, run: RunWithDerivatives) -> None:
+def _raise_of_run(compiled: Compiled, run: RunWithDerivatives) -> None:
     """Raise the error of a run that does not reach its end, with its own words."""
     respond(
         compiled, run.times, run.inputs, run.initial_state, settings=run.settings,

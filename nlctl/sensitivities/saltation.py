@@ -76,7 +76,7 @@ class Cause:
 
 @dataclass(frozen=True, kw_only=True)
 class Saltation:
-    """What becomes of derivatives at conditions and resets.
+    """How derivatives jump at conditions and resets.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class Saltation:
         return self._differ([(e, piece) for e, piece in zip(exprs, flow, strict=True)])
 
     def at_touch(self) -> Expr:
-        """Return when a condition was first touched, where a level has turned."""
+        """Return when a condition was first touched, where a level has reversed."""
         graph, touched = self.source.graph, self.source.graph.const(False)
         for _, touch in self.turning:
             touched = graph.op("or", touched, touch)
@@ -205,7 +205,7 @@ class Saltation:
     def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
         """Return the derivative of a memory, which while it is carried along nobody keeps.
 
-        A step ends a little behind where it has turned.
+        A step ends a little behind where it has reversed.
         """
         graph = self.source.graph
         kept = self.sides.memories[m]

@@ -60,7 +60,7 @@ class EquationParts:
     owners : tuple of int
         The block of each switching function.
     p : ndarray
-        Parameters near which the equations are looked at.
+        Parameters near which the equations are evaluated.
     """
 
     equations: Equations

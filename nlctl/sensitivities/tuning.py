@@ -162,7 +162,7 @@ def tune(
     >>> print(found["plant.a"], round(found.margin, 4), round(1 - np.exp(-2) / 0.5, 4))
     2.0 0.7293 0.7293
     """
-    problem, start = _asked(
+    problem, start = _problem(
         diagram, (space, spec, cost, samples), (timepts, inputs, initial_state, params),
         {"rtol": rtol, "atol": atol, "max_steps": max_steps},
     )  # fmt: skip
@@ -170,7 +170,7 @@ def tune(
     starts = integer("tune", "starts", starts, at_least=1)
     runs = Runs(problem)
     message = _searched(runs, problem.cube(start), float(budget), starts, seed)
-    return _found(runs, start, message)
+    return _tuned(runs, start, message)
 
 
 class _SpentError(Exception):
@@ -213,7 +213,7 @@ def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
         lower_cost(worth_of, start)
 
 
-def _found(runs: Runs, first: np.ndarray, message: str) -> Tuned:
+def _tuned(runs: Runs, first: np.ndarray, message: str) -> Tuned:
     """Return what was found, with what each gain has bought."""
     problem, k, start = runs.problem, first.size, runs.problem.cube(first)
     best, without = _plainest(runs, start)
@@ -263,7 +263,7 @@ def _history(runs: Runs) -> Any:
     return pd.DataFrame(rows)
 
 
-def _asked(
+def _problem(
     diagram: Any, what: tuple[Any, ...], given: tuple[Any, ...], how: dict[str, Any]
 ) -> tuple[TuningProblem, np.ndarray]:
     """Return what is asked of runs, and the gains to start from."""
@@ -273,7 +273,7 @@ def _asked(
         diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
     margins = _margins(spec, cost)
     params, initial_state = dict(params or {}), dict(initial_state or {})
-    present = _own_values(diagram, params, initial_state)
+    present = _present_values(diagram, params, initial_state)
     rows = [_row(diagram, name, value, present) for name, value in _bounds(space)]
     start, low, high = np.array([row[1:] for row in rows], dtype=float).T
     problem = TuningProblem(
@@ -329,7 +329,7 @@ def _bounds(space: Any) -> list[tuple[str, Any]]:
     return rows
 
 
-def _own_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
+def _present_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
     """Return what parameters and initial states are before anything is tuned."""
     p = diagram.parameter_vector(params)
     present = {name: float(p[place]) for name, (place, _) in float_parameters(diagram).items()}

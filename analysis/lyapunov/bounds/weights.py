@@ -164,7 +164,7 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
 
     Examples
     --------
-    A larger sigma_1 makes weights dear: they become smaller than those that approximate best.
+    A larger sigma_1 makes weights costly: they become smaller than those that approximate best.
 
     >>> import dataclasses
     >>> import numpy as np

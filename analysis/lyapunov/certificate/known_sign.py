@@ -212,7 +212,7 @@ def _largest_input(subject: Subject, need: Demand, bound: _BoundOfR) -> float:
     return upper(loop.law.N_0 * (loop.law.beta * C_0 + s))
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
     bound = closed.bound
     return {
         "C_0": closed.proved(upper(bound.level)),
@@ -236,5 +236,5 @@ KNOWN_SIGN = ProofKind(
     bound=_bound,
     endless=_endless,
     largest_input=_largest_input,
-    found=_found,
+    fields=_fields,
 )

@@ -144,7 +144,7 @@ def _layer(subject: Subject, need: Demand) -> _Layer:
     return _Layer(level=start.max(rho), rho=rho, M=M, doubt="")
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
     loop, C_0 = subject.loop, closed.bound.level
     rest = (arb(0),) * len(loop.e0)
     end = _in_the_end(subject, closed.bound.rho) if closed.holds else C_0
@@ -182,5 +182,5 @@ SLIDING_MODE = ProofKind(
     region=_region,
     bound=_layer,
     largest_input=lambda subject, need, bound: subject.u_max,
-    found=_found,
+    fields=_fields,
 )

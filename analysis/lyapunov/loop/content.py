@@ -72,7 +72,7 @@ def _is_plain(system: Any) -> bool:
     """Whether a system computes what its class, its maps and its record say, and nothing else."""
     fields = {name: value for name, value in vars(system).items() if name not in _RECORDS}
     update, output = fields.pop("updfcn", None), fields.pop("outfcn", None)
-    if any(callable(value) for value in fields.values()):  # in the place of a method
+    if any(callable(value) for value in fields.values()):  # instead of a method
         return False
     if type(system) is Block:
         spec = system.spec

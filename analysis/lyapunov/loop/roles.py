@@ -110,7 +110,7 @@ def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
     if content not in _PURE:
         _check_functions(wiring)
         _PURE.add(content)
-    places = _found(wiring, pieces)
+    places = _places(wiring, pieces)
     named = {
         name: Signal(i, k)
         for i, place in enumerate(wiring.blocks)
@@ -178,7 +178,7 @@ def _check_functions_of_kind(place: Place) -> None:
             )
 
 
-def _found(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
+def _places(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
     """Return the block of every part."""
     places: dict[str, Place] = {}
     for place in wiring.blocks:
@@ -327,7 +327,7 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
     if type(spec) not in kinds:
         choices = " or ".join(kind.__name__ for kind in kinds)
         raise DiagramError(
-            f"the certificate is about a {choices} in the place of '{place.path}', "
+            f"the certificate is about a {choices} as '{place.path}', "
             f"got {type(spec).__name__}: put one there"
         )
 
@@ -344,7 +344,7 @@ class Parts:
     plant, actuator, filtered_error, robust, law : record
         With the parameters of the run.
     basis, weights : record or None
-        None where `nlctl.Zero` stands in the place of the network.
+        None where `nlctl.Zero` replaces the network.
     roles : Roles
         Places of the blocks in the diagram.
     gains : Gains

@@ -33,7 +33,7 @@ from .region import Region, region
 __all__ = ["MODEL_REFERENCE"]
 
 _LIMIT = 1e12  # a bound of V beyond which the iteration counts as without end
-_TIGHTER = 1e-3  # relative: the ultimate bound is looked at again as long as it falls by more
+_TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it falls by more
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
@@ -110,7 +110,7 @@ def _in_the_end(subject: Subject, bound: Decrease) -> Decrease:
     return bound
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
     bound, match, form = closed.bound, subject.matching, subject.loop.form
     end = _in_the_end(subject, bound) if closed.holds else bound
     Gamma, errors = ball(match.Gamma), tuple(map(upper, form.errors(bound.level)))
@@ -146,5 +146,5 @@ MODEL_REFERENCE = ProofKind(
     bound=_bound,
     endless=_endless,
     largest_input=lambda subject, need, bound: need.u,
-    found=_found,
+    fields=_fields,
 )

@@ -86,8 +86,8 @@ class SlowDrift:
         reverses before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as
-        they were.
+        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue
+        as they were.
     balance : Balance
         The law fitted to all windows.
     rest, rest_range : float or None, tuple of float or None
@@ -213,7 +213,7 @@ def slow_drift(
     skip: int = 1,
     kG: float = 1.0,
 ) -> SlowDrift:
-    """Tell from a response how the slow drift of zeta will go on.
+    """Predict from a response how the slow drift of zeta continues.
 
     The prediction supposes that disturbance and reference stay as they were; a chirp does not.
 
@@ -369,7 +369,7 @@ def _forecast(
     """Return how long the budget lasts, and the shortest and the longest time that it may.
 
     The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0.  Windows that saw little of the lobe
-    tell little of p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
+    say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
     """
     mean, centre = float(rates.mean()), float(inverse.mean())
     slope, of_slope, of_mean = _slope(rates, inverse)

@@ -59,7 +59,7 @@ class FilteredCertificate(Certificate):
         yield "delta*", need.delta_star, unit, self._sure, "sup |g + d| + G_max eps_u*", over
 
     def _numbers(self) -> tuple[Mapping[str, float], Content]:
-        """Return the gains, and the states by part, as they stand in a file."""
+        """Return the gains, and the states by part, as a file has them."""
         raise NotImplementedError
 
     def _attempts(self) -> Iterator[Content]:

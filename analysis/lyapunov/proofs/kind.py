@@ -39,7 +39,7 @@ class ProofOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Subject:
-    """What a proof is about, before a box is looked at.
+    """What a proof is about, before a box is examined.
 
     Attributes
     ----------
@@ -120,8 +120,8 @@ class ProofKind:
         ``endless(region, iterations)`` says why the iteration is given up; nothing if it is not.
     largest_input : callable, optional
         ``largest_input(subject, region, bound)`` returns a bound of |u|.
-    found : callable, optional
-        ``found(subject, closed)`` returns the fields of `result` that are its own.
+    fields : callable, optional
+        ``fields(subject, closed)`` returns the fields of `result` that are its own.
     """
 
     name: str
@@ -136,7 +136,7 @@ class ProofKind:
     bound: Callable[[Subject, Any], Any] | None = None
     endless: Callable[[Any, Sequence[float]], str] = _not_looked_at
     largest_input: Callable[[Subject, Any, Any], float] | None = None
-    found: Callable[[Subject, Closed], Mapping[str, Any]] | None = None
+    fields: Callable[[Subject, Closed], Mapping[str, Any]] | None = None
 
 
 def certified(kind: Any, loop: Any, options: ProofOptions) -> Certificate:
@@ -158,7 +158,7 @@ def certified(kind: Any, loop: Any, options: ProofOptions) -> Certificate:
         arithmetic=closed.region.arithmetic,
         params=dict(options.params or {}),
         loop_facts=dict(subject.loop.content.facts),
-        **kind.found(subject, closed),
+        **kind.fields(subject, closed),
         seconds=time.perf_counter() - begun,
     )
 

@@ -78,7 +78,7 @@ def texts(values: Iterable[Any]) -> list[str]:
 
 
 def split_content(split: Decomposition) -> Content:
-    """Return the split of an actuator as it stands in a file."""
+    """Return the split of an actuator as a file has it."""
     endless = split.largest_u == float("inf")
     return {
         "k_1": str(exact(split.k_1)),

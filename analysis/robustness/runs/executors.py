@@ -181,7 +181,7 @@ def _failure(future: Future) -> BaseException | None:
 
 
 def _raise(numbers: range, error: BaseException) -> None:
-    """Raise what ended a chunk; a lost worker is told from an error of the experiment."""
+    """Raise what ended a chunk; a lost worker is distinguished from an error of the experiment."""
     # Dask's errors are known by their names: it need not be installed
     if isinstance(error, BrokenExecutor | CancelledError) or "Killed" in type(error).__name__:
         raise LostChunkError(

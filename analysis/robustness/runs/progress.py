@@ -46,7 +46,7 @@ class Progress:
     >>> now.remaining  # 700 rows at 100 a second
     7.0
     >>> low, high = now.interval(confidence=0.99)
-    >>> low, 0.015 < high < 0.05  # wider than 1 - 0.01^(1/300), which may be looked at once only
+    >>> low, 0.015 < high < 0.05  # wider than 1 - 0.01^(1/300), which may be inspected once only
     (0.0, True)
     """
 
@@ -64,7 +64,7 @@ class Progress:
 
     @as_annotated
     def interval(self, confidence: float = 0.99) -> tuple[float, float] | None:
-        """Return bounds of the probability of a violation that may be looked at any time.
+        """Return bounds of the probability of a violation that may be inspected at any time.
 
         See `sequential.sequence_bounds`.
 

@@ -220,7 +220,7 @@ def put(store: ChunkStore, frame: pd.DataFrame) -> None:
 
 
 def _seal(column: Any) -> str:
-    """Return a key of a column's values, which whoever edits the file does not keep."""
+    """Return a key of a column's values, which an edit of the file changes."""
     is_number = isinstance(column.dtype, np.dtype) and column.dtype.kind in "iufb"
     text = b"" if is_number else "\0".join(map(str, column)).encode()
     return hashlib.sha256(column.to_numpy().tobytes() if is_number else text).hexdigest()[:16]
@@ -291,7 +291,7 @@ def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.Data
             raise ValueError("they hold other rows than their names say")
         return frame
     except (OSError, ValueError, LookupError, TypeError) as error:
-        reason = str(error).partition("\n")[0]  # pyarrow's go on with every column
+        reason = str(error).partition("\n")[0]  # pyarrow's list every column
         raise StoreError(
             f"cannot read the chunks in '{store.chunks}': {reason}. Run damaged ones again with "
             "resume=True (--resume)"

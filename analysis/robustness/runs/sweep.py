@@ -251,11 +251,15 @@ def sweep(
         interrupt = stack.enter_context(gentle_interrupt())
         tally.restart()
         run = _Run(tally=tally, interrupt=interrupt, progress=progress, stop=stop)
-        todo = tally.missing(chunk)
+        todo, more = tally.missing(chunk), run.wants_more
         chunks = (
-            computed_here(prepared, design, todo, run.wanted, threads=threads, progress=run.tell)
+            computed_here(
+                prepared, design, todo, run.wants_more, threads=threads, progress=run.report
+            )
             if executor is None
-            else computed_elsewhere(executor, prepared, design, todo, run.wanted, threads=threads)
+            else computed_elsewhere(
+                executor, prepared, design, todo, run.wants_more, threads=threads
+            )
         )
         notes += run.through(stack.enter_context(closing(chunks)), keep)
     held = None
@@ -314,7 +318,7 @@ def _continued(store: ChunkStore, tally: Tally) -> list[str]:
 
 @dataclass(kw_only=True)
 class _Run:
-    """A sweep on its way: counts, and reasons to end it."""
+    """A running sweep: counts, and reasons to end it."""
 
     tally: Tally
     interrupt: Interrupt
@@ -322,11 +326,11 @@ class _Run:
     stop: Callable[[Progress], Any] | None
     decided: Any = None
 
-    def wanted(self) -> bool:
+    def wants_more(self) -> bool:
         """Whether another chunk should begin."""
         return not (self.interrupt.asked or self.decided)
 
-    def tell(self, unfinished: int = 0) -> None:
+    def report(self, unfinished: int = 0) -> None:
         """Report the progress."""
         if self.progress is not None:
             self.progress(self.tally.progress(unfinished))
@@ -342,13 +346,13 @@ class _Run:
         keep: Callable[[pd.DataFrame], object],
     ) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
-        self.tell()
+        self.report()
         self.consider()
         try:
             for numbers, frame in chunks:
                 keep(frame)
                 self.tally.count(numbers, frame["spec"].to_numpy())
-                self.tell()
+                self.report()
                 self.consider()
         except LostChunkError as lost:
             return [str(lost)]

@@ -18,7 +18,7 @@ from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
 __all__ = [
-    "Found",
+    "Search",
     "corner_count",
     "evolve",
     "in_batches",
@@ -42,7 +42,7 @@ EXTREME = 1e9
 """CMA-ES, which needs finite numbers, sees margins up to this size."""
 
 
-class Found:
+class Search:
     """The rows that were run so far."""
 
     def __init__(self, evaluate: Evaluate, space: Space, runs: int, target: float | None) -> None:
@@ -84,7 +84,7 @@ class Found:
         return margins
 
 
-def search_worst(search: Found, rng: np.random.Generator) -> None:
+def search_worst(search: Search, rng: np.random.Generator) -> None:
     """Run rows until the budget is spent or the target met; see `worst_case.worst_case`."""
     space = search.space
     is_finite = not space.quantities or space.scale == 0  # the corners are everything
@@ -121,7 +121,7 @@ def uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
     return from_unit_cube(space, rng.random((count, len(space.names))))
 
 
-def in_batches(search: Found, searcher: str, table: pd.DataFrame) -> None:
+def in_batches(search: Search, searcher: str, table: pd.DataFrame) -> None:
     """Run rows of a table until the target is met."""
     for first in range(0, len(table), BATCH):
         if search.left:
@@ -129,7 +129,7 @@ def in_batches(search: Found, searcher: str, table: pd.DataFrame) -> None:
 
 
 def evolve(
-    search: Found, rng: np.random.Generator, size: int, *, is_first: bool, most: int | None = None
+    search: Search, rng: np.random.Generator, size: int, *, is_first: bool, most: int | None = None
 ) -> None:
     """One search by CMA-ES with `size` rows in a generation, and `most` generations."""
     space, d = search.space, len(search.space.quantities)

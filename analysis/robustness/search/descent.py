@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..uncertainty.space import Space, from_unit_cube
-from .candidates import GENERATION, Found, evolve, in_batches, some_corners, uniform, unit_places
+from .candidates import GENERATION, Search, evolve, in_batches, some_corners, uniform, unit_places
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 __all__ = ["search_with_derivatives", "test_signals"]
@@ -34,7 +34,7 @@ _PIECE = re.compile(r"(.*)\[(\d+)\]")
 
 
 def search_with_derivatives(
-    search: Found, rng: np.random.Generator, derivatives: FirstOrderOf
+    search: Search, rng: np.random.Generator, derivatives: FirstOrderOf
 ) -> list[str]:
     """Run rows until the budget is spent or the target met; return why derivatives ended."""
     reasons: dict[str, None] = {}
@@ -90,7 +90,7 @@ def test_signals(space: Space) -> np.ndarray:
 
 
 def _descend(
-    search: Found, derivatives: FirstOrderOf, reasons: dict[str, None], first: int
+    search: Search, derivatives: FirstOrderOf, reasons: dict[str, None], first: int
 ) -> None:
     """Go down from the worst row since the first one, by linear programs in shrinking boxes."""
     if not search.left or not np.isfinite(search.margins[first:]).any():
@@ -110,7 +110,7 @@ def _descend(
 
 
 def _step(
-    search: Found, model: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
+    search: Search, model: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
 ) -> tuple[int, float] | None:
     """Run rows that the first order calls lower until one is; return it and the next radius."""
     space = search.space

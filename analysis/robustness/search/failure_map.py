@@ -28,7 +28,7 @@ CLOSE = 0.5
 _FINEST = 30
 """Divisions beyond which the finest cells are no wider than rounding."""
 _WORK = 40
-"""What a point of the first grid takes beside its row, in numbers."""
+"""What a point of the first grid takes next to its row, in numbers."""
 NEW = 5
 """Points that the refinement of a cell adds at most."""
 

@@ -25,7 +25,7 @@ __all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
 _NESTED = 60  # arguments of a largest value of windows that are followed
-_TIMES = 400  # samples that are looked at
+_TIMES = 400  # samples that are examined
 
 
 @dataclass(frozen=True, kw_only=True)

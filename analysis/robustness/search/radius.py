@@ -51,7 +51,7 @@ class Radius:
         How likely a violation is at the size `searched`, from independent draws of the laws of
         that size, which took no part in the search.
     largest : float
-        Largest size that may be looked at.
+        Largest size that may be tried.
     notes : tuple of str
         Why it is the largest, and why there is no statement.
     steps : pandas.DataFrame

@@ -14,7 +14,7 @@ from nlctl.wording import counted
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
-from .candidates import Found, corner_count, search_worst
+from .candidates import Search, corner_count, search_worst
 from .descent import search_with_derivatives
 from .evaluation import Evaluate, margins_of, row_text
 from .first_order import FirstOrderOf
@@ -187,7 +187,7 @@ def worst_case(
     if target is not None and not (isinstance(target, float) and np.isinf(target)):
         number("a worst case", "target", target)
     entropy = checked_entropy(entropy)
-    search = Found(evaluate, space, runs, target)
+    search = Search(evaluate, space, runs, target)
     is_finished, reasons = True, []
     try:
         if derivatives is None:

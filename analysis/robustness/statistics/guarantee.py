@@ -101,7 +101,7 @@ class Violation:
         """What is known of the probability, in words, without method and assumptions.
 
         Runs that violate are evidence of a lower bound, the others of an upper one; what there is
-        evidence of is told, also where only the other side was asked for.
+        evidence of is stated, also where only the other side was asked for.
         """
         low, high = rounded_down(self.singly[0]), rounded_up(self.singly[1])
         confidence = f"confidence {100 * self.confidence:.10g} %"
@@ -312,7 +312,7 @@ def violation_probability(
         raise NoGuaranteeError(
             f"the bound holds for a number of runs that was fixed in advance, {design.size}, and "
             f"{n} are done: finish them, or use sequential.confidence_sequence, which may be "
-            "looked at any time"
+            "inspected at any time"
         )
     lower, upper = clopper_pearson(k, n, confidence, side)
     single = (

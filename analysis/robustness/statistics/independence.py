@@ -8,7 +8,7 @@ from scipy import special, stats
 __all__ = ["independence_test"]
 
 MOST_TABLES = 200_000
-"""So many tables are gone through, one by one; of more, so many are drawn."""
+"""Up to so many tables are enumerated; of more, so many are drawn."""
 PERMUTATIONS = 99_999
 LARGE = 20.0
 """From this expected number on in every field the chi-square law is as good as exact."""

@@ -143,7 +143,7 @@ def check_keyword(function: Callable[..., Any], name: str) -> None:
 def diagrams(
     space: Space, build: Callable[..., ct.InputOutputSystem]
 ) -> list[tuple[Mapping[str, str], ct.InputOutputSystem]]:
-    """Build the diagram of every combination of the choices, and hold the space against each.
+    """Build the diagram of every combination of the choices, and check the space against each.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def record_file() -> Path:
 
 
 def study_digest(data: Mapping[str, Any]) -> str:
-    """Return a key of what stands in a study file."""
+    """Return a key of the content of a study file."""
     text = json.dumps(as_json(data), sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -9,7 +9,7 @@ may run without being asked is what makes loops of nlctl's blocks:
   makes systems, `SYSTEMS`.
 
 Anything else needs the trust of this user, see `record`; so does all but the first of these in a
-folder of results, which is data that somebody may have sent.  It is looked at twice: what is named,
+folder of results, which is data that somebody may have sent.  It is checked twice: what is named,
 before anything is imported, and where it was defined, before anything is called.  Whatever is
 trusted, a loop's function is called only if it can be one that returns a diagram.
 """
@@ -57,7 +57,7 @@ __all__ = [
 Reach = Literal["nlctl", "study", "all"]
 """What may run unasked: nlctl's own code, the study's folder and packages as well, or anything."""
 
-MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
+MAKERS = ("control", "nlctl")  # a function that makes a diagram calls one of these
 _ABOUT_LOOPS = "nlctl.analysis"  # and not of this one
 MADE_OF = tuple(
     f"nlctl.{room}"

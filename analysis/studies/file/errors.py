@@ -200,7 +200,7 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
 
 
 def _text(value: object) -> str:
-    """Return a value as it stands in the file; not an integer of thousands of digits."""
+    """Return a value as the file has it; not an integer of thousands of digits."""
     if isinstance(value, int) and abs(value) > _LARGEST:
         return f"an integer of {value.bit_length()} bits"
     return repr(value)

@@ -1,4 +1,4 @@
-"""TOML within limits: whatever stands in a file, it is read or refused at once."""
+"""TOML within limits: whatever a file holds is read or refused at once."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def study_text(content: bytes) -> str:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Return what stands in a text."""
+    """Return the data of a text."""
     if len(text) > _LARGEST:
         raise ValueError(f"has {len(text):,} characters, a study at most {_LARGEST:,}")
     lines = text.split("\n")

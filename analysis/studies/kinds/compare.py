@@ -156,7 +156,7 @@ def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
         lacking = [signal for signal in requirement.signals if signal not in signals]
         if lacking:
             raise ParameterError(
-                f"requirement '{requirement.key}' looks at '{lacking[0]}', which not every option "
+                f"requirement '{requirement.key}' reads '{lacking[0]}', which not every option "
                 "has: name those that count with requirements = [...]"
             )
     metrics = metrics_of(study, setup.folder, signals)

@@ -66,8 +66,8 @@ class Faults(Asked):
     )
     detects: dict[str, str] = Field(
         {},
-        description="What tells of a fault: formulas by name, such as bounds of the ledger. "
-        "When each is violated is told; none is part of the spec.",
+        description="What detects a fault: formulas by name, such as bounds of the ledger. "
+        "When each is violated is reported; none is part of the spec.",
     )
 
     @property
@@ -114,7 +114,7 @@ def _experiment(asked: Faults, setup: Setup) -> Experiment:
 
 
 def _detectors(asked: Faults, experiment: Experiment) -> tuple[Requirement, ...]:
-    """Return what tells of a fault, as requirements that the spec does not have."""
+    """Return the detectors of faults, as requirements that the spec does not have."""
     end = float(experiment.timepts[-1])
     return tuple(
         Requirement(key=name, formula=parse_formula(formula), until=end)
@@ -190,7 +190,7 @@ def _run(asked: Faults, ground: Ground) -> Finding | None:
     )
     watched = (*setup.experiment.spec.requirements, *_detectors(asked, setup.experiment))
     effects = effects.join(_times(prepared, table, watched)).rename_axis("row")
-    return _found(asked, effects)
+    return _finding(asked, effects)
 
 
 def _times(
@@ -228,7 +228,7 @@ def _violating(effects: pd.DataFrame) -> pd.DataFrame:
     return effects.loc[violates(effects["margin"])]
 
 
-def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
+def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
     """Return what the effects say, in a sentence, and the answer to the claim."""
     single, pairs = _single(effects), _pairs(effects)
     bad, bad_pairs = _violating(single), _violating(pairs)
@@ -403,7 +403,7 @@ def _effects(
 
 
 def _after(time: float, onset: float, step: float) -> str:
-    """Return the time from the onset to a violation, which samples tell to within a `step`.
+    """Return the time from the onset to a violation, which samples give to within a `step`.
 
     One before the onset has nothing to do with the fault.
     """

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RADIUS"]
 
-SIZES = 12  # that the search looks at, roughly
-_CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
+SIZES = 12  # that the search tries, roughly
+_CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
 _SMALLEST = " Dashed: the smallest size with a violation."
 
 
@@ -111,9 +111,9 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
 
 
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
-    """Yield which sizes were looked at, and the row at the edge of the smallest violation."""
+    """Yield which sizes were tried, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
-    if n["upper"] == 0:  # the nominal values violate: no other size was looked at
+    if n["upper"] == 0:  # the nominal values violate: no other size was tried
         yield from found_rows({"violating row": n["witness"]}, result.quantities, key)
         return
     listed = ", ".join(

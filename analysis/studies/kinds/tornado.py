@@ -111,7 +111,7 @@ def _gradient(
     asked: Tornado, experiment: Experiment, loop: Compiled, varied: list[Uncertain]
 ) -> tuple[MetricGradient, str]:
     """Return the derivatives of the nominal run, and by what there are none."""
-    metrics = _asked_of(asked, experiment)
+    metrics = _metrics_of(asked, experiment)
     given = arguments(experiment.space, pd.DataFrame([nominal(experiment.space)]))
     one = {part: {name: v[0] for name, v in lack.items()} for part, lack in given.items()}
     signals = list(dict.fromkeys(s for m in metrics for s in m.signals))
@@ -157,7 +157,7 @@ def _with_gaps(gradient: MetricGradient, names: list[str]) -> MetricGradient:
     )  # fmt: skip
 
 
-def _asked_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
+def _metrics_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
     """Return the requirement or metric of a column; of the spec all requirements."""
     requirements = experiment.spec.requirements
     if asked.of == "spec":

@@ -137,7 +137,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
     space = prepared.experiment.space
     design = independent(ground.prepared.experiment.space, asked.runs, ground.seed)
     drawn = design.table.rename(
-        columns=dict(zip(design.space.names, _own(space, asked), strict=True))
+        columns=dict(zip(design.space.names, _varied_names(space, asked), strict=True))
     )
     both = [drawn.assign(**dict(zip(tuned.names, values, strict=True)))
             for values in (tuned.start, tuned.values)]  # fmt: skip
@@ -166,7 +166,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
     )
 
 
-def _own(space: Space, asked: Tuning) -> list[str]:
+def _varied_names(space: Space, asked: Tuning) -> list[str]:
     """Return the names of what the study varies itself, as in the space with the gains."""
     quantities = [q.name for q in space.quantities]
     return [*quantities[: -len(asked.gains)], *(c.name for c in space.choices)]
@@ -255,7 +255,7 @@ def _requirements(tuned: Tuned) -> pd.DataFrame:
 
 
 def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
-    """Return what the spec looks at over time, at nominal values, before and after."""
+    """Return what the spec reads over time, at nominal values, before and after."""
     experiment, space = prepared.experiment, prepared.experiment.space
     ends = np.stack([tuned.start, tuned.values], axis=1)
     gains = dict(zip(tuned.names, ends, strict=True))
@@ -311,7 +311,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         description=f"{_FRESH} Median before {np.median(margins[0]):.4g}, after "
         f"{np.median(margins[1]):.4g}.", figure=figures.margins_of_both(*margins),
     )  # fmt: skip
-    yield _asked_table(tables["requirements"])
+    yield _requirements_table(tables["requirements"])
     yield Figure(
         key=f"{key}-tried", caption=_TRIED + text.clipped(tables["tried"]["margin"]),
         description=f"{_TRIED} Runs as counted: {n['counted_runs']:.0f}.",
@@ -319,7 +319,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     )  # fmt: skip
 
 
-def _asked_table(requirements: pd.DataFrame) -> Table:
+def _requirements_table(requirements: pd.DataFrame) -> Table:
     return Table(
         caption="What was asked, on the samples that gains were found on: least margins, and the "
         "mean of a metric.",

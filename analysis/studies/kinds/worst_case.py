@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["WORST_CASE"]
 
-SEARCH = "Lowest margin after each run of the search; the background tells what chose the run."
+SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
 ZELLER = (
     "A. Zeller, R. Hildebrandt: Simplifying and isolating failure-inducing input. IEEE Trans. "
     "Softw. Eng. 28 (2002) 183–200. doi 10.1109/32.988498."

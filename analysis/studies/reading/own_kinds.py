@@ -50,7 +50,7 @@ def model_of(own: Mapping[str, Kind]) -> type[Study]:
 def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:
     """Return the kinds that a study file names by their place, and the mistakes among them.
 
-    The files and modules that they stand in are run, see `code.rule`.
+    The files and modules that have them are run, see `code.rule`.
     """
     named = list(_named(data))
     problems = untrusted(named, grant)

@@ -36,7 +36,7 @@ from .validate import checked_experiment
 __all__ = ["StudyFile", "read_study"]
 
 _ROUNDS = 5  # mistakes may stand behind mistakes
-STAND_INS = {  # while the rest of a mistaken file is looked at
+STAND_INS = {  # while the rest of a mistaken file is validated
     "study": {"title": "a study", "seed": 0},
     "time": {"end": 1e5, "step": 0.1},  # formulas look ahead by less
     "spec": {},
@@ -78,7 +78,7 @@ def read_study(
     path : str or Path
         The study file, in TOML.
     settings : sequence of str, optional
-        ``key=value`` that replace what stands there: ``runs.size=100``,
+        ``key=value`` that replace what the file has: ``runs.size=100``,
         ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.
     folder : str or Path, optional
         What paths in the study are relative to; by default the file's folder.

@@ -264,7 +264,7 @@ def _check_analyses(
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
         if asked.definition.needs_rows and study.runs is None and "runs" not in tables:
-            notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
+            notes.add(("analysis", i), f"'{asked.kind}' needs the main table: add [runs]")
         certain = tables["spec"] and metrics is not None
         named = _named(asked, asked.definition.columns) if certain else []
         for key, name in named:
@@ -299,7 +299,7 @@ def _count(rows: int) -> str:
 
 
 def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Notes) -> None:
-    """Make designs that are known in advance, unless too large; hold the analyses against them."""
+    """Make designs that are known in advance, unless too large; check the analyses against them."""
     if study.runs is not None and ("runs",) not in large:
         mistakes = size_mistakes(study.runs)
         for key, mistake in mistakes.items():
@@ -319,7 +319,7 @@ def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Note
 
 
 def _named(asked: Asked, keys: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the names that stand under some keys of an analysis, each with its key."""
+    """Return the names that some keys of an analysis, each with its key."""
     names = []
     for key in keys:
         value = getattr(asked, key)

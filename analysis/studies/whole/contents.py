@@ -1,6 +1,6 @@
 """Whether a run folder is whole: one sealed record of every file, which every reader checks first.
 
-``contents.json`` is written last, when a run ends, and taken away when it goes on.  It says which
+``contents.json`` is written last, when a run ends, and removed when it continues.  It says which
 files there are, with a key of each, how many rows and which columns each table has, which analyses
 are expected, and which page was made of them: whatever a copy lost, a disk damaged or somebody
 edited is named.
@@ -25,7 +25,7 @@ __all__ = ["CONTENTS", "check_whole", "is_part", "problems_in", "seal", "sealed_
 CONTENTS = "contents.json"
 _LONGEST = 200  # characters of names in a message
 _AT_TOP = ("study.toml", "run.json", "results.json")
-REMEDY = "continue the run with --resume, which makes it anew, or take an intact copy"
+REMEDY = "continue the run with --resume, which makes it again, or take an intact copy"
 
 
 def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> None:
@@ -112,7 +112,7 @@ def sealed_record(folder: Path) -> dict[str, Any]:
         )
     if not path.exists():
         raise RunFolderError(f"'{folder}' holds no run of a study: there is no '{CONTENTS}'")
-    return shaped(path, ContentsFile, "continue the run with --resume, which makes it anew")
+    return shaped(path, ContentsFile, "continue the run with --resume, which makes it again")
 
 
 def problems_in(folder: Path, content: dict[str, Any]) -> Iterator[str]:

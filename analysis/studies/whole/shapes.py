@@ -1,4 +1,4 @@
-"""What stands in the JSON files of a run folder: the shapes that they are validated against.
+"""The shapes that the JSON files of a run folder are validated against.
 
 A file may be whole and carry the right key, and yet be of another version or made by hand.
 """
@@ -104,7 +104,7 @@ class _Metric(_File):
     meaning: _Text
 
 
-class _Found(_File):
+class _FindingHead(_File):
     key: _Key
     kind: _Text
     title: _Text
@@ -117,11 +117,11 @@ class _Found(_File):
     is_answered: _Some
 
 
-class _Listed(_Found):
+class _Listed(_FindingHead):
     tables: list[_Key]
 
 
-class FindingFile(_Found):
+class FindingFile(_FindingHead):
     """``KEY/finding.json``."""
 
     tables: dict[_Key, _Digest]

@@ -83,7 +83,7 @@ class ComplexPair(Special):
         return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
     def _text(self, *_: Any) -> Any:
-        raise Untraceable("a complex number in the place of a real one")
+        raise Untraceable("a complex number instead of a real one")
 
     __bool__ = __float__ = __str__ = __repr__ = __format__ = _text
 
@@ -210,7 +210,7 @@ ComplexPair.__matmul__ = lambda self, other: paired_product(self.graph, self, ot
 ComplexPair.__rmatmul__ = lambda self, other: paired_product(self.graph, other, self)  # type: ignore[attr-defined]
 
 
-def made(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
+def complex_number(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
     """Return ``complex(real, imag)``."""
     if isinstance(real, ComplexPair):
         return real
@@ -228,7 +228,7 @@ def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
 def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a discrete Fourier transform, by its matrix."""
 
-    def own(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
+    def written(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
         z = paired(graph, values)
         if z.ndim != 1 or n is not None or norm is not None or axis not in (0, -1):
             raise Untraceable("a Fourier transform with other arguments")
@@ -239,12 +239,12 @@ def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
             return ComplexPair(graph, real(z.real), imag(z.real))
         return ComplexPair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
 
-    return own
+    return written
 
 
 for _function in (np.fft.fft, np.fft.ifft):
     enter([_function], _transform(_function))
-enter([complex], made)
+enter([complex], complex_number)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))
 enter([cmath.log], lambda graph, z: _log(graph, paired(graph, z)))

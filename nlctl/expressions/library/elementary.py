@@ -143,13 +143,13 @@ def ldexp(np: Facade, x: Any, n: Any) -> Any:
 
 
 def _of_two(name: str) -> Any:
-    def own(graph: Graph, a: Any, b: Any) -> Tracer:
+    def written(graph: Graph, a: Any, b: Any) -> Tracer:
         a, b = traced(graph, a), traced(graph, b)
         both = elementwise(graph, name, a, b)
         without_nan_in_a = elementwise(graph, "select", elementwise(graph, "ne", a, a), b, both)
         return elementwise(graph, "select", elementwise(graph, "ne", b, b), a, without_nan_in_a)
 
-    return own
+    return written
 
 
 of(np.fmax)(_of_two("maximum"))

@@ -44,7 +44,7 @@ def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
 
 
 class Namespace(dict[str, Any]):
-    """Builtins of the copies of functions that are traced: it tells these from other code."""
+    """Builtins of the copies of functions that are traced, known by it from other code."""
 
 
 class Builtins:

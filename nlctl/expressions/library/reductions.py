@@ -51,7 +51,7 @@ def _numbers(graph: Graph, row: Sequence[Expr]) -> list[Expr]:
 
 
 def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
-    def own(
+    def written(
         graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False, initial: Any = None
     ) -> Any:
         def of_row(row: Sequence[Expr]) -> Expr:
@@ -69,7 +69,7 @@ def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 def ignoring_nan(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
@@ -193,7 +193,7 @@ def _is_true(graph: Graph, e: Expr) -> Expr:
 
 
 def _of_truths(name: str, start: bool) -> Callable[..., Any]:
-    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
         if isinstance(values, Masked):
             values = values.filled(start)
 
@@ -204,7 +204,7 @@ def _of_truths(name: str, start: bool) -> Callable[..., Any]:
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 any_of = of(np.any)(_of_truths("or", False))
@@ -225,7 +225,7 @@ def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
 def _first(name: str) -> Callable[..., Any]:
     """Return what finds the first of the largest or smallest; NaN is beyond all."""
 
-    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
+    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
         def of_row(row: Sequence[Expr]) -> Expr:
             best, place = _numbers(graph, row)[0], graph.const(0)
             for k, e in enumerate(_numbers(graph, row)[1:], start=1):
@@ -239,7 +239,7 @@ def _first(name: str) -> Callable[..., Any]:
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 argmax = of(np.argmax)(_first("gt"))

@@ -40,14 +40,14 @@ _COMPUTING = (
 def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy that moves elements; a view where NumPy's is one."""
 
-    def own(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
         owners: list[Tracer] = []
         given = [_opened(v, owners) for v in arguments]
         named = {k: _opened(v, owners) for k, v in options.items()}
         long = next((a for a in owners if a.axis is not None or a.origin is not None), None)
         return _closed(graph, function(*given, **named), long)
 
-    return own
+    return written
 
 
 def _opened(value: object, owners: list[Tracer]) -> Any:

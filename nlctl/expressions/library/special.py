@@ -130,12 +130,12 @@ _FORMULAS = {
 
 
 def _whole(name: str) -> Any:
-    def own(graph: Graph, x: Any) -> Any:
+    def written(graph: Graph, x: Any) -> Any:
         value = traced(graph, x)
         _finite(graph, value)
         return whole_numbers(graph, elementwise(graph, name, value))
 
-    return own
+    return written
 
 
 def _finite(graph: Graph, value: Tracer) -> None:

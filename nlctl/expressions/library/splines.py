@@ -56,7 +56,7 @@ def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
     return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
 
 
-def _each(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
+def _elementwise(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
     cells = mapped(lambda e: function(graph.number(e)), traced(graph, x).elements())
     return Tracer(graph, cells)
 
@@ -81,7 +81,7 @@ def piecewise_polynomial(
         nan = graph.const(np.nan)
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
-    return _each(graph, x, at)
+    return _elementwise(graph, x, at)
 
 
 def _beyond(
@@ -190,7 +190,7 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
             return value
         return _beyond(graph, e, ends, value, below, above)
 
-    return _each(graph, x, at)
+    return _elementwise(graph, x, at)
 
 
 def _of_one_value(spline: Any) -> Any:

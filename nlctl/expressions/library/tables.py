@@ -104,14 +104,14 @@ def digitize(graph: Graph, x: Any, bins: Any, right: bool = False) -> Tracer:
 
 
 def _bisected(side: str) -> Callable[..., Any]:
-    def own(graph: Graph, a: Any, x: Any) -> Any:
+    def written(graph: Graph, a: Any, x: Any) -> Any:
         if traced(graph, x).shape:
             raise Untraceable("a bisection for an array")
         bounds, guard = _constants(graph, a, "places of a table"), traced(graph, x)
         graph.guards.append(graph.op("eq", guard.only, guard.only))  # by halving: not what NaN does
         return searchsorted(graph, bounds, x, side)
 
-    return own
+    return written
 
 
 of(bisect.bisect_left)(_bisected("left"))
