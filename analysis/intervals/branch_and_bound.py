@@ -81,7 +81,7 @@ class Range:
 
 @dataclass(frozen=True, kw_only=True)
 class Proof:
-    """What became of the claim low <= f <= high on a box.
+    """The verdict on the claim low <= f <= high on a box.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Proof:
 
     @property
     def status(self) -> Literal["proved", "refuted", "undecided"]:
-        """What became of the claim."""
+        """The verdict on the claim."""
         return {True: "proved", False: "refuted"}.get(self.holds, "undecided")  # type: ignore
 
     @property

@@ -1,4 +1,4 @@
-"""Lines of the ledger: what became of a statement, how that is known, and what follows."""
+"""Lines of the ledger: how a statement was judged, how that is known, and what follows."""
 
 from __future__ import annotations
 

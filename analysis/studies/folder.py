@@ -135,12 +135,12 @@ def remove_run(folder: Path, *, force: bool = False) -> None:
     shutil.rmtree(folder)
 
 
-def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
+def load_study(folder: Path, given: Mapping[str, Kind] | None = None) -> Study:
     """Return the study of a run, as it was begun."""
     path = folder / "study.toml"
     try:
         text = study_text(file_bytes(path))
-        kinds = dict(own or {})
+        kinds = dict(given or {})
         study = from_toml(text, kinds | stand_ins(read_toml(text), kinds))
     except FileNotFoundError:
         raise RunFolderError(f"'{folder}' holds no run of a study") from None
@@ -217,9 +217,9 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     return _result_in(folder, *_own_kinds(folder, trust))
 
 
-def _result_in(folder: Path, own: Mapping[str, Kind], gone: Sequence[str]) -> Result:
+def _result_in(folder: Path, kinds: Mapping[str, Kind], gone: Sequence[str]) -> Result:
     """Return what is in a folder that is whole, or say why its parts do not go together."""
-    study, run = load_study(folder, own), load_run(folder)
+    study, run = load_study(folder, kinds), load_run(folder)
     content = shaped(folder / "results.json", ResultsFile, "continue with --resume")
     origin = origin_key(run["origin"])
     if content.pop("origin") != origin:

@@ -58,8 +58,8 @@ def _of_sum(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
 def _of_difference(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
     if b.quotient is None:
         return _quotient(graph, a)
-    turned = graph.op("neg", _quotient(graph, b))
-    return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else turned
+    negated = graph.op("neg", _quotient(graph, b))
+    return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else negated
 
 
 def _of_negative(graph: Graph, a: _Quantity) -> Expr:

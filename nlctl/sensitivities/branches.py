@@ -107,10 +107,10 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
     elif op == "copysign":
         value = graph.op("mul", graph.op("absolute", numbers[0]), kept)
     else:  # the angle jumps on the left half of the axis only
-        turned = graph.op("mul", const(math.pi), graph.op("sub", kept, now))
+        reflected = graph.op("mul", const(math.pi), graph.op("sub", kept, now))
         left = graph.op("lt", other, const(0.0))
         angle = graph.op("arctan2", *numbers)
-        value = graph.op("add", angle, graph.op("select", left, turned, const(0.0)))
+        value = graph.op("add", angle, graph.op("select", left, reflected, const(0.0)))
     return _side_of(graph, now, level, [level], margin, value)
 
 

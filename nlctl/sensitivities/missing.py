@@ -127,7 +127,7 @@ class _Run:
         labels = row_labels(self.compiled, conditions)
         first = self.compiled.program.switching + conditions.rows
         watching = len(self.differentiated.saltation.turning) + bool(
-            self.differentiated.sides.source.carried
+            self.differentiated.sides.source.driven
         )
         when, names = [], []
         for time, row in zip(happened.time, happened.label // 2, strict=True):

@@ -96,7 +96,7 @@ def with_its_derivatives(
     sides = sides_of(source, n * (1 + by))
     places = StatePlaces(states=n, by=by, branches=sides.rows)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
-    kept = [s.state for s in signals if s.state in source.carried]
+    kept = [s.state for s in signals if s.state in source.driven]
     maker = _Maker(
         source=source, sides=sides, places=places, seeds=seeds, observed=kept,
         saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
@@ -197,7 +197,7 @@ class _Maker:
             "m": equations.results["m"],
             "y": self._outputs(),
         }
-        if equations.results.get("reset") or self.sides.watches or self.source.carried:
+        if equations.results.get("reset") or self.sides.watches or self.source.driven:
             results["reset"] = self._resets()
         for name in equations.results:
             if name.startswith("sample"):
@@ -236,13 +236,13 @@ class _Maker:
         graph, pieces = self.source.graph, self.source.equations.pieces("y")
         count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
         leading, arriving = _divided(graph, pieces, count)
-        leading += [(self.source.carried[m], 1) for m in self.observed]
+        leading += [(self.source.driven[m], 1) for m in self.observed]
         shown = ((self._shown(leading, j), self._shown(arriving, j)) for j in range(self.places.by))
         parts = [(leading, arriving), *shown]
         return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
 
     def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
-        """Return the derivatives of numbers, of memories that are carried as they are kept."""
+        """Return the derivatives of numbers, of memories that are driven as they are kept."""
         return [(e, 1) for e in self.sides.kept([e for e, _ in self._along(numbers, j)])]
 
     def _switching(self) -> list[tuple[int, Tracer]]:
@@ -251,7 +251,7 @@ class _Maker:
         switching = [(row, array) for row, array in source.equations.results["g"] if row < first]
         switching = [(row, array) for row, array in switching if array.size]
         rows = [apart for apart, _ in self.saltation.turning]
-        rows += [self.sides.carried] if source.carried else []
+        rows += [self.sides.driven] if source.driven else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
         return [*switching, *self._rows(first, [(e, 1) for e in rows])]
@@ -267,9 +267,9 @@ class _Maker:
             pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
         if self.sides.watches:
             pieces += self.saltation.at_conditions()
-        turned = self.saltation.at_turns()
-        if turned:
-            pieces += [(e, 1) for e in turned.values()]
+        reversed_levels = self.saltation.at_turns()
+        if reversed_levels:
+            pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
         if self.saltation.turning:
             pieces.append((self.saltation.at_touch(), 1))

@@ -199,12 +199,12 @@ def _response(
     times, integrated = run_of
     values = np.empty((len(signals), integrated.time.size))
     derivatives = np.empty((len(signals), len(quantities), integrated.time.size))
-    carried = differentiated.sides.source.carried
+    driven = differentiated.sides.source.driven
     rows = sorted(range(len(signals)), key=lambda i: signals[i].combination is None)
     row = 0
     for i in rows:
         signal = signals[i]
-        is_state = signal.combination is None and signal.state not in carried
+        is_state = signal.combination is None and signal.state not in driven
         source = integrated.states if is_state else integrated.outputs
         row_of_signal = signal.state if is_state else row
         values[i] = source[row_of_signal]

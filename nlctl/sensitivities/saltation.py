@@ -123,7 +123,7 @@ class Saltation:
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
-        rows |= self._carried_after(rows)
+        rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
         sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
@@ -185,11 +185,11 @@ class Saltation:
 
     def at_turns(self) -> dict[int, Expr]:
         """Return what derivatives of memories become where these turn, by their states."""
-        places, carried = self.places, self.source.carried
+        places, driven = self.places, self.source.driven
         return {
             places.derivative(j) + m: self._kept(j, m, at_turn=True)
             for j in range(places.by)
-            for m in carried
+            for m in driven
         }
 
     # -- states ----------------------------------------------------------------------------------
@@ -200,16 +200,16 @@ class Saltation:
         for _, size in self.source.flow:
             pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.carried})
+        return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.driven})
 
     def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
-        """Return the derivative of a memory, which while it is carried along nobody keeps.
+        """Return the derivative of a memory, which is integrated only while it is not driven.
 
         A step ends a little behind where it has reversed.
         """
         graph = self.source.graph
         kept = self.sides.memories[m]
-        become = self.source.carried[m]
+        become = self.source.driven[m]
         (change,) = self.change(become, self.seeds[j])
         derivative = graph.const(0.0) if change is None else change
         if at_turn and change is not None:
@@ -229,7 +229,7 @@ class Saltation:
         return graph.op("select", moved, derivative, integrated)
 
     def _late(self, become: Expr) -> Expr:
-        """Return how long ago what carries a memory along has turned, 0 at a break.
+        """Return how long ago what drives a memory has reversed, 0 at a break.
 
         Where it turns is located by a difference of rates: a little too early or too late.
         """
@@ -290,21 +290,21 @@ class Saltation:
         ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
         return replaced_parts(graph, kept, ways)
 
-    def _carried_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
-        """Return what becomes of memories that are carried along where other states jump.
+    def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
+        """Return driven memories after a jump of other states.
 
-        First they are what has carried them until then.
+        First they are what has driven them until then.
         """
-        carried = self.source.carried
+        driven = self.source.driven
         return {
             m: self.source.with_states([become], {**rows, m: become})[0]
-            for m, become in carried.items()
+            for m, become in driven.items()
         }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
         """Return expressions behind a jump of some states, and what memories switch to by it."""
-        source, carried = self.source, self.source.carried
-        rows = {k: self.sides.kept([e])[0] if k in carried else e for k, e in rows.items()}
+        source, driven = self.source, self.source.driven
+        rows = {k: self.sides.kept([e])[0] if k in driven else e for k, e in rows.items()}
         held = [
             (m, c) for m, c in zip(source.program.memory, source.committed, strict=True)
             if m in source.switched

@@ -54,7 +54,7 @@ class KeptSides:
     source : EquationParts
     sides : tuple of KeptSide
     memories : mapping
-        Of states of memories, what is kept of them: far away while they are carried along, and
+        Of states of memories, what is kept of them: far away while they are driven, and
         where they stand otherwise.
     before : mapping
         What stands, on the sides that are kept, for parts of the equations.
@@ -103,8 +103,8 @@ class KeptSides:
         return sum(side.rows for side in self.sides)
 
     @property
-    def carried(self) -> Expr:
-        """What is at least 0 as long as every memory that is carried along is where it was."""
+    def driven(self) -> Expr:
+        """What is at least 0 as long as every memory that is driven is where it was."""
         graph, same = self.source.graph, self.source.graph.const(True)
         for m, kept in self.memories.items():
             if m not in self.source.switched:

@@ -56,7 +56,7 @@ class EquationParts:
     committed : list of Expr
         What each memory would become.
     switched : frozenset of int
-        States of memories that jump, and are not carried along.
+        States of memories that jump, and are not driven.
     owners : tuple of int
         The block of each switching function.
     p : ndarray
@@ -80,8 +80,8 @@ class EquationParts:
         return self.equations.graph
 
     @property
-    def carried(self) -> dict[int, Expr]:
-        """What memories would become that are carried along, by their states."""
+    def driven(self) -> dict[int, Expr]:
+        """The next values of driven memories, by their states."""
         pairs = zip(self.program.memory, self.committed, strict=True)
         return {m: expr for m, expr in pairs if m not in self.switched}
 
@@ -107,7 +107,7 @@ class EquationParts:
                 "on both sides; put a lag into the loop"
             )
         roots = [e for e, _ in (*self.flow, *self.arriving)]
-        roots += self.carried.values()
+        roots += self.driven.values()
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     def time(
@@ -123,16 +123,16 @@ class EquationParts:
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
     def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
-        """Return the rates of all states, those of memories that are carried along included."""
+        """Return the rates of all states, those of memories that are driven included."""
         pairs = zip(self.program.memory, committed, strict=True)
-        carried = {m: expr for m, expr in pairs if m not in self.switched}
-        if not carried:
+        driven = {m: expr for m, expr in pairs if m not in self.switched}
+        if not driven:
             return list(flow)
         direction = self.time(flow)
-        ahead = one_sided(self.graph, list(carried.values()), direction)
+        ahead = one_sided(self.graph, list(driven.values()), direction)
         rates = self.slopes(ahead, direction)
         zero = self.graph.const(0.0)
-        return rows_replaced(self.graph, flow, dict(zip(carried, (r or zero for r in rates),
+        return rows_replaced(self.graph, flow, dict(zip(driven, (r or zero for r in rates),
                                                         strict=True)))  # fmt: skip
 
     def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:

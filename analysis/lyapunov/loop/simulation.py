@@ -61,7 +61,7 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True)
 class MemberRun:
-    """A member, and what became of it.
+    """A member, and its run.
 
     Attributes
     ----------

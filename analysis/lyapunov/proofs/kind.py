@@ -68,7 +68,7 @@ class Subject:
 
 @dataclass(frozen=True, kw_only=True)
 class Closed:
-    """The last step of the iteration, and what became of it."""
+    """The last step of the iteration, and its outcome."""
 
     region: Any
     bound: Any

@@ -251,7 +251,7 @@ def sweep(
         interrupt = stack.enter_context(gentle_interrupt())
         tally.restart()
         run = _Run(tally=tally, interrupt=interrupt, progress=progress, stop=stop)
-        todo, more = tally.missing(chunk), run.wants_more
+        todo = tally.missing(chunk)
         chunks = (
             computed_here(
                 prepared, design, todo, run.wants_more, threads=threads, progress=run.report

@@ -124,7 +124,7 @@ def _gradient(
         )  # fmt: skip
         lacks.extend(str(lack) for lack in response.missing)
         gradient = [metric_gradient(metric, response) for metric in metrics]
-        return min(gradient, key=lambda each: each.value)
+        return min(gradient, key=lambda gradient: gradient.value)
 
     lacks: list[str] = []
     refused = {}

@@ -42,9 +42,9 @@ def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
     )
 
 
-def model_of(own: Mapping[str, Kind]) -> type[Study]:
+def model_of(kinds: Mapping[str, Kind]) -> type[Study]:
     """Return the shape of study files with nlctl's kinds of analysis and some of one's own."""
-    return study_model((*((kind.name, kind) for kind in KINDS), *own.items()))
+    return study_model((*((kind.name, kind) for kind in KINDS), *kinds.items()))
 
 
 def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:

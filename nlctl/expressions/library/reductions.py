@@ -259,11 +259,11 @@ def in_order(graph: Graph, row: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]
         raise Untraceable("too many elements to be sorted")
     for end in range(len(values) - 1, 0, -1):
         for i in range(end):
-            turned = _is_after(graph, values[i], values[i + 1])
+            is_inverted = _is_after(graph, values[i], values[i + 1])
             for kept in (values, places):
                 a, b = kept[i], kept[i + 1]
-                kept[i] = graph.op("select", turned, b, a)
-                kept[i + 1] = graph.op("select", turned, a, b)
+                kept[i] = graph.op("select", is_inverted, b, a)
+                kept[i + 1] = graph.op("select", is_inverted, a, b)
     return values, places
 
 
