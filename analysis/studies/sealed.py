@@ -32,7 +32,7 @@ __all__ = [
 RUN_FORMAT = 4
 """Of all files of a run folder; others are refused."""
 SEAL = "sha256"
-LARGEST = 200_000_000  # bytes of a file of JSON
+LARGEST_JSON = 200_000_000  # bytes of a file of JSON
 ANEW = "restore it, or run the study in another folder with --out"
 
 
@@ -87,7 +87,7 @@ def file_bytes(path: Path) -> bytes:
     """Return what is in a file of a run folder."""
     if path.exists() and not path.is_file():  # a pipe would never end
         raise OSError(errno.EINVAL, "it is not a file")
-    if path.stat().st_size > LARGEST:
+    if path.stat().st_size > LARGEST_JSON:
         raise OSError(errno.EFBIG, "it is larger than any file of a run")
     return path.read_bytes()
 

@@ -3,8 +3,9 @@
 `names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
 its equations in parts, `branches`, `kinks` and `sides` are about jumps, `saltation` about
 derivatives there, `program` puts all of that together, `run` integrates it, and `missing` says
-where there is no derivative.  `gradients` are those of metrics and margins, `fitting` finds parameters from data, `tuning` gains for requirements: `worth`
-makes its runs, `tuned` is what it returns, and `tuning_notes` what it has to say.
+where there is no derivative.  `gradients` are those of metrics and margins, `fitting`
+finds parameters from data, `tuning` gains for requirements: `worth` makes its runs, `tuned` is
+what it returns, and `tuning_notes` what it has to say.
 """
 
 from .fitting import Fit, fit
