@@ -34,22 +34,11 @@ PATIENCE = 1.5  # s: what takes longer is timed once
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One competitor's figures.
-
-    Attributes
-    ----------
-    name : str
-    rtol : float
-        The tolerance that was chosen.
-    seconds : float
-        Shortest time of a run, or per member of an ensemble; NaN if it was not timed.
-    accuracy : Accuracy or None
-    members, threads : int
-    """
+    """One competitor's figures."""
 
     name: str
-    rtol: float
-    seconds: float
+    rtol: float  # the tolerance that was chosen
+    seconds: float  # shortest time of a run, or per member of an ensemble; NaN if it was not timed
     accuracy: Accuracy
     members: int = 1
     threads: int = 1

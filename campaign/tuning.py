@@ -22,22 +22,13 @@ LOST = 1e3  # what counts as the excess of a run that did not reach its end
 
 @dataclass(frozen=True, kw_only=True)
 class EvolvedGains:
-    """Gains that were found.
+    """Gains that were found."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name, for ``params=`` of a run.
-    cost, limited : float
-        The two metrics with these gains.
-    runs : int
-        Number of simulations.
-    """
-
-    gains: dict[str, float]
+    gains: dict[str, float]  # values by qualified name, for ``params=`` of a run
+    # the two metrics with these gains
     cost: float
     limited: float
-    runs: int
+    runs: int  # number of simulations
 
 
 def evolved_gains(

@@ -61,24 +61,15 @@ def only_balls() -> Iterator[None]:
 
 @dataclass(frozen=True, kw_only=True)
 class Readable:
-    """A function of balls that is known as an expression, too.
+    """A function of balls that is known as an expression, too."""
 
-    Attributes
-    ----------
-    of_balls : callable
-        Of a tuple of balls.
-    expressions : callable
-        ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.  Several
-        are conditions, and the function their least.
-    codes : dict
-        Machine code that has been made of it, by sides and sign; None where there is none.
-    read : dict
-        The expressions, by sides.
-    """
-
-    of_balls: Callable[..., Any]
+    of_balls: Callable[..., Any]  # of a tuple of balls
+    # ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.
+    # Several are conditions, and the function their least.
     expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
+    # machine code that has been made of it, by sides and sign; None where there is none
     codes: dict[tuple[int, int], BoxCode | None] = field(default_factory=dict, compare=False)
+    # the expressions, by sides
     read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
 
     def __call__(self, *given: Any) -> Any:
@@ -87,17 +78,10 @@ class Readable:
 
 @dataclass(frozen=True, kw_only=True)
 class CodedClaim:
-    """What a claim excludes: that all these numbers are positive at a point of the box.
-
-    Attributes
-    ----------
-    code : BoxCode
-    bound : float
-        What their least is compared with.
-    """
+    """What a claim excludes: that all these numbers are positive at a point of the box."""
 
     code: BoxCode
-    bound: float
+    bound: float  # what their least is compared with
 
 
 def code_for(

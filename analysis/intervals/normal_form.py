@@ -30,21 +30,12 @@ EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "min
 
 @dataclass(frozen=True)
 class Atom:
-    """A symbol, or a function of sums that is not divided any further.
+    """A symbol, or a function of sums that is not divided any further."""
 
-    Attributes
-    ----------
-    name : str
-        Of the symbol, or of the function.
-    arguments : tuple of frozenset
-        Monomials of the sums that it is a function of; empty for a symbol.
-    data : tuple
-        Break points and values of a table.
-    """
-
-    name: str
+    name: str  # of the symbol, or of the function
+    # monomials of the sums that it is a function of; empty for a symbol
     arguments: tuple[Monomials, ...] = ()
-    data: tuple[tuple[float, ...], ...] = ()
+    data: tuple[tuple[float, ...], ...] = ()  # break points and values of a table
 
     @property
     def names(self) -> set[str]:

@@ -32,23 +32,12 @@ class Undecided(ArithmeticError):  # noqa: N818
 
 @dataclass
 class Decisions:
-    """The answers that one run of an equation gets where its balls cannot decide.
+    """The answers that one run of an equation gets where its balls cannot decide."""
 
-    Attributes
-    ----------
-    used : int
-        Comparisons that were answered by decisions, this one or an earlier one.
-    orders : list
-        What answers said of two quantities.
-    taken : tuple of bool
-        Answers so far; those that were not given beforehand are True.
-    given : tuple of bool
-        Answers that are fixed beforehand.
-    """
-
-    given: tuple[bool, ...] = ()
-    taken: tuple[bool, ...] = ()
-    used: int = 0
+    given: tuple[bool, ...] = ()  # answers that are fixed beforehand
+    taken: tuple[bool, ...] = ()  # answers so far; those that were not given beforehand are True
+    used: int = 0  # comparisons that were answered by decisions, this one or an earlier one
+    # what answers said of two quantities
     orders: list[tuple[tuple[Any, Any], set[int]]] = field(default_factory=list, repr=False)
 
     def possible(self, key: tuple[Any, Any]) -> set[int]:

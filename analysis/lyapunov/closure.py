@@ -54,21 +54,11 @@ _TIMES = np.linspace(0.0, 200.0, 97)
 
 @dataclass(frozen=True, kw_only=True)
 class StateReach:
-    """How far x gets while \\|r\\| keeps a bound.
+    r"""How far x gets while \|r\| keeps a bound."""
 
-    Attributes
-    ----------
-    lambdas : tuple of float
-        Of the filtered error (14).
-    e0 : tuple of n balls
-        Initial errors.
-    reference : SumOfSines
-        What the plant shall follow.
-    """
-
-    lambdas: tuple[float, ...]
-    e0: tuple[arb, ...]
-    reference: SumOfSines
+    lambdas: tuple[float, ...]  # of the filtered error (14)
+    e0: tuple[arb, ...]  # initial errors
+    reference: SumOfSines  # what the plant shall follow
 
     def __call__(self, C: float) -> tuple[float, ...]:
         r"""Return bounds of \|x1\|, ..., \|xn\| for \|r\| <= C."""

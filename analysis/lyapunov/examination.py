@@ -35,22 +35,12 @@ U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
-    """Runs of the members; more than one are repeated at each iteration, one after the other.
-
-    Attributes
-    ----------
-    loop : control.InterconnectedSystem
-    members : sequence of Member
-    split : Decomposition
-        Of the actuator.
-    max_steps : int
-        Steps after which a run counts as lost.
-    """
+    """Runs of the members; more than one are repeated at each iteration, one after the other."""
 
     loop: ct.InterconnectedSystem
     members: Sequence[Member] = field(repr=False)
-    split: Decomposition
-    max_steps: int = 2_000_000
+    split: Decomposition  # of the actuator
+    max_steps: int = 2_000_000  # steps after which a run counts as lost
 
     def __iter__(self) -> Iterator[MemberRun]:
         if len(self.members) == 1:

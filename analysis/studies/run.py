@@ -342,20 +342,11 @@ def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reopened:
-    """A run whose loop is the one that its results were computed from.
-
-    Attributes
-    ----------
-    file : StudyFile
-    prepared : Prepared
-        Its experiment.
-    versions : str
-        Which versions differ from those of the run, in words; empty if none does.
-    """
+    """A run whose loop is the one that its results were computed from."""
 
     file: StudyFile
-    prepared: Prepared
-    versions: str
+    prepared: Prepared  # its experiment
+    versions: str  # which versions differ from those of the run, in words; empty if none does
 
 
 def reopened(folder: Path, *, trust: bool = False) -> Reopened:

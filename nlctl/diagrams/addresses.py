@@ -28,17 +28,10 @@ _NUMBERS = (int, float, np.number, np.ndarray)
 
 @dataclass(kw_only=True)
 class Divided:
-    """Overrides, divided between python-control and single blocks.
+    """Overrides, divided between python-control and single blocks."""
 
-    Attributes
-    ----------
-    given : dict
-        What python-control is given.
-    alone : dict
-        What a third-party block alone is to read: by its identity, and by the names it reads.
-    """
-
-    given: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)  # what python-control is given
+    # what a third-party block alone is to read: by its identity, and by the names it reads
     alone: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 

@@ -57,15 +57,9 @@ class _TakesADict(OwnParameters):
 
 
 class Named(_TakesADict):
-    """A third-party block in a diagram of `interconnect`: "P.k" is its own k, and no one else's.
+    """A third-party block in a diagram of `interconnect`: "P.k" is its own k, and no one else's."""
 
-    Attributes
-    ----------
-    nlctl_own : dict
-        Its parameters, by the names that its functions read.
-    """
-
-    nlctl_own: dict[str, Any]
+    nlctl_own: dict[str, Any]  # its parameters, by the names that its functions read
 
     @property
     def params(self) -> Parameters:

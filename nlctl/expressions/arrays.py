@@ -40,33 +40,17 @@ class Tracer:
     Assigning to items changes it, as it changes an array.  A part of a short array is a view, as
     NumPy's are.  A part of a long one knows where it is from: what is assigned to it goes there,
     and it is not read any more once the whole has changed otherwise.
-
-    Attributes
-    ----------
-    graph : Graph
-    values : ndarray of Expr
-        Its shape is the array's without the long axis.
-    axis : int or None
-        The long axis.
-    length : int
-        Size of the long axis, 1 if there is none.
-    origin : (Tracer, int) or None
-        The long array that this is a part of, and how often that had been assigned to.
-    place : range or None
-        Where in the origin a part of one dimension lies.
-    version : int
-        How often a long array has been assigned to.
-    watched : (ndarray of Expr, tuple of Expr) or None
-        Elements of which this long array was made as another shape, and what they were then.
     """
 
     graph: Graph
-    values: np.ndarray
-    axis: int | None = None
-    length: int = 1
+    values: np.ndarray  # its shape is the array's without the long axis
+    axis: int | None = None  # the long axis
+    length: int = 1  # size of the long axis, 1 if there is none
+    # the long array that this is a part of, and how often that had been assigned to
     origin: tuple[Tracer, int] | None = None
-    place: range | None = None
-    version: int = 0
+    place: range | None = None  # where in the origin a part of one dimension lies
+    version: int = 0  # how often a long array has been assigned to
+    # elements of which this long array was made as another shape, and what they were then
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these

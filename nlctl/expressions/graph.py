@@ -41,40 +41,23 @@ class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Expr:
-    """One expression.
+    """One expression."""
 
-    Attributes
-    ----------
-    op : str
-        ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
-        ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
-        ``"solve"`` (signals that depend on each other),
-        an operation of `NUMPY`, or NumPy's name of a function.
-    args : tuple of Expr
-    data : object
-        What else it needs: a constant, (array, start, step) of a leaf, index or (start, step) of
-        a part, lengths of what is concatenated, (function, lengths) of a call or a
-        solution.
-    size : int or None
-        Number of elements of a vector, None for a number.
-    kind : str
-        ``"f"`` float, ``"i"`` integer, ``"b"`` truth value.
-    index : int
-        Its place in the graph, after all that it is made of.
-    varies : bool
-        Whether it depends on more than parameters.
-    value : int or None
-        Of an integer: what it is for the parameter values of the trace; None if it depends on
-        more than parameters.
-    """
-
+    # ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
+    # ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
+    # ``"solve"`` (signals that depend on each other), an operation of `NUMPY`, or NumPy's
+    # name of a function
     op: str
     args: tuple[Expr, ...]
+    # what else it needs: a constant, (array, start, step) of a leaf, index or (start, step)
+    # of a part, lengths of what is concatenated, (function, lengths) of a call or a solution
     data: Any
-    size: int | None
-    kind: str
-    index: int
-    varies: bool
+    size: int | None  # number of elements of a vector, None for a number
+    kind: str  # ``"f"`` float, ``"i"`` integer, ``"b"`` truth value
+    index: int  # its place in the graph, after all that it is made of
+    varies: bool  # whether it depends on more than parameters
+    # of an integer: what it is for the parameter values of the trace; None if it depends on
+    # more than parameters
     value: int | None
 
 

@@ -88,22 +88,15 @@ def number_text(value: float) -> str:
 
 @dataclass(kw_only=True)
 class LatexWriter:
-    """Writes the formulas of one function.
+    """Writes the formulas of one function."""
 
-    Attributes
-    ----------
-    leaf : callable
-        Takes an array's name and the place in it, and returns the symbol; for a vector the place
-        is that of its first element and the third argument an index.
-    known : mapping
-        Expressions that have a name; those that are used are in `used` afterwards.
-    tables : dict
-        Names of vectors of constants, found on the way.
-    """
-
+    # takes an array's name and the place in it, and returns the symbol; for a vector the
+    # place is that of its first element and the third argument an index
     leaf: Callable[[str, Index], str]
+    # expressions that have a name; those that are used are in `used` afterwards
     known: Mapping[Expr, str] = field(default_factory=dict)
     used: dict[Expr, str] = field(default_factory=dict)
+    # names of vectors of constants, found on the way
     tables: dict[Expr, str] = field(default_factory=dict)
 
     def formula(self, expr: Expr, index: Index | None = None, *, by_name: bool = True) -> str:

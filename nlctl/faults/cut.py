@@ -24,24 +24,14 @@ __all__ = ["signal_names", "with_faults"]
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """Where a signal can be cut.
+    """Where a signal can be cut."""
 
-    Attributes
-    ----------
-    diagram : str
-        Path of the diagram that has the wire; empty for the outermost one.
-    side : str
-        ``"output"`` or ``"input"`` of a part of the diagram, or ``"external"`` input of itself.
-    position : int
-        Where it stands among all outputs or inputs of the parts, or the inputs of the diagram.
-    label : str
-        What the fault is called after: ``"actuator_v"``.
-    """
-
-    diagram: str
+    diagram: str  # path of the diagram that has the wire; empty for the outermost one
+    # ``"output"`` or ``"input"`` of a part of the diagram, or ``"external"`` input of itself
     side: Literal["output", "input", "external"]
+    # where it stands among all outputs or inputs of the parts, or the inputs of the diagram
     position: int
-    label: str
+    label: str  # what the fault is called after: ``"actuator_v"``
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,27 +23,13 @@ _JUMPS = (*_ORDERS, *_WHOLE, *_QUOTIENTS, "sign", "heaviside", "copysign", "arct
 
 @dataclass(frozen=True, kw_only=True)
 class Branch:
-    """One side of a jump.
+    """One side of a jump."""
 
-    Attributes
-    ----------
-    now : Expr
-        The side that the arguments are on.
-    level : Expr
-        A smooth function that is at a fixed value where the side is left.
-    extent : Expr
-        Of what size the numbers are that it is the difference of.
-    margin : Expr
-        At least 0 as long as the arguments are on the side that is kept.
-    value : Expr
-        The operation, with the side that is kept.
-    """
-
-    now: Expr
-    level: Expr
-    extent: Expr
-    margin: Expr
-    value: Expr
+    now: Expr  # the side that the arguments are on
+    level: Expr  # a smooth function that is at a fixed value where the side is left
+    extent: Expr  # of what size the numbers are that it is the difference of
+    margin: Expr  # at least 0 as long as the arguments are on the side that is kept
+    value: Expr  # the operation, with the side that is kept
 
 
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:

@@ -17,15 +17,10 @@ Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
 
 @dataclass(frozen=True, kw_only=True)
 class Direction:
-    """Where everything that equations read goes.
+    """Where everything that equations read goes."""
 
-    Attributes
-    ----------
-    of : mapping
-        For ``"x"``, ``"t"``, ``"u"``, ``"p"`` what gives some of its rows, None where they stand
-        still.
-    """
-
+    # for ``"x"``, ``"t"``, ``"u"``, ``"p"`` what gives some of its rows, None where they
+    # stand still
     of: Mapping[str, Taken] = field(default_factory=dict)
 
     def __call__(self, leaf: Expr) -> Expr | None:

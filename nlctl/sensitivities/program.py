@@ -33,24 +33,13 @@ _LATE = 0.5  # of a step and the root of the relative tolerance: how far behind 
 
 @dataclass(frozen=True, kw_only=True)
 class Differentiated:
-    """A diagram, compiled with its derivatives.
-
-    Attributes
-    ----------
-    compiled : Compiled
-    places : StatePlaces
-    extended : Extended
-    sides : KeptSides
-    outputs : int
-        Number of the signals that are outputs.
-    saltation : Saltation
-    """
+    """A diagram, compiled with its derivatives."""
 
     compiled: Compiled
     places: StatePlaces
     extended: Extended
     sides: KeptSides
-    outputs: int
+    outputs: int  # number of the signals that are outputs
     saltation: Saltation
 
 

@@ -32,17 +32,9 @@ __all__ = ["RunWithDerivatives", "differentiated_run"]
 
 @dataclass(frozen=True, kw_only=True)
 class RunWithDerivatives:
-    """What a run with derivatives is asked.
+    """What a run with derivatives is asked."""
 
-    Attributes
-    ----------
-    times, inputs, initial_state, params
-        As `nlctl.input_output_response` takes them.
-    of, with_respect_to : sequence of str
-    settings : Settings
-    audit : bool or str
-    """
-
+    # as `nlctl.input_output_response` takes them
     times: np.ndarray
     inputs: Any
     initial_state: Any

@@ -35,62 +35,31 @@ _STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 @dataclass(frozen=True, kw_only=True)
 class When:
-    """How the time at which something happens moves.
+    """How the time at which something happens moves."""
 
-    Attributes
-    ----------
-    moves : list of Expr
-        Its derivative by each quantity.
-    grazes : Expr
-        Whether what it depends on is there at a rate of 0.
-    apart : Expr
-        Whether two conditions say different things.
-    happens : Expr
-        Whether anything happens at a time that moves.
-    """
-
-    moves: list[Expr]
-    grazes: Expr
-    apart: Expr
-    happens: Expr
+    moves: list[Expr]  # its derivative by each quantity
+    grazes: Expr  # whether what it depends on is there at a rate of 0
+    apart: Expr  # whether two conditions say different things
+    happens: Expr  # whether anything happens at a time that moves
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
-    """A condition that may have been met.
+    """A condition that may have been met."""
 
-    Attributes
-    ----------
-    met : Expr
-        Whether it was.
-    moves : list of Expr
-        The derivative by each quantity of the time at which it was.
-    grazes : Expr
-        Whether it was at a rate of 0.
-    """
-
-    met: Expr
-    moves: list[Expr]
-    grazes: Expr
+    met: Expr  # whether it was
+    moves: list[Expr]  # the derivative by each quantity of the time at which it was
+    grazes: Expr  # whether it was at a rate of 0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Saltation:
-    """How derivatives jump at conditions and resets.
-
-    Attributes
-    ----------
-    source : EquationParts
-    sides : KeptSides
-    places : StatePlaces
-    seeds : sequence of Direction
-        In which direction everything goes by each quantity.
-    """
+    """How derivatives jump at conditions and resets."""
 
     source: EquationParts
     sides: KeptSides
     places: StatePlaces
-    seeds: Sequence[Direction]
+    seeds: Sequence[Direction]  # in which direction everything goes by each quantity
 
     def at_conditions(self) -> list[SomeRows]:
         """Return what follows the states where a side has been left."""

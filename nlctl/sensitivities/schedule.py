@@ -34,24 +34,14 @@ class ScheduleWithRates(Schedule):
 
 @dataclass(frozen=True, kw_only=True)
 class Extended:
-    """A schedule with a line for the derivatives of each delayed signal.
-
-    Attributes
-    ----------
-    schedule : Schedule
-    layout : mapping
-        StatePlaces of all parameters, behind those of the diagram.
-    owner : int
-        The block that conditions belong to; memories that turn belong to the next, and what
-        turns before a condition to the one behind.
-    lines : int
-        Number of delayed signals.
-    """
+    """A schedule with a line for the derivatives of each delayed signal."""
 
     schedule: Schedule
-    layout: dict[int, dict[str, Slot]]
+    layout: dict[int, dict[str, Slot]]  # StatePlaces of all parameters, behind those of the diagram
+    # the block that conditions belong to; memories that turn belong to the next, and what
+    # turns before a condition to the one behind
     owner: int
-    lines: int
+    lines: int  # number of delayed signals
 
     def line(self, j: int, i: int) -> int:
         """Return which line the derivative by quantity `j` of delayed signal `i` has."""

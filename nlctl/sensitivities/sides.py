@@ -17,27 +17,13 @@ __all__ = ["KeptSide", "KeptSides", "sides_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class KeptSide:
-    """One jump, or as many as it has elements.
+    """One jump, or as many as it has elements."""
 
-    Attributes
-    ----------
-    kept : Expr
-        The side that is kept, a state.
-    here : Branch
-        By what everything is now.
-    before : Branch
-        By what everything was on the sides that are kept.
-    timed : bool
-        Whether it is of t alone.
-    node : Expr or None
-        The operation in the equations.
-    """
-
-    kept: Expr
-    here: Branch
-    before: Branch
-    timed: bool
-    node: Expr | None = None
+    kept: Expr  # the side that is kept, a state
+    here: Branch  # by what everything is now
+    before: Branch  # by what everything was on the sides that are kept
+    timed: bool  # whether it is of t alone
+    node: Expr | None = None  # the operation in the equations
 
     @property
     def rows(self) -> int:
@@ -47,23 +33,14 @@ class KeptSide:
 
 @dataclass(frozen=True, kw_only=True)
 class KeptSides:
-    """The sides of all jumps.
-
-    Attributes
-    ----------
-    source : EquationParts
-    sides : tuple of KeptSide
-    memories : mapping
-        Of states of memories, what is kept of them: far away while they are driven, and
-        where they stand otherwise.
-    before : mapping
-        What stands, on the sides that are kept, for parts of the equations.
-    """
+    """The sides of all jumps."""
 
     source: EquationParts
     sides: tuple[KeptSide, ...]
+    # of states of memories, what is kept of them: far away while they are driven, and where
+    # they stand otherwise
     memories: dict[int, Expr]
-    before: dict[Expr, Expr]
+    before: dict[Expr, Expr]  # what stands, on the sides that are kept, for parts of the equations
 
     @property
     def rows(self) -> int:

@@ -40,39 +40,18 @@ __all__ = ["EquationParts", "equation_parts"]
 
 @dataclass(frozen=True, kw_only=True)
 class EquationParts:
-    """The equations of a diagram, row by row.
-
-    Attributes
-    ----------
-    equations : Equations
-    extended : Extended
-    program : Program
-        Of the diagram itself.
-    inputs : int
-        Number of the diagram's inputs.
-    switching : list of Expr
-        Switching functions that blocks declare.
-    guards : list of Expr
-    committed : list of Expr
-        What each memory would become.
-    switched : frozenset of int
-        States of memories that jump, and are not driven.
-    owners : tuple of int
-        The block of each switching function.
-    p : ndarray
-        Parameters near which the equations are evaluated.
-    """
+    """The equations of a diagram, row by row."""
 
     equations: Equations
     extended: Extended
-    program: Program
-    inputs: int
-    switching: list[Expr]
+    program: Program  # of the diagram itself
+    inputs: int  # number of the diagram's inputs
+    switching: list[Expr]  # switching functions that blocks declare
     guards: list[Expr]
-    committed: list[Expr]
-    switched: frozenset[int]
-    owners: tuple[int, ...]
-    p: np.ndarray
+    committed: list[Expr]  # what each memory would become
+    switched: frozenset[int]  # states of memories that jump, and are not driven
+    owners: tuple[int, ...]  # the block of each switching function
+    p: np.ndarray  # parameters near which the equations are evaluated
 
     @property
     def graph(self) -> Graph:

@@ -28,38 +28,22 @@ _NEAREST = 6  # parts of a requirement that count: the lowest
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TuningProblem:
-    """Which runs are made, and what is asked of them.
-
-    Attributes
-    ----------
-    diagram : Compiled
-    times, inputs, params, initial_state
-        As `nlctl.ensemble_response` takes them.
-    samples : tuple of dict
-        What else is set in each run.
-    names : tuple of str
-        What is tuned.
-    low, high : ndarray of shape (k,)
-    margins : tuple of MetricLike
-        Larger is better, > 0 holds.
-    cost : MetricLike or None
-        Smaller is better.
-    how : mapping
-        Tolerances and steps of the runs.
-    """
+    """Which runs are made, and what is asked of them."""
 
     diagram: Compiled
+    # as `nlctl.ensemble_response` takes them
     times: np.ndarray
     inputs: Any
     params: Mapping[str, Any]
     initial_state: Mapping[str, Any]
-    samples: tuple[Mapping[str, float], ...]
-    names: tuple[str, ...]
+    samples: tuple[Mapping[str, float], ...]  # what else is set in each run
+    names: tuple[str, ...]  # what is tuned
+    # (k,)
     low: np.ndarray
     high: np.ndarray
-    margins: tuple[MetricLike, ...]
-    cost: MetricLike | None
-    how: Mapping[str, Any]
+    margins: tuple[MetricLike, ...]  # larger is better, > 0 holds
+    cost: MetricLike | None  # smaller is better
+    how: Mapping[str, Any]  # tolerances and steps of the runs
 
     @property
     def metrics(self) -> tuple[MetricLike, ...]:
@@ -107,26 +91,15 @@ class TuningProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Worth:
-    """What one choice of gains is worth.
+    """What one choice of gains is worth."""
 
-    Attributes
-    ----------
-    table : ndarray of shape (samples, metrics)
-        Margins, then the cost.
-    count : int
-        Number of margins.
-    parts : ndarray of shape (n,)
-        What margins are the least of, in all samples; empty if there are no derivatives.
-    slopes : ndarray of shape (n, k)
-        Their derivatives by coordinates of the unit cube.
-    cost_slopes : ndarray of shape (k,)
-        Those of the mean cost.
-    """
-
-    table: np.ndarray
-    count: int
+    table: np.ndarray  # (samples, metrics): Margins, then the cost
+    count: int  # number of margins
+    # (n,): what margins are the least of, in all samples; empty if there are no derivatives
     parts: np.ndarray = field(default_factory=lambda: np.empty(0))
+    # (n, k): their derivatives by coordinates of the unit cube
     slopes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    # (k,): those of the mean cost
     cost_slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property

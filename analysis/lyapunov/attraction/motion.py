@@ -28,18 +28,10 @@ __all__ = ["StateRates", "motion_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class StateRates:
-    """Rates x' = f(x).
+    """Rates x' = f(x)."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        States.
-    rates : tuple of Expr
-        Of the leaves ``x[0], x[1], ...``.
-    """
-
-    names: tuple[str, ...]
-    rates: tuple[Expr, ...]
+    names: tuple[str, ...]  # states
+    rates: tuple[Expr, ...]  # of the leaves ``x[0], x[1], ...``
 
     @property
     def order(self) -> int:

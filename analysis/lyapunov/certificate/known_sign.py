@@ -59,20 +59,11 @@ _LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 @dataclass(frozen=True, kw_only=True)
 class KnownSignLoop(FilteredLoop):
-    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts.
+    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts."""
 
-    Attributes
-    ----------
-    parts : Parts
-        Records of the blocks, and the gains.
-    delta_hat_0 : arb
-    W_hat_0 : tuple of arb
-        Initial estimates, of all starts.
-    """
-
-    parts: Parts
+    parts: Parts  # records of the blocks, and the gains
     delta_hat_0: arb
-    W_hat_0: tuple[arb, ...]
+    W_hat_0: tuple[arb, ...]  # initial estimates, of all starts
 
     @property
     def law(self) -> KnownSignLaw:

@@ -24,29 +24,15 @@ __all__ = ["CheckedLoop", "read_checked"]
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedLoop:
-    """What a loop is made of, after every check that does not depend on the proof.
+    """What a loop is made of, after every check that does not depend on the proof."""
 
-    Attributes
-    ----------
-    roles : Roles
-        Places of the blocks, with the parameters of the run.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
-    starts : Starts
-        Initial states that the proof shall be about.
-    content : LoopContent
-        What the loop consists of.
-    given : control.InterconnectedSystem
-        A copy of the loop, with the parameters of the run.
-    understood : control.InterconnectedSystem
-        The loop, connected again by name, with all its signals as outputs.
-    """
-
-    roles: Roles
-    disturbance: float
-    starts: Starts
-    content: LoopContent = field(repr=False)
+    roles: Roles  # places of the blocks, with the parameters of the run
+    disturbance: float  # bound of what external inputs add to the plant's v
+    starts: Starts  # initial states that the proof shall be about
+    content: LoopContent = field(repr=False)  # what the loop consists of
+    # a copy of the loop, with the parameters of the run
     given: ct.InterconnectedSystem = field(repr=False)
+    # the loop, connected again by name, with all its signals as outputs
     understood: ct.InterconnectedSystem = field(repr=False)
 
     def start(self, part: str) -> Sides:

@@ -26,18 +26,12 @@ _RECORDS = ("spec", "current_spec")
 
 @dataclass(frozen=True, kw_only=True)
 class LoopContent:
-    """What a loop consists of.
+    """What a loop consists of."""
 
-    Attributes
-    ----------
-    facts : mapping
-        As of `nlctl.analysis.loop_record.loop_facts`.
-    key : str
-        Of all that python-control computes of it with the parameters of the run; empty where no
-        key sees everything.
-    """
-
+    # as of `nlctl.analysis.loop_record.loop_facts`
     facts: Mapping[str, dict[str, str]] = field(repr=False)
+    # of all that python-control computes of it with the parameters of the run; empty where no
+    # key sees everything
     key: str
 
 

@@ -57,18 +57,12 @@ PIECES: Pieces = {
 
 @dataclass(frozen=True, kw_only=True)
 class Roles:
-    """The blocks of a closed loop by the part that they play, with the wiring checked.
+    """The blocks of a closed loop by the part that they play, with the wiring checked."""
 
-    Attributes
-    ----------
-    places : mapping
-        Place of every block, by part: "reference", "plant", "actuator", "filtered_error",
-        "basis" (where there is one), "weights", "robust", "law".
-    disturbances : mapping
-        Gain of every external input that is added to the plant's input v, by name.
-    """
-
+    # place of every block, by part: "reference", "plant", "actuator", "filtered_error",
+    # "basis" (where there is one), "weights", "robust", "law"
     places: Mapping[str, Place] = field(repr=False)
+    # gain of every external input that is added to the plant's input v, by name
     disturbances: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -61,28 +61,14 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True)
 class MemberRun:
-    """A member, and its run.
-
-    Attributes
-    ----------
-    member : Member
-    parts : Parts
-        With the member's parameters and gains.
-    signals : Signals
-        Up to the time that the run reached.
-    lost : float or None
-        Time (s) at which the run ended early, diverged or too stiff.
-    message : str
-        Why it ended early.
-    reference : Margin or None
-        Of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`.
-    """
+    """A member, and its run."""
 
     member: Member
-    parts: Parts
-    signals: Signals
-    lost: float | None
-    message: str = ""
+    parts: Parts  # with the member's parameters and gains
+    signals: Signals  # up to the time that the run reached
+    lost: float | None  # time (s) at which the run ended early, diverged or too stiff
+    message: str = ""  # why it ended early
+    # of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`
     reference: Margin | None = None
 
     @property

@@ -32,36 +32,21 @@ _FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
 
 @dataclass(frozen=True, kw_only=True)
 class Decrease:
-    """Bounds of V while |delta| <= D.
+    """Bounds of V while |delta| <= D."""
 
-    Attributes
-    ----------
-    level : arb
-        Bound of V for all time.
-    error, weights : arb
-        Bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma.
-    mean : arb
-        Bound of the limit superior of the mean of E^T Q E over [0, t].
-    falls : bool
-        Whether limsup V <= `error`, too.
-    alpha_0, alpha_1 : float
-        V' <= -alpha_1 V + alpha_0; NaN where there is no such inequality.
-    how, end : str
-        Where the level comes from, and the bounds in the end.
-    doubt : str
-        Why there is no bound; nothing if there is one.
-    """
-
-    level: arb
+    level: arb  # bound of V for all time
+    # bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma
     error: arb
     weights: arb
-    mean: arb
-    falls: bool = False
+    mean: arb  # bound of the limit superior of the mean of E^T Q E over [0, t]
+    falls: bool = False  # whether limsup V <= `error`, too
+    # V' <= -alpha_1 V + alpha_0; NaN where there is no such inequality
     alpha_0: float = np.nan
     alpha_1: float = np.nan
+    # where the level comes from, and the bounds in the end
     how: str
     end: str
-    doubt: str = ""
+    doubt: str = ""  # why there is no bound; nothing if there is one
 
 
 def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:

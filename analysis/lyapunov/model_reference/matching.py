@@ -37,30 +37,16 @@ __all__ = ["Matching", "matching"]
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:
-    """How a plant is matched: x_n' = beta v + c (nu + nu_e) + lambda W^T psi + rest.
-
-    Attributes
-    ----------
-    loop : ModelReferenceLoop
-    k : Fraction
-        Of v = k u + eps_u: the middle of its bounds.
-    beta, lam : Fraction
-        Input gain of the plant, and lambda = beta k / gain.
-    W : tuple of l Fraction
-        Weights that match, or were chosen.
-    chosen : bool
-        Whether they were chosen by the caller.
-    rest : Sum
-        What is left of the plant's equation, in the symbols t, x1, ..., xm1, ..., yd, v.
-    """
+    """How a plant is matched: x_n' = beta v + c (nu + nu_e) + lambda W^T psi + rest."""
 
     loop: ModelReferenceLoop
-    k: Fraction
+    k: Fraction  # of v = k u + eps_u: the middle of its bounds
+    # input gain of the plant, and lambda = beta k / gain
     beta: Fraction
     lam: Fraction
-    W: tuple[Fraction, ...]
-    chosen: bool
-    rest: Sum
+    W: tuple[Fraction, ...]  # weights that match, or were chosen
+    chosen: bool  # whether they were chosen by the caller
+    rest: Sum  # what is left of the plant's equation, in the symbols t, x1, ..., xm1, ..., yd, v
 
     @property
     def W_squared(self) -> Fraction:  # noqa: N802

@@ -28,24 +28,12 @@ _POLE = Fraction(1, 2**40)  # relative: half the width of an irrational pole
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredCertificate(Certificate):
-    """A certificate about |r|, of a loop whose controller sees the plant through r of (14).
+    """A certificate about |r|, of a loop whose controller sees the plant through r of (14)."""
 
-    Attributes
-    ----------
-    C_0 : float
-        Bound of |r| for all time, from all `starts`.
-    ultimate : float
-        Bound of limsup |r|.
-    u_max : float
-        Bound of |u| for all time.
-    loop : FilteredLoop
-        The parameters that it is about.
-    """
-
-    C_0: float
-    ultimate: float
-    u_max: float
-    loop: Any
+    C_0: float  # bound of |r| for all time, from all `starts`
+    ultimate: float  # bound of limsup |r|
+    u_max: float  # bound of |u| for all time
+    loop: Any  # the parameters that it is about
 
     def _of_plant(self) -> Iterator[Row]:
         need, over = self.region, str(self.region.box)

@@ -39,31 +39,15 @@ class ProofOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Subject:
-    """What a proof is about, before a box is examined.
+    """What a proof is about, before a box is examined."""
 
-    Attributes
-    ----------
-    loop : object
-        The loop as the proof reads it, with its `starts` and `disturbance`.
-    start : arb
-        What is bounded, at the starts.
-    actuator : record
-    split : Decomposition
-        Of the actuator, with what external inputs add.
-    u_max : float
-        Half the range of u for which the split is proved.
-    tol : float
-    matching : object
-        What else the kind of proof has found.
-    """
-
-    loop: Any
-    start: arb
+    loop: Any  # the loop as the proof reads it, with its `starts` and `disturbance`
+    start: arb  # what is bounded, at the starts
     actuator: Any
-    split: Decomposition
-    u_max: float
+    split: Decomposition  # of the actuator, with what external inputs add
+    u_max: float  # half the range of u for which the split is proved
     tol: float
-    matching: Any = field(default=None, repr=False)
+    matching: Any = field(default=None, repr=False)  # what else the kind of proof has found
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -66,20 +66,11 @@ class StoreError(UsageError):
 
 @dataclass(frozen=True, kw_only=True)
 class ChunkStore:
-    """A folder with chunks of one study.
-
-    Attributes
-    ----------
-    folder : Path
-    identity : mapping
-        See `identity.identity_of`.
-    columns : mapping
-        See `experiment.columns_of`.
-    """
+    """A folder with chunks of one study."""
 
     folder: Path
-    identity: Mapping[str, Any]
-    columns: Columns
+    identity: Mapping[str, Any]  # see `identity.identity_of`
+    columns: Columns  # see `experiment.columns_of`
 
     @property
     def chunks(self) -> Path:

@@ -16,12 +16,7 @@ __all__ = ["ViolationTime", "violation_time"]
 
 @dataclass(frozen=True, kw_only=True)
 class ViolationTime:
-    """The time to the violation of a requirement, as a metric of a run that reached its end.
-
-    Attributes
-    ----------
-    requirement : Requirement
-    """
+    """The time to the violation of a requirement, as a metric of a run that reached its end."""
 
     requirement: Requirement
 

@@ -91,20 +91,11 @@ DIAGRAMS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Grant:
-    """What code of one study may run.
-
-    Attributes
-    ----------
-    reach : Reach
-    folder : Path
-        What paths in the study are relative to.
-    study : str
-        A key of the study, see `record.study_digest`.
-    """
+    """What code of one study may run."""
 
     reach: Reach
-    folder: Path
-    study: str
+    folder: Path  # what paths in the study are relative to
+    study: str  # a key of the study, see `record.study_digest`
 
     def admits(self, path: Path) -> str:
         """Return why a file may not be run; nothing if it may."""
