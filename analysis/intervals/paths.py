@@ -12,7 +12,7 @@ from flint import arb
 
 __all__ = ["Decisions", "Undecided", "decided", "decided_so_far", "every_way", "take", "undecided"]
 
-BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
+BRANCHES = 64  # paths through an equation on one box, beyond which the box is split first
 
 
 class Undecided(ArithmeticError):  # noqa: N818
@@ -112,7 +112,7 @@ def decided_so_far() -> int | None:
 
 
 def every_way(call: Callable[[], Any]) -> Iterator[Any]:
-    """Yield what a call returns on every way through it, with balls that cannot decide the way."""
+    """Yield what a call returns on every path through it, where balls cannot decide which."""
     scripts: list[tuple[bool, ...]] = [()]
     count = 0
     while scripts:
@@ -124,4 +124,4 @@ def every_way(call: Callable[[], Any]) -> Iterator[Any]:
         taken = decisions.taken
         scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
         if count + len(scripts) > BRANCHES:
-            raise Undecided(f"more than {BRANCHES} ways through an equation")
+            raise Undecided(f"more than {BRANCHES} paths through an equation")

@@ -42,7 +42,7 @@ __all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_
 FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
 NOT_CLOSED = (
-    "that x stays in Omega, which (19) needs, is supposed and not shown: (36) holds only as far as "
+    "that x stays in Omega, which (19) needs, is assumed and not shown: (36) holds only as far as "
     "the runs were seen in the box."
 )
 _GROWTH = 1e-3  # relative; less than that, and the boxes do not grow any more

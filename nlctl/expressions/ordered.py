@@ -1,7 +1,7 @@
 """What is known of a comparison with a number from comparisons of the same thing before.
 
 ``if t < 3`` and then ``if t < 7``: where the first holds the second does, and a function with many
-thresholds in a row has few ways through it.  NaN is on no side of any number, so that what did not
+thresholds in a row has few paths through it.  NaN is on no side of any number, so that what did not
 hold before says nothing of where a thing is that may be NaN.
 """
 

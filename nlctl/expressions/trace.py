@@ -17,7 +17,7 @@ from .ordered import implied_by
 from .stage import Stage
 from .staged import LIBRARIES
 
-PATHS = 128  # ways through one function that are followed
+PATHS = 128  # paths through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
@@ -35,7 +35,7 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
         result = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
         if result is None:
-            raise Untraceable("it raises an error on every way")
+            raise Untraceable("it raises an error on every path")
         return result
     except Ambiguous:
         raise
@@ -84,7 +84,7 @@ def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
     """Return the result of a way; there are so many left."""
     left[0] -= 1
     if left[0] < 0:
-        raise Untraceable(f"more than {PATHS} ways through it")
+        raise Untraceable(f"more than {PATHS} paths through it")
     return result
 
 

@@ -65,7 +65,7 @@ def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: r
     def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
         if start in lines:
             raise CompileError(
-                "when something jumps depends on a delayed signal, whose rate nobody keeps: put a "
+                "when something jumps depends on a delayed signal, whose rate is not kept: put a "
                 "lag behind the delay (nlctl.Lag), or take differences of runs"
             )
         if start >= inputs:

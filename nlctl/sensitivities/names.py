@@ -101,7 +101,7 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
     if supplied_of(owner.system) is PAST and key == "delay":
         raise CompileError(
             f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
-            "nobody keeps; take differences of runs"
+            "is not kept; take differences of runs"
         )
 
 

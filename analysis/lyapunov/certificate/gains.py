@@ -61,7 +61,7 @@ class GainDesign:
         max |u| along the simulation; sampled, not proved.
     u_limit, horizon : float
         The limit that was asked for, and the length of the simulation (s).
-    trials : tuple of Trial
+    trials : tuple of GainCandidate
         All gains that the search tried, in order.
 
     Examples

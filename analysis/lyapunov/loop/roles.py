@@ -255,7 +255,7 @@ def _check_outputs(wiring: Wiring, named: Mapping[str, Signal]) -> None:
             if terms != {named[label]: 1.0}:
                 raise DiagramError(
                     f"output '{label}' of '{wiring.top.system.name}' is {_combined(wiring, terms)},"
-                    f" the proof speaks of {_signal(wiring, named[label])}: give it another name"
+                    f" the proof takes {_signal(wiring, named[label])}: give it another name"
                 )
 
 

@@ -173,7 +173,7 @@ def matching(
     lam = beta * k / loop.gain
     if not lam > 0:
         raise DiagramError(
-            f"the proof needs an input gain of the sign that '{paths['law']}' supposes: the "
+            f"the proof needs an input gain of the sign that '{paths['law']}' assumes: the "
             f"coefficient of v alone in '{paths['plant']}' is {float(beta):g}, the actuator's gain "
             f"{float(k):g}, the law's {float(loop.gain):g}"
         )

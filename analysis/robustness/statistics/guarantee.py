@@ -242,7 +242,7 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     if enough is None:
         raise ParameterError(
             f"a plan for the probability {probability:g} needs more than {MOST_RUNS:.0e} runs, "
-            "which nobody counts: take a larger probability"
+            "which cannot be counted: take a larger probability"
         )
     return enough
 

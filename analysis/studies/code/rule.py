@@ -119,7 +119,7 @@ class Grant:
         name = present_name(name)
         if name.partition(".")[0] == "nlctl":
             fits = name in ("nlctl", _ABOUT_LOOPS) or _is_in(name, MADE_OF)
-            return "" if fits or self.reach == "all" else f"'{name}' makes nothing of a loop"
+            return "" if fits or self.reach == "all" else f"'{name}' does nothing with a loop"
         try:
             places = _module_places(name)
         except (ParameterError, OSError):  # said when it is looked for
@@ -136,7 +136,7 @@ class Grant:
         if all(_is_own(p.resolve(), home) for p in places):
             return ""
         if top == "control" and name != top and not _is_in(name, SYSTEMS):
-            return f"'{name}' makes nothing of a loop"
+            return f"'{name}' does nothing with a loop"
         if top in _built_on():
             return ""
         return f"'{top}' is not built on nlctl or python-control"
@@ -265,7 +265,7 @@ def check_place(name: str) -> None:
         raise ParameterError(f"a module has names separated by dots, got '{source}'")
     if _is_standard(source) or source == "__main__":
         raise ParameterError(
-            f"'{source}' is a module of Python's standard library, which makes nothing of a loop"
+            f"'{source}' is a module of Python's standard library, which does nothing with a loop"
         )
 
 
