@@ -369,7 +369,7 @@ def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
     """Return those columns that a frame has, in their order and with their types."""
     for name, kind in columns.items():
         if name in frame and not isinstance(kind, str):
-            others = frame[name][~frame[name].isin(list(kind))]
+            others: Any = frame[name][~frame[name].isin(list(kind))]
             if len(others):
                 raise ValueError(
                     f"column '{name}' holds {str(others.iloc[0])[:40]!r}, no label of it"
