@@ -2,14 +2,14 @@
 
 Both examples of the paper run for 20 s, once and as an ensemble that varies x1(0).  Each solver
 takes the loosest tolerance with which its largest error in the plant's states is at most 1e-6,
-or what --error says, against a reference solution, and the error stands next to its time.  Before
-anything is timed, the right-hand side of each solver is compared with nlctl's.  Times are the
-shortest of several rounds: processor time on one core, wall time on two.  They depend on the
+or what --error says, against a reference solution, and the error is printed next to its time.
+Before anything is timed, the right-hand side of each solver is compared with nlctl's.  Times are
+the shortest of several rounds: processor time on one core, wall time on two.  They depend on the
 machine and on what else it does, so compare ratios within one output only.
 
 Example 2 has backlash.  "play" is the exact operator; "relaxed" is a memory state that follows it
 at 1000 1/s, which is what solvers without events can do: its errors are then taken against the
-accurate solution of the relaxed loop, and the distance to the exact play is printed beside them.
+accurate solution of the relaxed loop, and the distance to the exact play is printed next to them.
 
 The C++ programs need a compiler (and Boost's headers); heyoka, numbalsoda and diffrax are used if
 they are installed (extra "benchmark").  What is missing is skipped.

@@ -49,12 +49,12 @@ def conditions(x: Any) -> Any:
 
 def best(call: Callable[[], Any], repeats: int = REPEATS) -> tuple[float, Any]:
     """Return the least time of some calls (s), and what the last one returns."""
-    found, least = None, np.inf
+    result, least = None, np.inf
     for _ in range(repeats):
         start = time.perf_counter()
-        found = call()
+        result = call()
         least = min(least, time.perf_counter() - start)
-    return least, found
+    return least, result
 
 
 def known_sign(order: int) -> Any:
@@ -63,8 +63,8 @@ def known_sign(order: int) -> Any:
     controller = nlctl.adaptive_neural(
         order, law=nlctl.KnownSignLaw(), weights=nlctl.AdaptiveWeights(Gamma=10.0), robust=robust
     )
-    made = nlctl.paper.example_1 if order == 2 else nlctl.paper.example_2
-    return made(controller=controller)
+    example = nlctl.paper.example_1 if order == 2 else nlctl.paper.example_2
+    return example(controller=controller)
 
 
 def decrease(table: Table) -> None:
@@ -74,12 +74,12 @@ def decrease(table: Table) -> None:
     with only_balls():
         before, on_balls = best(call, 1)
     call()
-    after, found = best(call)
+    after, proof = best(call)
     rate = on_balls.boxes / on_balls.seconds
     name = "V' < 0 of a pendulum"
     table.add_row(f"{name}: balls", on_balls.status, f"{rate:,.0f} boxes/s", f"{before:.3f} s", "1")
     table.add_row(
-        f"{name}: all of the proof", found.status, "", f"{after:.3f} s", f"{before / after:.0f}"
+        f"{name}: all of the proof", proof.status, "", f"{after:.3f} s", f"{before / after:.0f}"
     )
     code = enclosed(expressions_of(conditions, 2)[1], 2)
     ends = np.array(box.low), np.array(box.high)
@@ -108,9 +108,9 @@ def certificates(table: Table) -> None:
         for how, only, call in ways:
             with only():
                 call()
-                seconds, found = best(call)
+                seconds, certificate = best(call)
             times.append(seconds)
-            bounds.append(found.C_0)
+            bounds.append(certificate.C_0)
             share = "" if len(bounds) % 2 else f"C_0 {(bounds[-1] - bounds[-2]) / bounds[-2]:+.1e}"
             table.add_row(
                 f"certify, Example {example}: {how}", share, "", f"{seconds:.3f} s",
@@ -142,22 +142,22 @@ def tubes(table: Table, *, long: bool) -> None:
     reachable_set(laub_loomis, Box.of(**{f"x{i + 1}": (v, v) for i, v in enumerate(centre)}), 0.1)
     for width, limit in ((0.01, 4.5), (0.05, 4.5), (0.1, 5.0)):
         box = Box.of(**{f"x{i + 1}": (v - width, v + width) for i, v in enumerate(centre)})
-        found = reachable_set(laub_loomis, box, 20.0, within=Box.of(x4=(-np.inf, limit)))
+        tube = reachable_set(laub_loomis, box, 20.0, within=Box.of(x4=(-np.inf, limit)))
         name = f"LALO20, W = {width:g}: x4 < {limit:g}"
-        _tube_row(table, name, found, f"width {found.end_high[3] - found.end_low[3]:.3g}")
+        _tube_row(table, name, tube, f"width {tube.end_high[3] - tube.end_low[3]:.3g}")
     if long:
         x, y = (1.25, 1.55), (2.35, 2.45)
-        found = reachable_set(
+        tube = reachable_set(
             coupled, Box.of(x1=x, y1=y, x2=x, y2=y, b=(1.0, 3.0)), 7.0, max_pieces=10_000,
             within=Box.of(y1=(-np.inf, 2.75), y2=(-np.inf, 2.75)),
         )  # fmt: skip
-        slack = max(found.bounds("y1")[1], found.bounds("y2")[1]) - 2.75
-        _tube_row(table, "CVDP23: y1, y2 < 2.75", found, f"slack {slack:.2g}")
+        slack = max(tube.bounds("y1")[1], tube.bounds("y2")[1]) - 2.75
+        _tube_row(table, "CVDP23: y1, y2 < 2.75", tube, f"slack {slack:.2g}")
 
 
-def _tube_row(table: Table, name: str, found: Any, what: str) -> None:
-    table.add_row(name, f"{found.status}, {what}", f"{found.pieces} pieces",
-                  f"{found.seconds:.2f} s", "")  # fmt: skip
+def _tube_row(table: Table, name: str, tube: Any, what: str) -> None:
+    table.add_row(name, f"{tube.status}, {what}", f"{tube.pieces} pieces",
+                  f"{tube.seconds:.2f} s", "")  # fmt: skip
 
 
 def main() -> None:

@@ -34,22 +34,11 @@ PATIENCE = 1.5  # s: what takes longer is timed once
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One competitor's figures.
-
-    Attributes
-    ----------
-    name : str
-    rtol : float
-        The tolerance that was chosen.
-    seconds : float
-        Shortest time of a run, or per member of an ensemble; NaN if it was not timed.
-    accuracy : Accuracy or None
-    members, threads : int
-    """
+    """One competitor's figures."""
 
     name: str
-    rtol: float
-    seconds: float
+    rtol: float  # the tolerance that was chosen
+    seconds: float  # shortest time of a run, or per member of an ensemble; NaN if it was not timed
     accuracy: Accuracy
     members: int = 1
     threads: int = 1
@@ -58,9 +47,9 @@ class Row:
 def available(problem: Problem, names: Iterable[str], say: Callable[[str], object]) -> list[Solver]:
     """Return the solvers that can run here and integrate the right equations.
 
-    What is left out is told with the reason.
+    What is left out is reported with the reason.
     """
-    found = []
+    usable = []
     for name in names:
         module = importlib.import_module(f"competitors.{COMPETITORS[name]}")
         try:
@@ -71,10 +60,10 @@ def available(problem: Problem, names: Iterable[str], say: Callable[[str], objec
         for solver in solvers:
             difference = wrong_equations(problem, solver)
             if difference < SAME * problem.nodes:  # false for NaN
-                found.append(solver)
+                usable.append(solver)
             else:
                 say(f"refused {solver.name}: its equations differ from nlctl's by {difference:.1e}")
-    return found
+    return usable
 
 
 def single_runs(problem: Problem, solvers: Iterable[Solver], rounds: int) -> list[Row]:

@@ -63,13 +63,13 @@ def main() -> None:
         for make in (nlctl.paper.example_1, nlctl.paper.example_2):
             compiled = nlctl.compile(make())
             for width in (1, ENSEMBLE_WIDTH):
-                each = []
+                times = []
                 for k in range(5):
                     os.environ["NLCTL_CACHE_DIR"] = f"{folder}/{make.__name__}-{width}-{k}"
-                    each.append(compile_time(make, width))
+                    times.append(compile_time(make, width))
                 print(
                     f"{make.__name__}, {width} at a time: machine code in "
-                    f"{np.median(each):.0f} ms, right-hand side "
+                    f"{np.median(times):.0f} ms, right-hand side "
                     f"{evaluation_time(compiled, width):.0f} ns per member"
                 )
 

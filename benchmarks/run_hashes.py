@@ -56,8 +56,8 @@ def conditions(system: Any) -> int:
     with contextlib.suppress(Exception):
         compiled = system if isinstance(system, nlctl.native.Compiled) else nlctl.compile(system)
         read = compiled.lowered.rows["g"] - compiled.program.events
-        found = compiled.equations.conditions if hasattr(compiled, "equations") else None
-        return read + (len(found.of_time) if found else 0)
+        hidden = compiled.equations.conditions if hasattr(compiled, "equations") else None
+        return read + (len(hidden.of_time) if hidden else 0)
     return 0
 
 
@@ -65,10 +65,10 @@ def noted(function: Callable[..., Any], lines: list[str], name: str) -> Callable
     """Return a function that notes a line for each result of another one."""
 
     def called(system: Any, *args: Any, **kwargs: Any) -> Any:
-        found = function(system, *args, **kwargs)
+        result = function(system, *args, **kwargs)
         beyond = conditions(system)
-        lines.append(f"{name} {len(lines)} {hashed(found)}" + f" {beyond}" * (beyond > 0))
-        return found
+        lines.append(f"{name} {len(lines)} {hashed(result)}" + f" {beyond}" * (beyond > 0))
+        return result
 
     return called
 

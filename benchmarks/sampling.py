@@ -27,8 +27,8 @@ DT, END, ROUNDS = 1e-3, 20.0, 25
 def seconds(compiled: Any) -> tuple[float, int]:
     """Return the time that one run takes, and its steps."""
     start = time.perf_counter()
-    made = nlctl.input_output_response(compiled, np.array([0.0, END]), step=DT, audit=False)
-    return time.perf_counter() - start, made.statistics.accepted
+    response = nlctl.input_output_response(compiled, np.array([0.0, END]), step=DT, audit=False)
+    return time.perf_counter() - start, response.statistics.accepted
 
 
 def main() -> None:
@@ -41,8 +41,8 @@ def main() -> None:
         sampled = make(controller=nlctl.sampled(law, DT))
         both = [nlctl.compile(loop) for loop in (continuous, sampled)]
         rounds = [[seconds(compiled) for compiled in both] for _ in range(ROUNDS)]
-        one, other = (min(found[i][0] for found in rounds) for i in range(2))
-        steps = " and ".join(str(found[1]) for found in rounds[0])
+        one, other = (min(timed[i][0] for timed in rounds) for i in range(2))
+        steps = " and ".join(str(timed[1]) for timed in rounds[0])
         table.add_row(name, steps, f"{1e3 * one:.1f}", f"{1e3 * other:.1f}", f"{other / one:.2f}")
     console.print(table)
 

@@ -29,15 +29,15 @@ ROUNDS = 15
 
 def shortest(functions: dict[str, Callable[[], object]]) -> dict[str, float]:
     """Return the shortest time of each function (s), all of them in turn."""
-    found = dict.fromkeys(functions, np.inf)
+    least = dict.fromkeys(functions, np.inf)
     for function in functions.values():
         function()  # compiled
     for _ in range(ROUNDS):
         for name, function in functions.items():
             begin = time.perf_counter()
             function()
-            found[name] = min(found[name], time.perf_counter() - begin)
-    return found
+            least[name] = min(least[name], time.perf_counter() - begin)
+    return least
 
 
 def rows(name: str, diagram: object) -> list[tuple[str, ...]]:

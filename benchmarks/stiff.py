@@ -44,31 +44,31 @@ def solvers(update: Callable, end: float, x0: tuple[float, ...]) -> dict[str, So
 
     def engine(method: str) -> Solve:
         def solve(rtol: float) -> np.ndarray:
-            made = nlctl.input_output_response(
+            response = nlctl.input_output_response(
                 compiled, grid, 0, x0, method=method, rtol=rtol, atol=ATOL * rtol, audit=False
             )
-            return made.states[:, -1]
+            return response.states[:, -1]
 
         return solve
 
     def scipy(method: str) -> Solve:
         def solve(rtol: float) -> np.ndarray:
-            made = solve_ivp(
+            solution = solve_ivp(
                 lambda t, x: fused(t, x, nothing, nothing), (0.0, end), x0, method,
                 rtol=max(rtol, 1e-13), atol=ATOL * rtol, t_eval=[end],
             )  # fmt: skip
-            return made.y[:, -1] if made.success else np.full(n, np.nan)
+            return solution.y[:, -1] if solution.success else np.full(n, np.nan)
 
         return solve
 
-    own = {f"nlctl, {method}": engine(method) for method in ("auto", "rodas5p")}
-    return own | {f"SciPy {method}": scipy(method) for method in ("Radau", "LSODA")}
+    of_nlctl = {f"nlctl, {method}": engine(method) for method in ("auto", "rodas5p")}
+    return of_nlctl | {f"SciPy {method}": scipy(method) for method in ("Radau", "LSODA")}
 
 
-def measured(solve: Solve, wanted: np.ndarray) -> tuple[float, float, float]:
+def measured(solve: Solve, expected: np.ndarray) -> tuple[float, float, float]:
     """Return the tolerance at which a solver reaches TARGET, its error there, and its time in s."""
     for rtol in TOLERANCES:
-        error = float(np.max(np.abs(solve(rtol) - wanted) / np.abs(wanted)))
+        error = float(np.max(np.abs(solve(rtol) - expected) / np.abs(expected)))
         if error <= TARGET:
             return rtol, error, min(_seconds(solve, rtol) for _ in range(ROUNDS))
     return np.nan, np.nan, np.nan
@@ -86,9 +86,9 @@ def main() -> None:
     console.print(machine())
     for name, problem in PROBLEMS.items():
         every = solvers(*problem)
-        wanted = every["SciPy Radau"](1e-12)
+        expected = every["SciPy Radau"](1e-12)
         table = Table("solver", "rtol", "error", "ms", "x SciPy Radau", title=name)
-        rows = {key: measured(solve, wanted) for key, solve in every.items()}
+        rows = {key: measured(solve, expected) for key, solve in every.items()}
         for key, (rtol, error, seconds) in rows.items():
             times = rows["SciPy Radau"][2] / seconds
             table.add_row(

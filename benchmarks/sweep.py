@@ -148,8 +148,8 @@ def child(count: int) -> None:
     prepared = decay()
     design = independent(prepared.experiment.space, count, entropy=1)
     with tempfile.TemporaryDirectory() as folder:
-        found = sweep(prepared, design, folder)
-        assert found.complete
+        swept = sweep(prepared, design, folder)
+        assert swept.complete
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
 

@@ -28,16 +28,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", action="store_true", help="time first runs, too")
     parser.add_argument("--why", action="store_true", help="list what is not traced, and why")
     parser.add_argument("--theme", help="one module of the corpus alone")
-    asked = parser.parse_args(arguments)
-    chosen = [e for e in ENTRIES if asked.theme in (None, e.theme)]
+    options = parser.parse_args(arguments)
+    chosen = [e for e in ENTRIES if options.theme in (None, e.theme)]
     fates = {entry.name: fate(entry) for entry in chosen}
     console = Console()
     console.print(_table([e.theme for e in chosen], list(fates.values())))
-    for name, found in fates.items():
-        if found.apart or (asked.why and found.why):
-            text = f"{name}: {found.kind}: {found.apart or found.why}"
+    for name, outcome in fates.items():
+        if outcome.apart or (options.why and outcome.why):
+            text = f"{name}: {outcome.kind}: {outcome.apart or outcome.why}"
             console.print(text, markup=False, highlight=False)
-    if asked.runs:
+    if options.runs:
         traced = [e for e in chosen if fates[e.name].kind == "traced"]
         first_run(traced[0])  # the integrators are loaded
         times = {e.name: first_run(e) for e in traced}
@@ -52,11 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _table(themes: Sequence[str], fates: Sequence[Fate]) -> Table:
     table = Table("theme", "functions", "traced", "called", "refused", "equal to 1e-12")
     for theme in (*dict.fromkeys(themes), "all"):
-        own = [f for f, of in zip(fates, themes, strict=True) if theme in (of, "all")]
-        count = Counter(f.kind for f in own)
-        equal = sum(f.kind == "traced" and not f.apart for f in own)
-        share = f"{count['traced']} ({count['traced'] / len(own):.0%})"
-        table.add_row(theme, str(len(own)), share, str(count["called"]), str(count["refused"]),
+        of_theme = [f for f, of in zip(fates, themes, strict=True) if theme in (of, "all")]
+        count = Counter(f.kind for f in of_theme)
+        equal = sum(f.kind == "traced" and not f.apart for f in of_theme)
+        share = f"{count['traced']} ({count['traced'] / len(of_theme):.0%})"
+        table.add_row(theme, str(len(of_theme)), share, str(count["called"]), str(count["refused"]),
                       f"{equal} of {count['traced']}")  # fmt: skip
     return table
 

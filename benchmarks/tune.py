@@ -71,16 +71,16 @@ PROBLEMS = (
 
 def own_search(problem: Problem, compiled: object) -> tuple[np.ndarray, np.ndarray, nlctl.Tuned]:
     """Return runs so far and the best margin so far of `nlctl.tune`."""
-    found = nlctl.tune(compiled, problem.space, problem.spec, 400, TIMES, starts=1)
-    history = found.history[found.history["by"] == "search"]
-    return history["runs"].to_numpy(), np.maximum.accumulate(history["margin"].to_numpy()), found
+    tuned = nlctl.tune(compiled, problem.space, problem.spec, 400, TIMES, starts=1)
+    history = tuned.history[tuned.history["by"] == "search"]
+    return history["runs"].to_numpy(), np.maximum.accumulate(history["margin"].to_numpy()), tuned
 
 
-def evolution(problem: Problem, compiled: object, found: nlctl.Tuned, seed: int) -> np.ndarray:
+def evolution(problem: Problem, compiled: object, tuned: nlctl.Tuned, seed: int) -> np.ndarray:
     """Return the best margin so far after each run of CMA-ES, over logarithms of the gains."""
-    names, (low, high) = found.names, np.log([found.low, found.high])
+    names, (low, high) = tuned.names, np.log([tuned.low, tuned.high])
     strategy = cma.CMAEvolutionStrategy(
-        (np.log(found.start) - low) / (high - low), 0.25,
+        (np.log(tuned.start) - low) / (high - low), 0.25,
         {
             "bounds": [0, 1], "seed": seed + 1, "verbose": -9, "tolfun": RESOLUTION,
             "tolfunhist": RESOLUTION,
@@ -88,28 +88,28 @@ def evolution(problem: Problem, compiled: object, found: nlctl.Tuned, seed: int)
     )  # fmt: skip
     best: list[float] = []
     while not strategy.stop() and strategy.countiter < GENERATIONS:
-        asked = strategy.ask()
-        gains = np.exp(low + np.clip(asked, 0, 1) * (high - low))
+        proposed = strategy.ask()
+        gains = np.exp(low + np.clip(proposed, 0, 1) * (high - low))
         table = nlctl.ensemble_response(
             compiled, TIMES, params=dict(zip(names, gains.T, strict=True)), max_steps=100_000,
             metrics=problem.spec.requirements, rtol=1e-6, atol=1e-8,
         ).table  # fmt: skip
         margins = table[[r.key for r in problem.spec.requirements]].min(axis=1).fillna(LOST_MARGIN)
-        strategy.tell(asked, list(-margins))
+        strategy.tell(proposed, list(-margins))
         best += list(margins)
     return np.maximum.accumulate(best)
 
 
-def cost_of_derivatives(compiled: object, found: nlctl.Tuned) -> float:
+def cost_of_derivatives(compiled: object, tuned: nlctl.Tuned) -> float:
     """Return how many runs one with derivatives takes, at the gains that were found."""
-    same = {"params": found.params, "audit": False, "rtol": 1e-6, "atol": 1e-8}
+    same = {"params": tuned.params, "audit": False, "rtol": 1e-6, "atol": 1e-8}
 
     def plain() -> object:
         return nlctl.input_output_response(compiled, TIMES, **same)
 
     def differentiated() -> object:
         return nlctl.sensitivity_response(
-            compiled, TIMES, of=["e", "u"], with_respect_to=found.names, **same
+            compiled, TIMES, of=["e", "u"], with_respect_to=tuned.names, **same
         )
 
     took = shortest({"plain": plain, "differentiated": differentiated})
@@ -119,11 +119,18 @@ def cost_of_derivatives(compiled: object, found: nlctl.Tuned) -> float:
 def rows(problem: Problem) -> list[tuple[str, ...]]:
     """Return the figures of one problem."""
     compiled = nlctl.compile(problem.diagram)
-    runs, own, found = own_search(problem, compiled)
-    others = [evolution(problem, compiled, found, seed) for seed in SEEDS]
-    before, end = found.margin_before, float(np.median([other[-1] for other in others]))
-    each, k = cost_of_derivatives(compiled, found), len(found.names)
-    about = (problem.name, f"{k}", f"{before:.3f}", f"{own[-1]:.3f}", f"{end:.3f}", f"{each:.1f}")
+    runs, searched, tuned = own_search(problem, compiled)
+    others = [evolution(problem, compiled, tuned, seed) for seed in SEEDS]
+    before, end = tuned.margin_before, float(np.median([other[-1] for other in others]))
+    cost, k = cost_of_derivatives(compiled, tuned), len(tuned.names)
+    about = (
+        problem.name,
+        f"{k}",
+        f"{before:.3f}",
+        f"{searched[-1]:.3f}",
+        f"{end:.3f}",
+        f"{cost:.1f}",
+    )
     table = []
     for share in (*SHARES, None):
         target = before + (share or 0.0) * (end - before)
@@ -131,9 +138,9 @@ def rows(problem: Problem) -> list[tuple[str, ...]]:
         if share is None:
             met = [other.size for other in others]
         median = float(np.median(met))
-        there = np.flatnonzero(own >= target)
+        there = np.flatnonzero(searched >= target)
         counted = runs[-1] if share is None else runs[there[0]] if there.size else np.inf
-        measured = counted * each / (1 + 0.7 * k)
+        measured = counted * cost / (1 + 0.7 * k)
         figures = (f"{share:.0%}" if share else "end", f"{median:.0f}", f"{measured:.0f}")
         figures += (f"{counted:.0f}", f"{median / measured:.1f}", f"{median / counted:.1f}")
         table.append((*about, *figures))

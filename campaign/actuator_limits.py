@@ -81,20 +81,20 @@ def _latex(value: float) -> str:
 
 
 def actuator_run(example: str, name: str, label: str = "paper") -> dict[str, Any]:
-    """Run an example with one actuator in the place of its own."""
+    """Run an example with one actuator instead of its own."""
     actuator, controller = actuators_of_the_table()[name], rival_controller(example, label)
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
     loop = paper.EXAMPLES[example](actuator=actuator, controller=controller)
-    made: Any = native.uninterrupted(
+    response: Any = native.uninterrupted(
         input_output_response(loop, times, ignore_errors=True, max_steps=_EFFORT)
     )
     row = {
         "example": example, "controller": label, "actuator": name,
-        "status": made.statistics.status.name, "time": made.statistics.time,
+        "status": response.statistics.status.name, "time": response.statistics.time,
         "error": np.nan, "peak": np.nan,
     }  # fmt: skip
-    if made.statistics.status is Status.OK:
-        y, yd, u = (made.outputs[loop.output_index[signal]] for signal in ("y", "yd", "u"))
+    if response.statistics.status is Status.OK:
+        y, yd, u = (response.outputs[loop.output_index[signal]] for signal in ("y", "yd", "u"))
         row["error"] = float(np.abs(y - yd)[times >= TAIL].max())
         row["peak"] = float(np.abs(u).max())
     return row
@@ -112,12 +112,15 @@ def controllers_text(record: pd.DataFrame, example: str) -> str:
     A cell has the error, then what of the spec of reports/example-1.toml it violates, or how and
     when the run ended.
     """
-    own: Any = record[record["example"] == example]
+    of_example: Any = record[record["example"] == example]
     cells = [
-        _cell(row, ok) for row, ok in zip(own.to_dict("records"), meets_the_spec(own), strict=True)
+        _cell(row, ok)
+        for row, ok in zip(of_example.to_dict("records"), meets_the_spec(of_example), strict=True)
     ]
-    labels = list(dict.fromkeys(own["controller"]))
-    table = own.assign(cell=cells).pivot(index="actuator", columns="controller", values="cell")
+    labels = list(dict.fromkeys(of_example["controller"]))
+    table = of_example.assign(cell=cells).pivot(
+        index="actuator", columns="controller", values="cell"
+    )
     rows = ((name, *table.loc[name, labels]) for name in table.index)
     return markdown_table(("actuator", *labels), rows)
 
@@ -132,7 +135,7 @@ def _cell(row: dict[str, Any], meets: bool) -> str:
 
 
 _DOTS = (*(colour for colour, _ in STYLES), *(colour for colour, _ in STYLES))
-_MARKERS = "osD^vP<>"  # colours repeat: the marker tells as well
+_MARKERS = "osD^vP<>"  # colours repeat: the marker distinguishes as well
 _BEYOND, _HALF = 2.3, 0.7  # log10: place of the runs that did not reach their end
 
 
@@ -149,14 +152,15 @@ def actuator_errors(
     names, labels = (list(dict.fromkeys(record[c])) for c in ("actuator", "controller"))
     shown: dict[str, object] = {}
     for place, label in enumerate(labels):
-        own: Any = record[record["controller"] == label]
+        of_controller: Any = record[record["controller"] == label]
         colour, marker = _DOTS[place], _MARKERS[place]
         lines = [
-            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2) for name in own["actuator"]
+            names.index(name) + 0.1 * (place - (len(labels) - 1) / 2)
+            for name in of_controller["actuator"]
         ]
         aside = _BEYOND + 0.16 * (place - (len(labels) - 1) / 2)
-        error = own["error"].fillna(10**aside).to_numpy()
-        fill = [colour if good else "none" for good in meets(own)]
+        error = of_controller["error"].fillna(10**aside).to_numpy()
+        fill = [colour if good else "none" for good in meets(of_controller)]
         ax.scatter(error, lines, 18, fill, marker=marker, edgecolors=colour, linewidths=1.0)
         shown[label] = ax.scatter([], [], 18, colour, marker=marker)
     ax.axvline(band, color=GREY, linewidth=0.9)
@@ -183,15 +187,15 @@ def _main() -> None:
         for label in rival_controllers(example)
         for name in actuators_of_the_table()
     ]
-    made = pd.DataFrame(rows).reindex(columns=_COLUMNS)
-    made.to_csv(ACTUATOR_RECORD, index=False, float_format="%.6g")
+    table = pd.DataFrame(rows).reindex(columns=_COLUMNS)
+    table.to_csv(ACTUATOR_RECORD, index=False, float_format="%.6g")
     kept = pd.read_csv(ACTUATOR_RECORD)
     print(assumption_text())
     for example in paper.EXAMPLES:
         print("\n" + controllers_text(kept, example))
-        own: Any = kept[kept["example"] == example]
+        of_example: Any = kept[kept["example"] == example]
         for folder in sys.argv[1:]:
-            figure = actuator_errors(own, meets_the_spec, BAND)
+            figure = actuator_errors(of_example, meets_the_spec, BAND)
             place = Path(folder) / f"actuators-{example[-1]}.svg"
             place.write_bytes(svg_files([figure])[0])
 

@@ -30,9 +30,11 @@ def tuned_baselines(
     by_key = {m.key: m for m in tracking_metrics(start=10, band=0.15, weights="", gain="")}
     cost, limited = by_key["iae"], by_key["peak_u"]
     published = compiled_loop(build(sensor=sensor(example)))
-    own = {"law.beta": np.array([part_of(published_controller(example), "law").spec.beta])}
+    published_gains = {
+        "law.beta": np.array([part_of(published_controller(example), "law").spec.beta])
+    }
     row = ensemble_response(
-        published, times, params=own, metrics=(limited,), **TOLERANCES
+        published, times, params=published_gains, metrics=(limited,), **TOLERANCES
     ).table.iloc[0]
     limit = float(row[limited.key])
     bounds = {
@@ -40,14 +42,14 @@ def tuned_baselines(
         | {"controller.T_f": (0.005, 0.5)},
         "sliding mode": {"law.K": (limit / 10, limit), "law.phi": (0.01, 1.0)},
     }
-    found = {}
+    tuned = {}
     for label, controller in baselines(example).items():
         loop = compiled_loop(build(controller=controller, sensor=sensor(example)))
-        found[label] = evolved_gains(
+        tuned[label] = evolved_gains(
             loop, bounds[label], times, cost,
             limited=limited, limit=limit, generations=generations, seed=seed,
         )  # fmt: skip
-    return found
+    return tuned
 
 
 if __name__ == "__main__":

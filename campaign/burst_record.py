@@ -73,10 +73,10 @@ def _main() -> None:
     """Make the record again, the two runs at the same time."""
     with ThreadPoolExecutor(len(TOLERANCES)) as pool:
         waiting = [pool.submit(long_run, paper.example_2(), rtol=rtol) for rtol in TOLERANCES]
-        other, run = (each.result() for each in waiting)
-    made = agreed(run, other)
-    write_record(thinned_run(made))
-    print(f"{made}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")
+        other, run = (future.result() for future in waiting)
+    record = agreed(run, other)
+    write_record(thinned_run(record))
+    print(f"{record}\n{RECORD}: the predictions need {max(LOOKS):g} s of a run and are not kept")
 
 
 if __name__ == "__main__":

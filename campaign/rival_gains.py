@@ -69,16 +69,16 @@ def tuned_rivals(
     table = ensemble_response(
         printed, times, 0.0, start, params=params, metrics=(limited,), **TOLERANCES
     ).table
-    found = {}
+    tuned = {}
     for label, bounds in search_bounds(example).items():
         middle = {key: float(np.sqrt(low * high)) for key, (low, high) in bounds.items()}
         loop = compiled_loop(example_with(example, made_with(example, label, middle), actuator))
-        found[label] = evolved_gains(
+        tuned[label] = evolved_gains(
             loop, bounds, times, cost,
             limited=limited, limit=float(table[limited.key].to_numpy().max()), samples=samples,
             generations=max(1, round(candidates / (10 * len(bounds))) - 1), seed=seed,
         )  # fmt: skip
-    return found
+    return tuned
 
 
 if __name__ == "__main__":

@@ -36,15 +36,18 @@ def rival_rows(result: Result, example: str) -> pd.DataFrame:
         actuator = result.asked[finding.key].options["actuator"]
         ranking = finding.tables["ranking"]
         for label in ("paper", *pairs.loc["paper"].index):
-            own: Any = ranking.loc[label]
+            of_controller: Any = ranking.loc[label]
             less = (0.0,) * 3 if label == "paper" else pairs.loc[("paper", label)]
             rows.append(
                 {"example": example, "study": key, "actuator": actuator}
                 | {"controller": label}
                 | dict(zip(KEY, loop_key(example, label, actuator), strict=True))
                 | {"samples": finding.numbers["samples"]}
-                | {key: int(own[key]) for key in ("violations", "failed")}
-                | {key: own[f"median {key}"] for key in ("late_rms", "iae", "peak_u", "energy")}
+                | {key: int(of_controller[key]) for key in ("violations", "failed")}
+                | {
+                    key: of_controller[f"median {key}"]
+                    for key in ("late_rms", "iae", "peak_u", "energy")
+                }
                 | dict(zip(("less", "less_low", "less_high"), tuple(less)[:3], strict=True))
             )
     return pd.DataFrame(rows)
@@ -55,24 +58,27 @@ def rivals_text(record: pd.DataFrame, example: str) -> str:
 
     A cell has violations (of which did not end), median RMS of e and median largest abs(u).
     """
-    own: Any = record[record["example"] == example]
+    of_example: Any = record[record["example"] == example]
     cells = [
-        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}" for r in own.to_dict("records")
+        f"{failed_text(r)}; {r['late_rms']:.4f}; {r['peak_u']:.1f}"
+        for r in of_example.to_dict("records")
     ]
-    table = own.assign(cell=cells).pivot(index="controller", columns="actuator", values="cell")
-    labels = list(dict.fromkeys(own["controller"]))
+    table = of_example.assign(cell=cells).pivot(
+        index="controller", columns="actuator", values="cell"
+    )
+    labels = list(dict.fromkeys(of_example["controller"]))
     rows = ((label, *table.loc[label, list(RIVAL_ACTUATORS)]) for label in labels)
     return markdown_table(("controller", *RIVAL_ACTUATORS.values()), rows)
 
 
 def _main() -> None:
     """Make the record again."""
-    made = []
+    tables = []
     with tempfile.TemporaryDirectory() as folder:
         for example in paper.EXAMPLES:
             result = run(read_study(rivals_study(example)), Path(folder) / example)
-            made.append(rival_rows(result, example))
-    record = pd.concat(made)
+            tables.append(rival_rows(result, example))
+    record = pd.concat(tables)
     record.to_csv(RIVALS_RECORD, index=False, float_format="%.6g")
     for example in paper.EXAMPLES:
         print(rivals_text(record, example) + "\n")

@@ -38,13 +38,13 @@ def refined_runs(example: str, label: str) -> pd.DataFrame:
 
 def _main() -> None:
     """Make the record again."""
-    made = pd.concat(
+    record = pd.concat(
         refined_runs(example, label)
         for example in paper.EXAMPLES
         for label in compared_controllers(example)
     )
-    made.to_csv(SAMPLING_RECORD, index=False, float_format="%.6g")
-    print(spec_ends(made).to_string())
+    record.to_csv(SAMPLING_RECORD, index=False, float_format="%.6g")
+    print(spec_ends(record).to_string())
 
 
 if __name__ == "__main__":

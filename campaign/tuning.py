@@ -22,22 +22,13 @@ LOST = 1e3  # what counts as the excess of a run that did not reach its end
 
 @dataclass(frozen=True, kw_only=True)
 class EvolvedGains:
-    """Gains that were found.
+    """Gains that were found."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name, for ``params=`` of a run.
-    cost, limited : float
-        The two metrics with these gains.
-    runs : int
-        Number of simulations.
-    """
-
-    gains: dict[str, float]
+    gains: dict[str, float]  # values by qualified name, for ``params=`` of a run
+    # the two metrics with these gains
     cost: float
     limited: float
-    runs: int
+    runs: int  # number of simulations
 
 
 def evolved_gains(
@@ -90,17 +81,17 @@ def evolved_gains(
         excess = np.fmin(np.maximum(largest / limit - 1, 0), LOST)
         return np.where(excess > 0, _REFUSED * (1 + excess), mean)
 
-    found = differential_evolution(
+    optimum = differential_evolution(
         costs, np.log(np.array(list(bounds.values()))), maxiter=generations, popsize=10, tol=1e-6,
         polish=False, vectorized=True, updating="deferred", rng=seed,
     )  # fmt: skip
-    if not found.fun < _REFUSED:
+    if not optimum.fun < _REFUSED:
         raise ParameterError(
             f"no gains keep {limited.key} <= {limit:g} within these bounds: widen them"
         )
-    gains = {name: float(value) for name, value in zip(names, np.exp(found.x), strict=True)}
-    largest = outcomes(found.x[:, None])[1]
-    return EvolvedGains(gains=gains, cost=float(found.fun), limited=float(largest[0]), runs=runs)
+    gains = {name: float(value) for name, value in zip(names, np.exp(optimum.x), strict=True)}
+    largest = outcomes(optimum.x[:, None])[1]
+    return EvolvedGains(gains=gains, cost=float(optimum.fun), limited=float(largest[0]), runs=runs)
 
 
 def split_samples(

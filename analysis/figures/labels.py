@@ -42,6 +42,7 @@ def within_reach(values: object) -> np.ndarray:
     return np.clip(y, -min(reach, _LARGEST), min(reach, _LARGEST))
 
 
-def drawable(table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of numbers in one unit with all of them within reach."""
-    return pd.DataFrame(within_reach(table), index=table.index, columns=table.columns)
+def drawable(table: pd.DataFrame, *columns: str) -> pd.DataFrame:
+    """Return columns of a table, numbers in one unit, with all of them within reach."""
+    numbers = within_reach(table[list(columns)])
+    return pd.DataFrame(numbers, index=table.index, columns=list(columns))

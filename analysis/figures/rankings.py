@@ -34,7 +34,7 @@ def screening(effects: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     effects = effects.sort_values("mu_star", ascending=False, kind="stable")
-    effects = drawable(effects[["mu_star", "low", "high", "sigma"]])
+    effects = drawable(effects, "mu_star", "low", "high", "sigma")
     figure, ax = number_axes(effects.index)
     _bar(ax, effects, ("mu_star", "low", "high"), BLUE, "$\\mu^*$, mean magnitude")
     at = np.arange(len(effects))
@@ -59,7 +59,7 @@ def shares(indices: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     indices = indices.sort_values("ST", ascending=False, kind="stable")
-    indices = drawable(indices[["S1", "S1_low", "S1_high", "ST", "ST_low", "ST_high"]])
+    indices = drawable(indices, "S1", "S1_low", "S1_high", "ST", "ST_low", "ST_high")
     figure, ax = number_axes(indices.index)
     _bar(ax, indices, ("S1", "S1_low", "S1_high"), BLUE, "$S_1$, by itself", -0.18)
     _bar(ax, indices, ("ST", "ST_low", "ST_high"), PURPLE, "$S_T$, with interactions", 0.18, "///")
@@ -87,7 +87,7 @@ def tornado(effects: pd.DataFrame, value: float) -> Figure:
     """
     reach = effects[["low", "high"]].abs().max(axis=1).fillna(-1.0)
     order = np.argsort(-reach.to_numpy(), kind="stable")
-    effects = drawable(effects[["low", "high", "run_low", "run_high"]]).iloc[order]
+    effects = drawable(effects, "low", "high", "run_low", "run_high").iloc[order]
     value = float(within_reach(value))
     figure, ax = number_axes(effects.index)
     figure.set_figheight(figure.get_figheight() + 0.4)
@@ -146,7 +146,7 @@ def violation_rates(ranking: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(ranking.index)
-    shares = drawable(ranking[["rate", "rate_low", "rate_high"]])
+    shares = drawable(ranking, "rate", "rate_low", "rate_high")
     _bar(ax, shares, ("rate", "rate_low", "rate_high"), ORANGE, "", hatch="///")
     ax.set(xlabel="share of runs that violate the spec", xlim=(0.0, 1.02))
     ax.xaxis.set_major_formatter(PercentFormatter(1.0))

@@ -87,7 +87,7 @@ def deviations(table: pd.DataFrame) -> Figure:
         Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(table.index)
-    table, height = drawable(table), 0.7 / len(table.columns)
+    table, height = drawable(table, *table.columns), 0.7 / len(table.columns)
     for i, ((name, values), (colour, hatch)) in enumerate(
         zip(table.items(), ((GREY, ""), (BLUE, "///")), strict=False)
     ):

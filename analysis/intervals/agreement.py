@@ -129,11 +129,13 @@ def _compare(
     if not point.any or point.lost:
         return
     values, balls = _on_floats(function, floats, refusal), list(_elements(result))
-    told = f"at {', '.join(f'{x:.6g}' for x in point.taken)}"
+    at_floats = f"at {', '.join(f'{x:.6g}' for x in point.taken)}"
     if values is None or len(values) != len(balls):
         what = "raises an error" if values is None else f"returns {counted(len(values), 'number')}"
         if all(_value(ball).is_finite() for ball in balls):
-            raise refusal(f"with floats {told} it {what}, and with balls it gives {len(balls)}")
+            raise refusal(
+                f"with floats {at_floats} it {what}, and with balls it gives {len(balls)}"
+            )
         return
     thin = _at_point(function, floats) if n < _AT_POINTS else None
     for i, (value, ball) in enumerate(zip(values, balls, strict=True)):
@@ -144,17 +146,17 @@ def _compare(
         room = _BALLS * float(thin[i].rad()) if i < len(thin) else 0.0
         if not (room > 0 and _holds(_value(ball), value, room) and _holds(thin[i], value, room)):
             raise refusal(
-                f"with floats {told} it gives {value:.9g}, and with balls that hold them "
+                f"with floats {at_floats} it gives {value:.9g}, and with balls that hold them "
                 f"{_value(ball)}: it must not ask what its arguments are"
             )
     _compare_quotients(function, arguments, point, (values, balls), refusal)
 
 
 def _compare_quotients(
-    function: Any, arguments: Any, point: _Point, found: Any, refusal: _Refusal
+    function: Any, arguments: Any, point: _Point, results: Any, refusal: _Refusal
 ) -> None:
     """Compare difference quotients with those of floats."""
-    values, balls = found
+    values, balls = results
     v = point.slope
     if v is None or abs(v) < _APART or not any(isinstance(ball, Slope) for ball in balls):
         return
@@ -216,8 +218,8 @@ def _elements(result: Any) -> Iterator[Any]:
 
 
 def _value(ball: Any) -> arb:
-    found = as_ball(ball.here if isinstance(ball, Slope) else ball)
-    return arb.nan() if found is NotImplemented else found.value
+    enclosed = as_ball(ball.here if isinstance(ball, Slope) else ball)
+    return arb.nan() if enclosed is NotImplemented else enclosed.value
 
 
 def _holds(ball: arb, value: float, room: float) -> bool:
@@ -237,7 +239,7 @@ class _Point:
         self.slope: float | None = None
 
     def inside(self, thing: Any) -> Any:
-        """Return an argument with floats in the place of balls."""
+        """Return an argument with floats instead of balls."""
         if thing is UNREAD:
             return 0.0
         if isinstance(thing, Slope):

@@ -56,7 +56,7 @@ class Ball(NumPyFunctions):
 
     Examples
     --------
-    An equation takes it in the place of a number, and its derivative comes along:
+    An equation takes it instead of a number, and its derivative comes along:
 
     >>> from flint import arb
     >>> from nlctl.analysis.intervals.arithmetic import Ball
@@ -76,12 +76,12 @@ class Ball(NumPyFunctions):
         self.gradient = gradient
         self.not_negative = not_negative or bool(value >= 0)
 
-    def known_not_negative(self, known: bool = True) -> Ball:
+    def known_not_negative(self, is_known: bool = True) -> Ball:
         """Return the ball with what is known of its sign besides its ends.
 
         Parameters
         ----------
-        known : bool, optional
+        is_known : bool, optional
             Whether no value is below 0.
 
         Returns
@@ -89,7 +89,7 @@ class Ball(NumPyFunctions):
         Ball
             The same where nothing is new.
         """
-        return Ball(self.value, self.gradient, True) if known and not self.not_negative else self
+        return Ball(self.value, self.gradient, True) if is_known and not self.not_negative else self
 
     def __repr__(self) -> str:
         if _QUIET.get():
@@ -137,8 +137,8 @@ class Ball(NumPyFunctions):
         other = as_ball(other)
         if other is NotImplemented:
             return other
-        found = self._joined(self.value + other.value, 1, other, 1)
-        return found.known_not_negative(self.not_negative and other.not_negative)
+        result = self._joined(self.value + other.value, 1, other, 1)
+        return result.known_not_negative(self.not_negative and other.not_negative)
 
     __radd__ = __add__
 
@@ -159,8 +159,8 @@ class Ball(NumPyFunctions):
         other = as_ball(other)
         if other is NotImplemented:
             return other
-        found = self._joined(self.value * other.value, other.value, other, self.value)
-        return found.known_not_negative(self.not_negative and other.not_negative)
+        result = self._joined(self.value * other.value, other.value, other, self.value)
+        return result.known_not_negative(self.not_negative and other.not_negative)
 
     __rmul__ = __mul__
 
@@ -169,8 +169,8 @@ class Ball(NumPyFunctions):
         if other is NotImplemented:
             return other
         value = self.value / other.value
-        found = self._joined(value, 1 / other.value, other, -value / other.value)
-        return found.known_not_negative(self.not_negative and other.not_negative)
+        result = self._joined(value, 1 / other.value, other, -value / other.value)
+        return result.known_not_negative(self.not_negative and other.not_negative)
 
     def __rtruediv__(self, other: object) -> Any:
         other = as_ball(other)
@@ -184,8 +184,8 @@ class Ball(NumPyFunctions):
         if n < 0:
             return 1 / self ** (-n)
         n = int(n)
-        found = self.chain(power(self.value, n), n * power(self.value, max(n - 1, 0)))
-        return found.known_not_negative(n % 2 == 0 or self.not_negative)
+        result = self.chain(power(self.value, n), n * power(self.value, max(n - 1, 0)))
+        return result.known_not_negative(n % 2 == 0 or self.not_negative)
 
     def __abs__(self) -> Ball:
         return self.maximum(-self).known_not_negative()
@@ -254,7 +254,7 @@ class Ball(NumPyFunctions):
             return self._sinc()
         row = FUNCTIONS[name]
         assert row.enclosure is not None
-        known = name in _NOT_NEGATIVE or (self.not_negative and name in _ODD_AND_RISING)
+        not_negative = name in _NOT_NEGATIVE or (self.not_negative and name in _ODD_AND_RISING)
         if name == "sqrt" and self.not_negative and self.value.is_finite():
             value = self._root()
         else:
@@ -263,11 +263,11 @@ class Ball(NumPyFunctions):
             low, high = (row.enclosure(end) for end in (self.value.lower(), self.value.upper()))
             if self.value.is_finite() and low.is_exact() and high.is_exact():
                 value = low.union(high)
-            return self.chain(value, _ANY).known_not_negative(known)
+            return self.chain(value, _ANY).known_not_negative(not_negative)
         if not self.gradient:
-            return Ball(value, (), known)
-        found = self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
-        return found.known_not_negative(known)
+            return Ball(value, (), not_negative)
+        result = self.chain(value, as_ball(row.derivative[0](Ball(self.value))).value)
+        return result.known_not_negative(not_negative)
 
     def _root(self) -> arb:
         """Return the root of what is not negative, of its ends."""
@@ -303,12 +303,12 @@ class Ball(NumPyFunctions):
         if other is NotImplemented:
             return other
         if name == "power":
-            found = real_power(self.value, other.value, from_zero=self.not_negative)
+            rule = real_power(self.value, other.value, from_zero=self.not_negative)
         else:
-            found = FUNCTIONS_OF_TWO[name](self.value, other.value)
-        value, by_self, by_other = found
-        made = self._joined(value, by_self, other, by_other)
-        return made.known_not_negative(name in ("hypot", "power"))  # a real power has no sign
+            rule = FUNCTIONS_OF_TWO[name](self.value, other.value)
+        value, by_self, by_other = rule
+        result = self._joined(value, by_self, other, by_other)
+        return result.known_not_negative(name in ("hypot", "power"))  # a real power has no sign
 
     def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Ball:
         """Return the linear interpolation of a table, constant beyond its ends.

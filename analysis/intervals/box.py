@@ -180,13 +180,13 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
                 f"visited_box needs responses with named outputs, got {type(response).__name__}"
             )
     labels = [list(r.output_labels or ()) for r in responses]
-    wanted = [n for n in labels[0] if n in ("u", "v") or _is_state(n)]
-    if not any(map(_is_state, wanted)):
+    names = [n for n in labels[0] if n in ("u", "v") or _is_state(n)]
+    if not any(map(_is_state, names)):
         raise ParameterError("visited_box needs the outputs x1, ..., xn in the response")
     sides = {}
-    for name in wanted:
+    for name in names:
         rows = zip(responses, labels, strict=True)
-        values = np.concatenate([np.ravel(r.y[own.index(name)]) for r, own in rows])
+        values = np.concatenate([np.ravel(r.y[outputs.index(name)]) for r, outputs in rows])
         low, high = np.min(values), np.max(values)
         room = margin * (high - low)
         sides[name] = (low - room, high + room)

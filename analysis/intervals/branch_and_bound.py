@@ -54,7 +54,7 @@ class Range:
         Extreme values that are attained (on boxes with an infinite side: that interval
         arithmetic gives at a point of the finite ones).
     boxes, undecided : int
-        Boxes looked at, and those left without a finite bound.
+        Boxes examined, and those left without a finite bound.
     seconds : float
     arithmetic : {"balls", "floats"}
         What proved it: python-flint's balls, or floats rounded outwards in machine code.
@@ -81,14 +81,14 @@ class Range:
 
 @dataclass(frozen=True, kw_only=True)
 class Proof:
-    """What became of the claim low <= f <= high on a box.
+    """The verdict on the claim low <= f <= high on a box.
 
     Attributes
     ----------
     holds : bool or None
         True: proved.  False: refuted, at the point `where`.  None: undecided.
     boxes, undecided : int
-        Boxes looked at, and those that stayed undecided.
+        Boxes examined, and those that stayed undecided.
     where : dict or None
         The point that refutes the claim, or the centre of an undecided box.
     value : float
@@ -113,7 +113,7 @@ class Proof:
 
     @property
     def status(self) -> Literal["proved", "refuted", "undecided"]:
-        """What became of the claim."""
+        """The verdict on the claim."""
         return {True: "proved", False: "refuted"}.get(self.holds, "undecided")  # type: ignore
 
     @property
@@ -180,10 +180,10 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
     integer("enclose", "max_boxes", max_boxes, at_least=1)
-    known, function = function, _also_of_floats("enclose", function)
+    as_given, function = function, _also_of_floats("enclose", function)
     start = time.perf_counter()
-    high, greatest, n, lost, by_code = _end(known, function, box, 1, tol, max_boxes)
-    low, least, m, missed, also = _end(known, function, box, -1, tol, max_boxes)
+    high, greatest, n, lost, by_code = _end(as_given, function, box, 1, tol, max_boxes)
+    low, least, m, missed, also = _end(as_given, function, box, -1, tol, max_boxes)
     return Range(
         low=-low,
         high=high,
@@ -248,15 +248,15 @@ def prove(
     integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
-    known, function = function, _also_of_floats("prove", function)
+    as_given, function = function, _also_of_floats("prove", function)
     start = time.perf_counter()
-    proof = _proved_by_code(known, function, box, (low, high), max_boxes)
+    proof = _proved_by_code(as_given, function, box, (low, high), max_boxes)
     proof = proof or _proved_by_balls(function, box, (low, high), max_boxes)
     return replace(proof, seconds=time.perf_counter() - start)
 
 
 def _proved_by_code(
-    known: Any, function: _Function, box: Box, ends: tuple[float, float], max_boxes: int
+    as_given: Any, function: _Function, box: Box, ends: tuple[float, float], max_boxes: int
 ) -> Proof | None:
     """Return what machine code finds, if there is any; balls confirm a point that refutes."""
     boxes = 0
@@ -264,19 +264,19 @@ def _proved_by_code(
     if max_boxes <= TOO_FEW or not claims:
         return None
     for sign, bound in claims:
-        code = code_for(known, function, box, sign, bound)
+        code = code_for(as_given, function, box, sign, bound)
         if code is None:
             return None
-        found = decided_by_code(code, box, max(max_boxes - boxes, 1))
-        boxes += found.boxes
-        if found.holds:
+        verdict = decided_by_code(code, box, max(max_boxes - boxes, 1))
+        boxes += verdict.boxes
+        if verdict.holds:
             continue
-        value = _at(function, found.point, box)
-        if found.holds is False and not (value.upper() < ends[0] or value.lower() > ends[1]):
+        value = _at(function, verdict.point, box)
+        if verdict.holds is False and not (value.upper() < ends[0] or value.lower() > ends[1]):
             return None
         return Proof(
-            holds=found.holds, boxes=boxes, undecided=found.undecided,
-            where=dict(zip(box.names, map(float, found.point), strict=True)),
+            holds=verdict.holds, boxes=boxes, undecided=verdict.undecided,
+            where=dict(zip(box.names, map(float, verdict.point), strict=True)),
             value=float(value.mid()), seconds=0.0, arithmetic="floats",
         )  # fmt: skip
     return Proof(
@@ -321,15 +321,15 @@ def _proved_by_balls(
 
 
 def _end(
-    known: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
+    as_given: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
 ) -> tuple[float, float, int, int, bool]:
     """Return what `_supremum` does of sign f, and whether machine code has found it."""
-    code = code_for(known, function, box, sign) if max_boxes > TOO_FEW else None
+    code = code_for(as_given, function, box, sign) if max_boxes > TOO_FEW else None
     if code is None:
         mirrored = function if sign > 0 else lambda x: -as_ball(function(x))
         return *_supremum(mirrored, box, tol, max_boxes), False
-    found = supremum_by_code(code, box, tol, max_boxes, HOPELESS)
-    return found.high, found.attained, found.boxes, found.unbounded, True
+    supremum = supremum_by_code(code, box, tol, max_boxes, HOPELESS)
+    return supremum.high, supremum.attained, supremum.boxes, supremum.unbounded, True
 
 
 def _also_of_floats(who: str, function: _Function) -> _Function:

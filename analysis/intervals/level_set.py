@@ -199,15 +199,15 @@ def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Pro
             ends = (box.low, box.high)
             low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in ends)
             face = dataclasses.replace(box, low=low, high=high)
-            found = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
-            if found.holds is False:
-                at = ", ".join(f"{k} = {v:.6g}" for k, v in (found.where or {}).items())
+            proof = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
+            if proof.holds is False:
+                at = ", ".join(f"{k} = {v:.6g}" for k, v in (proof.where or {}).items())
                 raise ParameterError(
-                    f"the box does not hold the level set: V = {found.value:.6g} <= {level:g} at "
+                    f"the box does not hold the level set: V = {proof.value:.6g} <= {level:g} at "
                     f"{at}, on its face {name} = {end:g}: take a larger box, or a lower level"
                 )
-            if found.holds is None:
-                return found
+            if proof.holds is None:
+                return proof
     return None
 
 

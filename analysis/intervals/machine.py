@@ -61,24 +61,15 @@ def only_balls() -> Iterator[None]:
 
 @dataclass(frozen=True, kw_only=True)
 class Readable:
-    """A function of balls that is known as an expression, too.
+    """A function of balls that is known as an expression, too."""
 
-    Attributes
-    ----------
-    of_balls : callable
-        Of a tuple of balls.
-    expressions : callable
-        ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.  Several
-        are conditions, and the function their least.
-    codes : dict
-        Machine code that has been made of it, by sides and sign; None where there is none.
-    read : dict
-        The expressions, by sides.
-    """
-
-    of_balls: Callable[..., Any]
+    of_balls: Callable[..., Any]  # of a tuple of balls
+    # ``expressions(graph, sides)``: the same of symbols, as expressions of the graph.
+    # Several are conditions, and the function their least.
     expressions: Callable[[Graph, tuple[Tracer, ...]], Sequence[Expr]]
+    # machine code that has been made of it, by sides and sign; None where there is none
     codes: dict[tuple[int, int], BoxCode | None] = field(default_factory=dict, compare=False)
+    # the expressions, by sides
     read: dict[int, tuple[Graph, Sequence[Expr]]] = field(default_factory=dict, compare=False)
 
     def __call__(self, *given: Any) -> Any:
@@ -87,17 +78,10 @@ class Readable:
 
 @dataclass(frozen=True, kw_only=True)
 class CodedClaim:
-    """What a claim excludes: that all these numbers are positive at a point of the box.
-
-    Attributes
-    ----------
-    code : BoxCode
-    bound : float
-        What their least is compared with.
-    """
+    """What a claim excludes: that all these numbers are positive at a point of the box."""
 
     code: BoxCode
-    bound: float
+    bound: float  # what their least is compared with
 
 
 def code_for(
@@ -106,16 +90,16 @@ def code_for(
     """Return code for sign f <= bound; None for a function that has none, or on no such machine."""
     if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
         return None
-    known = function.codes if isinstance(function, Readable) else {}
+    codes = function.codes if isinstance(function, Readable) else {}
     key = (len(box.names), sign)
-    if key not in known:
-        code = _made(function, *key)
-        known[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
-    code = known[key]
+    if key not in codes:
+        code = _generated(function, *key)
+        codes[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
+    code = codes[key]
     return None if code is None else CodedClaim(code=code, bound=bound)
 
 
-def _made(function: Any, sides: int, sign: int) -> BoxCode | None:
+def _generated(function: Any, sides: int, sign: int) -> BoxCode | None:
     """Return the code of sign f, None if it has none."""
     try:
         graph, results = _expressions(function, sides)
@@ -132,8 +116,8 @@ def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
     if isinstance(function, Readable):
         if sides not in function.read:
             graph = UnroundedGraph({"x": sides})
-            found = function.expressions(graph, side_leaves(graph, sides))
-            function.read[sides] = graph, found
+            expressions = function.expressions(graph, side_leaves(graph, sides))
+            function.read[sides] = graph, expressions
         return function.read[sides]
     return expressions_of(function, sides)
 
@@ -168,29 +152,29 @@ def _agrees(code: BoxCode, function: Any, box: Box, sign: int) -> bool:
 
 def _point(box: Box, k: int) -> list[float]:
     """Return one of a sequence of points in a box."""
-    found = []
+    point = []
     for i, (a, b) in enumerate(box.cell):
         share = (0.5 + (k + 1) * _GOLDEN ** (i + 1)) % 1.0
         low = a if np.isfinite(a) else min(b, 0.0) - _LARGE if np.isfinite(b) else -_LARGE
         high = b if np.isfinite(b) else max(low, 0.0) + _LARGE
-        found.append(float(min(max(low + share * (high - low), a), b)))
-    return found
+        point.append(float(min(max(low + share * (high - low), a), b)))
+    return point
 
 
 def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
     return np.array(box.low, dtype=float), np.array(box.high, dtype=float)
 
 
-def decided_by_code(found: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
-    """Return what becomes of the claim; the same whatever the number of processors."""
+def decided_by_code(claim: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
+    """Return the verdict on a claim; the same whatever the number of processors."""
     low, high = _ends(box)
     threads = os.cpu_count() or 1
-    return decide_claim(found.code, low, high, found.bound, max_boxes=max_boxes, threads=threads)
+    return decide_claim(claim.code, low, high, claim.bound, max_boxes=max_boxes, threads=threads)
 
 
 def supremum_by_code(
-    found: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
+    claim: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
 ) -> Supremum:
     """Return the supremum of the least of the numbers."""
     low, high = _ends(box)
-    return enclose_supremum(found.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)
+    return enclose_supremum(claim.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)

@@ -30,21 +30,12 @@ EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "min
 
 @dataclass(frozen=True)
 class Atom:
-    """A symbol, or a function of sums that is not divided any further.
+    """A symbol, or a function of sums that is not divided any further."""
 
-    Attributes
-    ----------
-    name : str
-        Of the symbol, or of the function.
-    arguments : tuple of frozenset
-        Monomials of the sums that it is a function of; empty for a symbol.
-    data : tuple
-        Break points and values of a table.
-    """
-
-    name: str
+    name: str  # of the symbol, or of the function
+    # monomials of the sums that it is a function of; empty for a symbol
     arguments: tuple[Monomials, ...] = ()
-    data: tuple[tuple[float, ...], ...] = ()
+    data: tuple[tuple[float, ...], ...] = ()  # break points and values of a table
 
     @property
     def names(self) -> set[str]:
@@ -242,8 +233,8 @@ class Sum(NumPyFunctions):
 
     def _function(self, name: str, *others: Sum, data: tuple[Any, ...] = ()) -> Sum:
         atom = Atom(name, tuple(argument.key() for argument in (self, *others)), data)
-        own = frozenset([] if name in EVERYWHERE else [atom])
-        partial = own.union(self.partial, *(argument.partial for argument in others))
+        undefined = frozenset([] if name in EVERYWHERE else [atom])
+        partial = undefined.union(self.partial, *(argument.partial for argument in others))
         return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)
 
 
@@ -279,7 +270,7 @@ def as_sum(x: Any) -> Any:
 
 
 def indeterminate(name: str) -> Sum:
-    """Return a symbol as a sum, which equations take in the place of a number.
+    """Return a symbol as a sum, which equations take instead of a number.
 
     Examples
     --------

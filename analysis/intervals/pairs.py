@@ -20,13 +20,13 @@ _UNIT = arb(0, 1)
 
 def hull(values: Iterable[arb]) -> arb:
     """Return the smallest interval that holds others; everything if one is not finite."""
-    found: arb | None = None
+    union: arb | None = None
     for value in values:
         if not value.is_finite():
             return arb.nan() if value.is_nan() else _ANY
-        found = value if found is None else found.union(value)
-    assert found is not None
-    return found
+        union = value if union is None else union.union(value)
+    assert union is not None
+    return union
 
 
 def _hypot(x: arb, y: arb) -> Enclosed:

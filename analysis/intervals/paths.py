@@ -12,7 +12,7 @@ from flint import arb
 
 __all__ = ["Decisions", "Undecided", "decided", "decided_so_far", "every_way", "take", "undecided"]
 
-BRANCHES = 64  # ways through an equation on one box, beyond which the box is split first
+BRANCHES = 64  # paths through an equation on one box, beyond which the box is split first
 
 
 class Undecided(ArithmeticError):  # noqa: N818
@@ -32,26 +32,15 @@ class Undecided(ArithmeticError):  # noqa: N818
 
 @dataclass
 class Decisions:
-    """The answers that one run of an equation gets where its balls cannot decide.
+    """The answers that one run of an equation gets where its balls cannot decide."""
 
-    Attributes
-    ----------
-    used : int
-        Comparisons that were answered by decisions, this one or an earlier one.
-    orders : list
-        What answers said of two quantities.
-    taken : tuple of bool
-        Answers so far; those that were not given beforehand are True.
-    given : tuple of bool
-        Answers that are fixed beforehand.
-    """
-
-    given: tuple[bool, ...] = ()
-    taken: tuple[bool, ...] = ()
-    used: int = 0
+    given: tuple[bool, ...] = ()  # answers that are fixed beforehand
+    taken: tuple[bool, ...] = ()  # answers so far; those that were not given beforehand are True
+    used: int = 0  # comparisons that were answered by decisions, this one or an earlier one
+    # what answers said of two quantities
     orders: list[tuple[tuple[Any, Any], set[int]]] = field(default_factory=list, repr=False)
 
-    def known(self, key: tuple[Any, Any]) -> set[int]:
+    def possible(self, key: tuple[Any, Any]) -> set[int]:
         """Return the orders of two quantities that earlier answers leave."""
         for (a, b), orders in self.orders:
             if a is key[0] and (b is key[1] or _same_number(b, key[1])):
@@ -89,7 +78,7 @@ def take(decisions: Decisions) -> Iterator[Decisions]:
 
 @contextmanager
 def undecided() -> Iterator[None]:
-    """Answer nothing: a comparison that balls cannot decide raises, whoever follows branches."""
+    """Answer nothing: a comparison that balls cannot decide raises, whatever branch is followed."""
     token = _DECISIONS.set(None)
     try:
         yield
@@ -101,9 +90,9 @@ def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], wha
     """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:
-        known = decisions.known(key)
-        decisions.used += not possible <= known
-        possible = possible & known
+        so_far = decisions.possible(key)
+        decisions.used += not possible <= so_far
+        possible = possible & so_far
     if possible <= holds:
         return True
     if not possible & holds:
@@ -123,7 +112,7 @@ def decided_so_far() -> int | None:
 
 
 def every_way(call: Callable[[], Any]) -> Iterator[Any]:
-    """Yield what a call returns on every way through it, with balls that cannot decide the way."""
+    """Yield what a call returns on every path through it, where balls cannot decide which."""
     scripts: list[tuple[bool, ...]] = [()]
     count = 0
     while scripts:
@@ -135,4 +124,4 @@ def every_way(call: Callable[[], Any]) -> Iterator[Any]:
         taken = decisions.taken
         scripts += [taken[:i] + (False,) for i in range(len(given), len(taken))]
         if count + len(scripts) > BRANCHES:
-            raise Undecided(f"more than {BRANCHES} ways through an equation")
+            raise Undecided(f"more than {BRANCHES} paths through an equation")

@@ -14,7 +14,7 @@ __all__ = ["UNREAD", "reads_time"]
 
 
 class TimeRead(Exception):  # noqa: N818 (it ends an evaluation; nobody else sees it)
-    """The time was looked at."""
+    """The time was read."""
 
 
 def _refused(*_: Any, **__: Any) -> NoReturn:

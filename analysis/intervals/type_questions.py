@@ -1,7 +1,7 @@
 """What a function may not ask of its arguments: their type, text, identity, attributes.
 
 A run gives it floats, a proof balls, the compiler symbols.  A function that asks which of these it
-got may do one thing in a run and another in a proof, at points that no comparison looks at.  So
+got may do one thing in a run and another in a proof, at points that no comparison visits.  So
 its code is read before it is called, with all that it calls, and the question is named.
 """
 
@@ -71,9 +71,9 @@ def type_question(function: Any) -> str | None:
         if id(thing) in seen:
             continue
         seen[id(thing)] = thing  # kept, so that no other one gets its identity
-        found = _question_of(thing)
-        if found:
-            return found
+        question = _question_of(thing)
+        if question:
+            return question
         waiting += _reached(thing)
     return None
 
@@ -84,7 +84,7 @@ def _question_of(thing: object) -> str | None:
     if isinstance(thing, types.CodeType):
         return _question_in(thing)
     module = thing.__name__ if isinstance(thing, types.ModuleType) else _module_of(thing)
-    return f"uses {module}, which tells types and objects apart" if module in _MODULES else None
+    return f"uses {module}, which distinguishes types and objects" if module in _MODULES else None
 
 
 def _module_of(thing: object) -> str:
@@ -144,18 +144,18 @@ def _of_object(thing: object, names: set[str]) -> Iterator[Any]:
         yield getattr(thing, "py_func", None)  # numba's
         yield getattr(thing, "__wrapped__", None)
         yield getattr(thing, "pyfunc", None)  # of np.vectorize
-    own = {} if isinstance(thing, type) else getattr(thing, "__dict__", {})
+    fields = {} if isinstance(thing, type) else getattr(thing, "__dict__", {})
     members: dict[str, Any] = {}
     for kind in reversed(thing.__mro__ if isinstance(thing, type) else type(thing).__mro__):
         members |= {} if _is_of_library(kind.__module__) else vars(kind)
-    members |= own
+    members |= fields
     waiting, done = (names | _OPERATORS) & set(members), set()
     while waiting:
         name = waiting.pop()
         done.add(name)
         yield members[name]
-        if name in own:
-            yield from _of_object(own[name], names - {name})
+        if name in fields:
+            yield from _of_object(fields[name], names - {name})
         function = getattr(members[name], "fget", getattr(members[name], "__func__", members[name]))
         if isinstance(function, types.FunctionType):  # what it calls of its own object
             waiting |= (set(_names(function.__code__)) & set(members)) - done
@@ -174,24 +174,24 @@ def _question_in(code: types.CodeType) -> str | None:
     for step in dis.get_instructions(code):
         line = step.starts_line if type(step.starts_line) is int else line
         name, op = step.argval, step.opname
-        asked = None
+        question = None
         if op in ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_DEREF") and name in _CALLS:
-            asked = name
+            question = name
         elif op in ("LOAD_ATTR", "LOAD_METHOD", "LOAD_FROM_DICT_OR_GLOBALS", "IMPORT_FROM"):
             dunder = str(name).startswith("__") and name not in _KNOWN_DUNDERS
-            asked = f".{name}" if dunder or name in _CALLS | _ATTRIBUTES else None
+            question = f".{name}" if dunder or name in _CALLS | _ATTRIBUTES else None
         elif op == "IMPORT_NAME" and str(name).partition(".")[0] in _MODULES:
-            asked = f"the module {name}"
+            question = f"the module {name}"
         elif op == "IS_OP" and not (last is not None and last.argval is None):
-            asked = "whether it is an object ('is')"
+            question = "whether it is an object ('is')"
         elif op in ("FORMAT_VALUE", "FORMAT_SIMPLE", "FORMAT_WITH_SPEC", "CONVERT_VALUE"):
-            asked = "for a text ('f\"{...}\"')"
+            question = "for a text ('f\"{...}\"')"
         elif op in ("MATCH_CLASS", "MATCH_MAPPING", "MATCH_SEQUENCE"):
-            asked = "for a class ('match')"
+            question = "for a class ('match')"
         entered += op == "WITH_EXCEPT_START"
         caught += op == "PUSH_EXC_INFO"
-        if asked:
-            return f"asks {asked} in {code.co_qualname}, line {line}"
+        if question:
+            return f"asks {question} in {code.co_qualname}, line {line}"
         last = step
     return f"catches exceptions in {code.co_qualname} ('try')" if caught > entered else None
 
@@ -203,5 +203,5 @@ def is_of_library(function: Any) -> bool:
 
 
 def _is_of_library(module: str) -> bool:
-    known = ("numpy", "scipy", "numba", "control", "flint", "nlctl", "builtins", "math")
-    return module.partition(".")[0] in known
+    libraries = ("numpy", "scipy", "numba", "control", "flint", "nlctl", "builtins", "math")
+    return module.partition(".")[0] in libraries

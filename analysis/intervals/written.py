@@ -1,6 +1,6 @@
 """What a function does with numbers, written down as a list of operations.
 
-A `Written` is one entry of the list; an equation takes it in the place of a number, as it does a
+A `Written` is one entry of the list; an equation takes it instead of a number, as it does a
 ball.  Constants are the doubles of the equation, exactly.  What a comparison decides, and functions
 that are not in the list of `OPERATIONS`, cannot be written.
 """
@@ -58,11 +58,11 @@ class Written(NumPyFunctions):
         self.place = place
 
     def _node(self, *node: Any) -> Written:
-        found = next((i for i, known in enumerate(self.nodes) if known == list(node)), None)
-        if found is None:
-            found = len(self.nodes)
+        place = next((i for i, other in enumerate(self.nodes) if other == list(node)), None)
+        if place is None:
+            place = len(self.nodes)
             self.nodes.append(list(node))
-        return Written(self.nodes, found)
+        return Written(self.nodes, place)
 
     def lifted(self, number: Any) -> Any:  # type: ignore[override]
         """Return a number as an entry of the same list; NotImplemented for what is none."""

@@ -39,10 +39,10 @@ from .premises import Premises, premises
 
 __all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
 
-FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not looked at
+FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
 NOT_CLOSED = (
-    "that x stays in Omega, which (19) needs, is supposed and not shown: (36) holds only as far as "
+    "that x stays in Omega, which (19) needs, is assumed and not shown: (36) holds only as far as "
     "the runs were seen in the box."
 )
 _GROWTH = 1e-3  # relative; less than that, and the boxes do not grow any more
@@ -54,27 +54,17 @@ _TIMES = np.linspace(0.0, 200.0, 97)
 
 @dataclass(frozen=True, kw_only=True)
 class StateReach:
-    """How far x gets while \\|r\\| keeps a bound.
+    r"""How far x gets while \|r\| keeps a bound."""
 
-    Attributes
-    ----------
-    lambdas : tuple of float
-        Of the filtered error (14).
-    e0 : tuple of n balls
-        Initial errors.
-    reference : SumOfSines
-        What the plant shall follow.
-    """
-
-    lambdas: tuple[float, ...]
-    e0: tuple[arb, ...]
-    reference: SumOfSines
+    lambdas: tuple[float, ...]  # of the filtered error (14)
+    e0: tuple[arb, ...]  # initial errors
+    reference: SumOfSines  # what the plant shall follow
 
     def __call__(self, C: float) -> tuple[float, ...]:
         r"""Return bounds of \|x1\|, ..., \|xn\| for \|r\| <= C."""
         errors = error_bounds(self.lambdas, self.e0, arb(C))
-        wanted = reference_bounds(self.reference)
-        return tuple(float(e.upper()) + y for e, y in zip(errors, wanted, strict=False))
+        commands = reference_bounds(self.reference)
+        return tuple(float(e.upper()) + y for e, y in zip(errors, commands, strict=False))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,35 +89,38 @@ class Closure:
     room: float
 
 
-def closure(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants) -> Line:
-    """Return the line that tells whether \\|r\\| <= C_0 keeps the state in a box."""
-    given = premises(found, run.gains)
+def closure(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants) -> Line:
+    """Return the line on whether \\|r\\| <= C_0 keeps the state in a box."""
+    given = premises(constants, run.gains)
     C_0 = given.C_0(float(terms(run.signals, given).V[0]), float(np.max(run.signals["I"])))
     reach = _reach(run, given)
     if reach is None or not np.isfinite(C_0):
         why = "C_0 is infinite" if not np.isfinite(C_0) else "no bound of the reference is known"
         return Line(key="closure", statement=STATEMENT, status="undecided", evidence=why)
     try:
-        own = reach(C_0)
+        bounds = reach(C_0)
     except ParameterError as error:
         return Line(key="closure", statement=STATEMENT, status="undecided", evidence=str(error))
-    names = coordinate_names(len(own))
-    sides = [found.box[x] for x in names]
-    room = min(min(high, -low) - a for (low, high), a in zip(sides, own, strict=True))
-    here = f"C_0 = {C_0:.5g} gives {_told(own)}"
+    names = coordinate_names(len(bounds))
+    sides = [constants.box[x] for x in names]
+    room = min(min(high, -low) - a for (low, high), a in zip(sides, bounds, strict=True))
+    here = f"C_0 = {C_0:.5g} gives {_sides_text(bounds)}"
     if room >= 0:
         return _line("computed", room, f"on this box {here}")
-    other = closed_set(found, run.gains, reach, Q=float(np.max(run.signals["I"])))
+    other = closed_set(constants, run.gains, reach, Q=float(np.max(run.signals["I"])))
     if other.status == "closes":
-        v = "v in [{:.4g}, {:.4g}]".format(*found.box["v"])
-        told = f"not on this box, where {here}, but on {_told(other.box)}, {v}, where C_0 = "
-        return _line("computed", other.room, f"{told}{other.C_0:.5g}")
-    if other.status == "none closes":
-        told = (
-            f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{_weights(found)}: each would "
-            f"hold {_told(other.box)}, where C_0 is {other.C_0:.4g} at least; on this box {here}"
+        v = "v in [{:.4g}, {:.4g}]".format(*constants.box["v"])
+        evidence = (
+            f"not on this box, where {here}, but on {_sides_text(other.box)}, {v}, where C_0 = "
         )
-        return _line("violated", other.room, told)
+        return _line("computed", other.room, f"{evidence}{other.C_0:.5g}")
+    if other.status == "none closes":
+        evidence = (
+            f"none up to |x_i| <= {FARTHEST:g} closes, whatever Q{_weights(constants)}: each would "
+            f"hold {_sides_text(other.box)}, where C_0 is {other.C_0:.4g} at least; "
+            f"on this box {here}"
+        )
+        return _line("violated", other.room, evidence)
     return _line("undecided", room, f"does not close on this box: {here}; of others it is open")
 
 
@@ -143,19 +136,19 @@ def _line(status: Any, room: float, evidence: str) -> Line:
     )
 
 
-def _told(reach: Sequence[float]) -> str:
+def _sides_text(reach: Sequence[float]) -> str:
     names = coordinate_names(len(reach))
     return ", ".join(f"|{x}| <= {a:.4g}" for x, a in zip(names, reach, strict=True))
 
 
-def _weights(found: Constants) -> str:
-    return "" if _given(found) is not None else " and W"
+def _weights(constants: Constants) -> str:
+    return "" if _given(constants) is not None else " and W"
 
 
-def _given(found: Constants) -> Any:
+def _given(constants: Constants) -> Any:
     """Return the weights, if they were asked for and not chosen for the box."""
-    chosen = next(entry for entry in found.entries if entry.symbol == "|W|")
-    return found.W if chosen.provenance == "given" else None
+    chosen = next(entry for entry in constants.entries if entry.symbol == "|W|")
+    return constants.W if chosen.provenance == "given" else None
 
 
 def _reach(run: MemberRun, given: Premises) -> StateReach | None:
@@ -169,12 +162,14 @@ def _reach(run: MemberRun, given: Premises) -> StateReach | None:
     return StateReach(lambdas=given.lambdas, e0=tuple(e0), reference=spec)
 
 
-def closed_set(found: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:
+def closed_set(constants: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:
     """Look for a box that closes, and for a reason why none does."""
-    W = _given(found)
+    W = _given(constants)
     least, C_0, sides = 0.0, abs(float(gains.r_0)), reach(abs(float(gains.r_0)))
     for _ in range(_STEPS):
-        C_0 = max(least_bound(found.parts, found.split, gains, sides, found.box["v"], W), C_0)
+        C_0 = max(
+            least_bound(constants.parts, constants.split, gains, sides, constants.box["v"], W), C_0
+        )
         wider = reach(C_0)
         least = min(a - b for a, b in zip(sides, wider, strict=True))
         if not max(wider) <= FARTHEST:
@@ -183,35 +178,40 @@ def closed_set(found: Constants, gains: Gains, reach: StateReach, *, Q: float = 
         sides = wider
         if grown <= 1 + _GROWTH:
             break
-    for candidate in _candidates(sides, found, gains, reach, W, Q):
+    for candidate in _candidates(sides, constants, gains, reach, W, Q):
         if candidate.room >= 0:
             return candidate
     return Closure(status="undecided", box=sides, C_0=C_0, room=least)
 
 
 def _candidates(
-    sides: tuple[float, ...], found: Constants, gains: Gains, reach: StateReach, W: Any, Q: float
+    sides: tuple[float, ...],
+    constants: Constants,
+    gains: Gains,
+    reach: StateReach,
+    W: Any,
+    Q: float,
 ) -> Iterator[Closure]:
     """Yield boxes around the least one that could close, with their proved constants."""
     names = coordinate_names(len(sides))
     for factor in _ROOM:
         ends = tuple(factor * a for a in sides)
         box = Box(names=names, low=tuple(-a for a in ends), high=ends, how="closure")
-        on_it = _constants(found, box.times("v", *found.box["v"]), W)
+        on_it = _constants(constants, box.times("v", *constants.box["v"]), W)
         given = premises(on_it, gains)
         error = given.W - np.array(gains.W_hat_0)
         C_0 = given.C_0(float(initial_V(gains, given.delta, float(error @ error))), Q)
-        own = reach(C_0) if np.isfinite(C_0) else (np.inf,) * len(ends)
-        room = min(a - b for a, b in zip(ends, own, strict=True))
+        bounds = reach(C_0) if np.isfinite(C_0) else (np.inf,) * len(ends)
+        room = min(a - b for a, b in zip(ends, bounds, strict=True))
         yield Closure(status="closes", box=ends, C_0=C_0, room=room)
 
 
-def _constants(found: Constants, box: Box, W: Any) -> Constants:
+def _constants(constants: Constants, box: Box, W: Any) -> Constants:
     """Return the constants on a box, with the weights that suit it or, where none are found, 0."""
     try:
-        return constants_of(found.parts, found.split, box, W)
+        return constants_of(constants.parts, constants.split, box, W)
     except ParameterError:
-        return constants_of(found.parts, found.split, box, np.zeros(len(found.W)))
+        return constants_of(constants.parts, constants.split, box, np.zeros(len(constants.W)))
 
 
 def least_bound(
@@ -254,10 +254,10 @@ def least_bound(
         return bound(w, error, max(w - from_0, 0.0))
 
     far = of_norm(0.0) * np.sqrt(alpha_1(gains) / gains.sigma_1)  # |W| alone makes it larger beyond
-    found: Any = minimize_scalar(
+    minimum: Any = minimize_scalar(
         of_norm, bounds=(0.0, far), method="bounded", options={"xatol": 1e-9}
     )
-    return min(float(found.fun), of_norm(0.0)) * (1 - 1e-6)
+    return min(float(minimum.fun), of_norm(0.0)) * (1 - 1e-6)
 
 
 def _at_points(parts: Parts, sides: Sequence[float]) -> tuple[np.ndarray, np.ndarray, Any]:

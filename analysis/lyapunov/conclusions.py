@@ -42,13 +42,13 @@ class _Response:
 
 
 def slow_drift_of(run: MemberRun) -> SlowDrift | None:
-    """Return where the slow drift of zeta leads; None if the run does not tell."""
-    found = _slow_drift_or_reason(run)
-    return None if isinstance(found, str) else found
+    """Return where the slow drift of zeta leads; None if the run does not show it."""
+    drift_or_reason = _slow_drift_or_reason(run)
+    return None if isinstance(drift_or_reason, str) else drift_or_reason
 
 
 def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
-    """Return where the slow drift leads, or why that cannot be told."""
+    """Return where the slow drift leads, or why that is unknown."""
     length = run.signals.t[-1] - run.signals.t[0]
     if length < 6 * _WINDOW:
         return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
@@ -58,13 +58,13 @@ def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
         return str(error)
 
 
-def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, found: Constants) -> list[Line]:
+def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants) -> list[Line]:
     """Return the lines of (12), Lemma 1, what remains of it, the slow drift and the closure."""
-    given = premises(found, run.gains)
+    given = premises(constants, run.gains)
     lines = [_property(given), _lemma(), *_bounded(run, given)]
     if np.isfinite(run.signals["zeta"]).all():
-        lines += [*_remains(run, given, found), _slow_drift_line(run)]
-    return [*lines, closure(loop, run, found)]
+        lines += [*_remains(run, given, constants), _slow_drift_line(run)]
+    return [*lines, closure(loop, run, constants)]
 
 
 def _property(given: Premises) -> Line:
@@ -73,15 +73,15 @@ def _property(given: Premises) -> Line:
         seen = nussbaum_property(given.N)
     except ParameterError as error:
         return Line(key="(12)", statement=statement, status="undecided", evidence=str(error))
-    told = f"{counted(len(seen.means), 'lobe')} on [0, {seen.end:.4g}]"
+    evidence = f"{counted(len(seen.means), 'lobe')} on [0, {seen.end:.4g}]"
     if not seen.means:
         changes = counted(len(seen.lobes) - 1, "change of sign", "changes of sign")
-        told = f"{changes} on [0, {seen.end:.4g}], no four lobes"
+        evidence = f"{changes} on [0, {seen.end:.4g}], no four lobes"
     return Line(
         key="(12)",
         statement=statement,
         status="checked" if seen.type_a else "violated",
-        evidence=f"{told}, type B {'seen' if seen.type_b else 'not seen'}",
+        evidence=f"{evidence}, type B {'seen' if seen.type_b else 'not seen'}",
         follows=""
         if seen.type_a
         else "N is not a Nussbaum function on this range: take another N for the law.",
@@ -120,9 +120,9 @@ def _bounded(run: MemberRun, given: Premises) -> list[Line]:
         room = lobe.high - zeta[i]
         ends = antiderivative(given.N)(np.array([lobe.low, zeta[-1]]))
         share = abs(float(ends[1] - ends[0])) / lobe.budget
-        told = f"max zeta = {zeta[i]:.6g}, {100 * share:.3g} % of the lobe's budget spent"
+        evidence = f"max zeta = {zeta[i]:.6g}, {100 * share:.3g} % of the lobe's budget spent"
     except ParameterError:
-        room, told = np.nan, f"max zeta = {zeta[i]:.6g}"
+        room, evidence = np.nan, f"max zeta = {zeta[i]:.6g}"
     status = "checked" if room > 0 else "undecided" if np.isnan(room) else "violated"
     lost = "" if run.lost is None else f"; {run.message}"
     lines.append(
@@ -133,17 +133,17 @@ def _bounded(run: MemberRun, given: Premises) -> list[Line]:
             least=float(room),
             time=float(s.t[i]),
             state=s.at(float(s.t[i])),
-            evidence=told + lost,
+            evidence=evidence + lost,
             follows="N has changed its sign, or r bursts." if lost or room <= 0 else "",
         )
     )
     return lines
 
 
-def _remains(run: MemberRun, given: Premises, found: Constants) -> list[Line]:
+def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line]:
     """Inequality 2.3 (c), and the safe horizon (b)."""
     x = terms(run.signals, given)
-    low, high = found["k_1"] * given.G_min, found["k_2"] * given.G_max
+    low, high = constants["k_1"] * given.G_min, constants["k_2"] * given.G_max
     names = ("(c)", "(b)")
     if not (0 < low <= high < np.inf and np.isfinite(given.alpha_0)):
         return [Line(key=k, statement="bounds of k G", status="undecided") for k in names]
@@ -170,12 +170,12 @@ def _remains(run: MemberRun, given: Premises, found: Constants) -> list[Line]:
         return [c, Line(key="(b)", statement=SAFE, status="undecided", evidence=str(error))]
     crossed = bool(np.any(moved.zeta[moved.time - moved.time[0] < safe.time] >= safe.zeta))
     kept = "violated" if crossed else "checked"
-    told = f"T = {safe.time:.4g} s for a monotone zeta or a constant gain"
+    evidence = f"T = {safe.time:.4g} s for a monotone zeta or a constant gain"
     b = Line(
         key="(b)",
         statement=SAFE,
         status=kept if margin.monotone else "not applicable",
-        evidence=told + ("" if margin.monotone else "; here zeta falls and k G varies"),
+        evidence=evidence + ("" if margin.monotone else "; here zeta falls and k G varies"),
         follows="k G left its bounds." if margin.monotone and crossed else "",
     )
     return [c, b]
@@ -183,17 +183,17 @@ def _remains(run: MemberRun, given: Premises, found: Constants) -> list[Line]:
 
 def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    found = _slow_drift_or_reason(run)
-    if isinstance(found, str):
-        return Line(key="slow drift", statement=statement, status="undecided", evidence=found)
-    calm = found.verdict in ("settles", "reversed")
-    soon = f"; budget spent by {found.burst:.4g} s or so, then max |r| = {found.peak:.4g}"
+    slow = _slow_drift_or_reason(run)
+    if isinstance(slow, str):
+        return Line(key="slow drift", statement=statement, status="undecided", evidence=slow)
+    calm = slow.verdict in ("settles", "reversed")
+    soon = f"; budget spent by {slow.burst:.4g} s or so, then max |r| = {slow.peak:.4g}"
     return Line(
         key="slow drift",
         statement=statement,
         status="checked" if calm else "undecided",
-        least=1 - found.share,
-        time=found.time,
-        evidence=f"{found.verdict}: {100 * found.share:.3g} % of the budget spent, "
-        f"{found.recent.mean():.3g} per s" + ("" if calm else soon),
+        least=1 - slow.share,
+        time=slow.time,
+        evidence=f"{slow.verdict}: {100 * slow.share:.3g} % of the budget spent, "
+        f"{slow.recent.mean():.3g} per s" + ("" if calm else soon),
     )

@@ -154,8 +154,8 @@ class Conservatism:
             for c in self.comparisons
         ]
         lines.append(
-            f"second half: max |r| / lambda = {self.e_1:.5g}, a bound of limsup |e_1| if r goes on "
-            f"like that, and max |e_1| = {self.tail_max_e_1:.5g}"
+            f"second half: max |r| / lambda = {self.e_1:.5g}, a bound of limsup |e_1| if r "
+            f"continues like that, and max |e_1| = {self.tail_max_e_1:.5g}"
         )
         return "\n".join(lines)
 
@@ -178,7 +178,7 @@ def conservatism(
     Returns
     -------
     Conservatism
-        The terms of C_0, the run beside it, and bounds by direct comparison.
+        The terms of C_0, the run next to it, and bounds by direct comparison.
 
     Raises
     ------
@@ -197,8 +197,8 @@ def conservatism(
     1.0 True
     """
     study = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
-    member, found = study.runs.first, study.constants
-    s, given = member.signals, premises(found, member.gains)
+    member, constants = study.runs.first, study.constants
+    s, given = member.signals, premises(constants, member.gains)
     x, Q = terms(s, given), float(np.max(s["I"]))
     V_0, half = float(x.V[0]), 0.5 * (s.t[0] + s.t[-1])
     late, r = over(s.t, s["r"], half, np.inf)
@@ -213,7 +213,7 @@ def conservatism(
         ultimate=given.C_0(0.0, Q),
         tail_max_r=peak(late, r),
         shares=_shares(given, float(x.r[0]), Q),
-        delta_shares=_delta_shares(given, found),
+        delta_shares=_delta_shares(given, constants),
         C_0_along=_bound_with(given, along, given.W, Q),
         C_0_fitted=_fitted(s, given, Q),
         sqrt_2V=float(np.sqrt(2 * np.max(x.V))),
@@ -247,14 +247,14 @@ def _shares(given: Premises, r_0: float, Q: float) -> tuple[Share, ...]:
     )
 
 
-def _delta_shares(given: Premises, found: Constants) -> tuple[Share, ...]:
+def _delta_shares(given: Premises, constants: Constants) -> tuple[Share, ...]:
     rows = (
         ("actuator in delta*", "G_max eps_u*", given.G_max * given.split.eps_star),
         ("disturbance in delta*", "d*", given.d),
         ("network in delta*", "eps*", given.eps),
     )
     return tuple(
-        Share(term=term, formula=formula, value=v, share=v / found["delta*"])
+        Share(term=term, formula=formula, value=v, share=v / constants["delta*"])
         for term, formula, v in rows
     )
 

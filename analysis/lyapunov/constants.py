@@ -349,13 +349,13 @@ def _error_entries(
     return [
         Constant(
             symbol=symbol,
-            value=found.magnitude,
+            value=supremum.magnitude,
             unit=per_second(n),
-            provenance=_outcome(found.magnitude),
-            how=f"{how}, {counted(found.boxes, 'box', 'boxes')}",
+            provenance=_outcome(supremum.magnitude),
+            how=f"{how}, {counted(supremum.boxes, 'box', 'boxes')}",
             over=over,
         )
-        for symbol, found, how, over in rows
+        for symbol, supremum, how, over in rows
     ]
 
 

@@ -35,22 +35,12 @@ U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
 @dataclass(frozen=True, kw_only=True)
 class _Runs:
-    """Runs of the members; more than one are made anew at each iteration, one after the other.
-
-    Attributes
-    ----------
-    loop : control.InterconnectedSystem
-    members : sequence of Member
-    split : Decomposition
-        Of the actuator.
-    max_steps : int
-        Steps after which a run counts as lost.
-    """
+    """Runs of the members; more than one are repeated at each iteration, one after the other."""
 
     loop: ct.InterconnectedSystem
     members: Sequence[Member] = field(repr=False)
-    split: Decomposition
-    max_steps: int = 2_000_000
+    split: Decomposition  # of the actuator
+    max_steps: int = 2_000_000  # steps after which a run counts as lost
 
     def __iter__(self) -> Iterator[MemberRun]:
         if len(self.members) == 1:
@@ -150,11 +140,11 @@ def examine(
     box = _visited(runs) if box is None else box
     sides = [name for name in box.names if name != "u"]
     weights = None if isinstance(W, str) and W == "tightest" else W
-    found = constants(
+    proved = constants(
         loop, box.only(*sides).times("u", -U_MAX, U_MAX), W=weights, k=k, start=fixed[0],
         params=fixed[1],
     )  # fmt: skip
-    return Examination(loop=loop, runs=runs, constants=found)
+    return Examination(loop=loop, runs=runs, constants=proved)
 
 
 def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:

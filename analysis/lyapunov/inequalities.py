@@ -158,15 +158,15 @@ def _equations(signals: Signals, given: Premises, x: Terms) -> tuple[Margin, ...
     filter_signals = [x.r], [np.asarray(filtered)]
     if "e" in signals.values:
         filter_signals = [x.r, signals["e"]], [np.asarray(filtered), e[0]]
-    told = [signals[name] for name in ("y", *names)]
-    told += [signals[f"rate_{name}"] for name in names[:-1]]
+    outputs = [signals[name] for name in ("y", *names)]
+    outputs += [signals[f"rate_{name}"] for name in names[:-1]]
     states = [signals[f"state_{name}"] for name in (names[0], *names, *names[1:])]
     return (
         equality(
             "(1)",
             "x_i' = x_{i+1}, y = x_1, and the outputs are the states",
             t,
-            *_farthest(told, states),
+            *_farthest(outputs, states),
         ),
         equality("(9)", "x_n' = g + k G u + G eps_u + d", t, signals[f"rate_x{n}"], parts),
         equality("(14)", "r = [A^T 1] e, e = e_1", t, *_farthest(*filter_signals)),

@@ -206,36 +206,36 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     for name in settings:
         if name not in _SETTINGS:
             raise unknown("setting", name, _SETTINGS, "of ledger", UnknownKeywordError)
-    found = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
-    return _assembled(found)
+    study = loop if isinstance(loop, Examination) else examine(loop, run, **settings)
+    return _assembled(study)
 
 
 def _assembled(study: Examination) -> Ledger:
     """Merge the lines of all runs: of each the worst."""
     merged: dict[str, Line] = {}
-    loop, found = study.loop, study.constants
+    loop, constants = study.loop, study.constants
     Q, max_r, horizon, count = -np.inf, 0.0, 0.0, 0
     for number, run in enumerate(study.runs):
-        limit = 2 * U_MAX if found.split.provenance == "proved" else np.inf
+        limit = 2 * U_MAX if constants.split.provenance == "proved" else np.inf
         lines = [
             run_line(run),
             decay_line(run),
-            *assumption_lines(run, found, limit),
-            *inequality_lines(run, found),
-            *conclusions(loop, run, found),
+            *assumption_lines(run, constants, limit),
+            *inequality_lines(run, constants),
+            *conclusions(loop, run, constants),
         ]
         for line in lines:
-            own = dataclasses.replace(line, member=number, replay=run.member.options)
-            merged[line.key] = own.worse_of(merged.get(line.key))
+            replayed = dataclasses.replace(line, member=number, replay=run.member.options)
+            merged[line.key] = replayed.worse_of(merged.get(line.key))
         Q = float(np.maximum(Q, np.max(run.signals["I"])))
-        max_r = float(np.maximum(max_r, _largest_r(run, found)))
+        max_r = float(np.maximum(max_r, _largest_r(run, constants)))
         horizon, count = max(horizon, float(run.signals.t[-1])), count + 1
     lines = tuple(dataclasses.replace(line, runs=count) for line in merged.values())
     return Ledger(
         loop=str(loop.name),
         loop_facts=loop_facts(loop),
         lines=lines,
-        constants=found,
+        constants=constants,
         horizon=horizon,
         members=count,
         Q=Q,
@@ -244,6 +244,6 @@ def _assembled(study: Examination) -> Ledger:
     )
 
 
-def _largest_r(run: MemberRun, found: Constants) -> float:
-    x = terms(run.signals, premises(found, run.gains))
+def _largest_r(run: MemberRun, constants: Constants) -> float:
+    x = terms(run.signals, premises(constants, run.gains))
     return peak_by_rates(run.signals.t, x.r, x.r_rate)

@@ -1,4 +1,4 @@
-"""Lines of the ledger: what became of a statement, how that is known, and what follows."""
+"""Lines of the ledger: how a statement was judged, how that is known, and what follows."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ FOLLOWS = {
     "A1": "(2), (3) fail: delta* of (20) does not bound the actuator's error.",
     "A1 range": "the actuator's split is not proved there, and eps_u* need not hold.",
     "A2": "the disturbance is larger than declared: delta* of (20), C_0 of (36) are too small.",
-    "A3": "the gain leaves its sector: (8) fails, G_max and the sign of k G are not as supposed.",
+    "A3": "the gain leaves its sector: (8) fails, G_max and the sign of k G are not as assumed.",
     "(10)": "eps* does not bound the network's error: delta* of (20) is too small.",
     "(1)": "the plant is not a chain of integrators with measured states: another plant.",
-    "(yd)": "the reference's derivatives are not those of yd: (14), (15), (18) speak of others.",
+    "(yd)": "the reference's derivatives are not those of yd: (14), (15), (18) use others.",
     "(9)": "the plant is not x_n' = f(x, v) + d(x, t): the proof is about another plant.",
     "(14)": "r is not the filtered error of (14): (36) says nothing about e.",
     "(15)": "r' is not what (18) starts from: Y_d or the plant differs from the paper's.",
@@ -149,14 +149,14 @@ class Line:
 
 
 def run_line(run: MemberRun) -> Line:
-    """Return the line that tells whether a run reached its horizon."""
-    asked, reached = float(run.member.times[-1]), float(run.signals.t[-1])
+    """Return the line on whether a run reached its horizon."""
+    horizon, reached = float(run.member.times[-1]), float(run.signals.t[-1])
     lost = run.lost is not None
     return Line(
         key="run",
-        statement=f"all signals stay finite over {asked:g} s",
+        statement=f"all signals stay finite over {horizon:g} s",
         status="violated" if lost else "checked",
-        least=(reached if run.lost is None else run.lost) - asked,
+        least=(reached if run.lost is None else run.lost) - horizon,
         time=run.lost if run.lost is not None else np.nan,
         state=run.signals.at(reached),
         evidence=run.message or "native run",
@@ -165,7 +165,7 @@ def run_line(run: MemberRun) -> Line:
 
 
 def decay_line(run: MemberRun) -> Line:
-    """Return the line that tells whether V decays: every rate of (31) is positive."""
+    """Return the line on whether V decays: every rate of (31) is positive."""
     gains = run.gains
     rates = {"2 beta": 2 * gains.beta, "sigma_2 gamma": gains.sigma_2 * gains.gamma}
     if gains.W_hat_0:
@@ -182,14 +182,14 @@ def decay_line(run: MemberRun) -> Line:
     )
 
 
-def assumption_lines(run: MemberRun, found: Constants, u_max: float) -> list[Line]:
+def assumption_lines(run: MemberRun, constants: Constants, u_max: float) -> list[Line]:
     """Return the lines of Assumptions 1 to 3, (10) and the compact set."""
-    given = premises(found, run.gains)
-    how = found.table()
+    given = premises(constants, run.gains)
+    how = constants.table()
     declared = update_is_declared(run.parts.roles.places["plant"])
     sources = {"A1": "eps_u*", "A2": "d*", "A3": "G_max", "(10)": "eps*"}
     lines = []
-    for margin in assumptions(run.signals, given, found.box, u_max):
+    for margin in assumptions(run.signals, given, constants.box, u_max):
         line = _line(margin, run.signals, "checked", "samples of the run")
         if margin.equation == "A1 range" and not np.isfinite(u_max):
             continue  # a split in closed form holds for all u
@@ -203,38 +203,40 @@ def assumption_lines(run: MemberRun, found: Constants, u_max: float) -> list[Lin
                 evidence = f"{line.evidence}; of f and d, which the update follows at the samples"
                 line = dataclasses.replace(line, status="checked", evidence=evidence)
         if margin.equation == "Omega":
-            line = dataclasses.replace(line, evidence=f"box {found.box.how}")
+            line = dataclasses.replace(line, evidence=f"box {constants.box.how}")
         lines.append(line)
     return lines
 
 
-def inequality_lines(run: MemberRun, found: Constants) -> list[Line]:
+def inequality_lines(run: MemberRun, constants: Constants) -> list[Line]:
     """Return the lines of the numbered inequalities, corrected and, where it fails, as printed."""
-    given = premises(found, run.gains)
+    given = premises(constants, run.gains)
     margins = [*inequalities(run.signals, given), *([run.reference] if run.reference else [])]
     lines = [
         _line(margin, run.signals, "checked", counted(margin.t.size, "sample"))
         for margin in margins
     ]
     lines = [_beyond_samples(line) for line in lines]
-    return [*lines, *_literal_lines(run, found, given)]
+    return [*lines, *_literal_lines(run, constants, given)]
 
 
-def _literal_lines(run: MemberRun, found: Constants, given: Premises) -> list[Line]:
+def _literal_lines(run: MemberRun, constants: Constants, given: Premises) -> list[Line]:
     """Return the lines that q cos(w t) enters, with it in g as the paper has it."""
-    printed = literal(given, found, run.parts.plant)
+    printed = literal(given, constants, run.parts.plant)
     if printed is None:
         return []
-    premised = [*assumptions(run.signals, printed, found.box, np.inf)]
+    premised = [*assumptions(run.signals, printed, constants.box, np.inf)]
     lines = []
     for margin in (*premised, *inequalities(run.signals, printed)):
         if margin.equation not in LITERAL:
             continue
         samples = counted(margin.t.size, "sample")
-        told = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
+        evidence = f"{100 * margin.share_violated:.3g} % of {samples} violate it"
         if margin.equation == "(10)":
-            told += f"; no network of x has an eps* below {forcing_bound(found.parts.plant):.4g}"
-        line = _line(margin, run.signals, "checked", told)
+            evidence += (
+                f"; no network of x has an eps* below {forcing_bound(constants.parts.plant):.4g}"
+            )
+        line = _line(margin, run.signals, "checked", evidence)
         premise = f"d* = {printed.d:.4g}, eps* = {printed.eps:.4g}"
         lines.append(
             dataclasses.replace(
@@ -258,8 +260,8 @@ def _beyond_samples(line: Line) -> Line:
     return line
 
 
-def _line(margin: Margin, signals: Signals, known: LineStatus, evidence: str) -> Line:
-    status: LineStatus = known if margin.holds else "violated"
+def _line(margin: Margin, signals: Signals, otherwise: LineStatus, evidence: str) -> Line:
+    status: LineStatus = otherwise if margin.holds else "violated"
     if margin.kind == "inequality" and not np.isfinite(margin.margin).all():
         finite = np.isfinite(np.stack([signals["r"], signals["u"], signals["I"]])).all()
         status = "undecided" if finite else status

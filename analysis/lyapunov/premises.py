@@ -147,7 +147,7 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     Returns
     -------
     Premises or None
-        With the printed numbers in the place of the derived ones.
+        With the printed numbers instead of the derived ones.
 
     Examples
     --------
@@ -172,9 +172,9 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
     if not isinstance(declared, ForcedDuffing):
         return None
     quiet = dataclasses.replace(declared, q_mean=0.0, q_ripple=0.0)
-    own, p = equation_arguments(quiet), equation_arguments(plant)
+    quiet_params, p = equation_arguments(quiet), equation_arguments(plant)
     box = constants.box.only("x1", "x2").times("t", 0.0, np.inf)
-    d = enclose(lambda z: quiet.d(z[:-1], z[-1], own), box).magnitude
+    d = enclose(lambda z: quiet.d(z[:-1], z[-1], quiet_params), box).magnitude
     eps = upper(as_ball(given.eps) + forcing_bound(declared))
     return dataclasses.replace(
         given,

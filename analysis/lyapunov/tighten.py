@@ -45,7 +45,7 @@ OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 @dataclass(frozen=True, kw_only=True)
 class TrialBound:
-    """One set of gains that the search looked at.
+    """One set of gains that the search tried.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Tightened:
     u, u_limit, horizon : float
         max |u| along the run, its limit, and the length of the runs (s).
     trials : tuple of TrialBound
-        All gains that the search looked at, in order.
+        All gains that the search tried, in order.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def tighten(
     k : (k_1, k_2), optional
         Bounds of the actuator's gain, see `decompose`.
     evaluations : int, optional
-        Number of gains that are looked at.
+        Number of gains that are tried.
     max_steps : int, optional
         Steps of a run beyond which gains count as too stiff.
 
@@ -173,7 +173,7 @@ def tighten(
     Raises
     ------
     ParameterError
-        If no gains that were looked at keep the limit, or it is not positive.
+        If no gains that were tried keep the limit, or it is not positive.
     UnknownNameError
         If there is no such `bound`.
 

@@ -1,7 +1,7 @@
 """What samples say of a signal between them: where a curve may be put through them, and which.
 
-A polynomial through samples says something only where the signal is smooth, and samples tell: each
-should lie where its neighbours say.  With up to 8 neighbours the *defect* of a sample is
+A polynomial through samples says something only where the signal is smooth, and samples show where:
+each should lie where its neighbours say.  With up to 8 neighbours the *defect* of a sample is
 
     r = y_k - p(t_k),     p the polynomial through the neighbours,
 
@@ -70,7 +70,7 @@ def _window(first, last, k):
 @equation
 def _defect(t, y, a, b, k):
     """Return how far sample `k` is from where others of [a, b) say, or what rounding makes."""
-    found, size = 0.0, abs(y[k])
+    defect, size = 0.0, abs(y[k])
     for j in range(a, b):
         size = max(size, abs(y[j]))
         if j == k:
@@ -79,8 +79,8 @@ def _defect(t, y, a, b, k):
         for m in range(a, b):
             if m not in (j, k):
                 weight *= (t[k] - t[m]) / (t[j] - t[m])
-        found += weight * (y[j] - y[k])
-    return max(abs(found), _ROUNDING * size)
+        defect += weight * (y[j] - y[k])
+    return max(abs(defect), _ROUNDING * size)
 
 
 @equation
@@ -130,9 +130,9 @@ def _turn(t, y, first, last, k, low, high):
     gain, d, dd = _at(s, c, x)
     doubt = _doubt(t, y, first, last, k)
     beyond = gain * (-1.0 if dd > 0.0 else 1.0)
-    found = beyond > _CLEAR * doubt  # NaN: not
-    value = y[k] + np.sign(gain) * (abs(gain) - _GUARD * doubt) if found else y[k]
-    return t[k] + x, value, found
+    is_clear = beyond > _CLEAR * doubt  # NaN: not
+    value = y[k] + np.sign(gain) * (abs(gain) - _GUARD * doubt) if is_clear else y[k]
+    return t[k] + x, value, is_clear
 
 
 @equation
@@ -170,9 +170,9 @@ def turning_points(t, y, breaks):
         turns = ((up > 0) & (down <= 0)) | ((up < 0) & (down >= 0))
         for k in np.nonzero(turns)[0] + first:
             low, high = t[k - 1] if k > first else start, t[k + 1] if k + 1 < last else end
-            at, extreme, found = _turn(t, y, first, last, k, low, high)
-            found &= bottom <= extreme <= top and (count == 0 or at > place[count - 1])
-            if found and at > low and at < high and at != t[k]:
+            at, extreme, is_clear = _turn(t, y, first, last, k, low, high)
+            is_clear &= bottom <= extreme <= top and (count == 0 or at > place[count - 1])
+            if is_clear and at > low and at < high and at != t[k]:
                 place[count], value[count], before[count] = at, extreme, k + (at > t[k])
                 count += 1
     return before[:count], place[:count], value[:count]

@@ -44,7 +44,7 @@ def in_machine_code(function: Callable[..., Any]) -> Callable[..., Any]:
         return functools.partial(
             in_machine_code(function.func), *function.args, **function.keywords
         )
-    return _compiled(function) if any(function is own for own in OWN) else function
+    return _compiled(function) if any(function is metric for metric in OWN) else function
 
 
 @functools.cache

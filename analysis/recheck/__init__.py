@@ -6,7 +6,7 @@ of the program that found them is used, and nothing but Python's own library: in
 integers, rounded outward, and all else is rational.  The answer is yes, or no with the line of the
 proof that does not hold.
 
-What is taken from the file as a premise, and is for its reader to compare with the loop at hand, is
+What is taken from the file as a premise, and is for its reader to compare with the loop, is
 printed: the kind of controller, the equation, the split v = k u + eps_u, the reference.
 """
 
@@ -19,15 +19,15 @@ from fractions import Fraction
 from typing import Any
 
 from .content import FORMAT, Record, Refuted, need, seal_of
-from .filtered import known_sign_bounds, sliding_mode_bounds, told_of_filter
-from .reference_model import reference_model_bounds, told_of_model
+from .filtered import filter_text, known_sign_bounds, sliding_mode_bounds
+from .reference_model import model_text, reference_model_bounds
 
 __all__ = ["FORMAT", "RECHECKED", "Refuted", "proved_bounds", "recheck", "seal_of"]
 
 RECHECKED = {  # what follows, and the premises in words
-    "known sign": (known_sign_bounds, told_of_filter),
-    "sliding mode": (sliding_mode_bounds, told_of_filter),
-    "reference model": (reference_model_bounds, told_of_model),
+    "known sign": (known_sign_bounds, filter_text),
+    "sliding mode": (sliding_mode_bounds, filter_text),
+    "reference model": (reference_model_bounds, model_text),
 }
 
 
@@ -88,7 +88,7 @@ def proved_bounds(content: Any) -> dict[str, Fraction]:
     Parameters
     ----------
     content : dict
-        What the file holds; the seal and the claim are not looked at.
+        What the file holds; the seal and the claim are ignored.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What stands in the file of a certificate, and the answer no."""
+"""What the file of a certificate holds, and the answer no."""
 
 from __future__ import annotations
 
@@ -57,21 +57,23 @@ class Record:
 
     def positive(self, name: str) -> Fraction:
         """Return a number above 0."""
-        found = read_rational(self[name])
-        need(found > 0, f"{name} is not above 0")
-        return found
+        number = read_rational(self[name])
+        need(number > 0, f"{name} is not above 0")
+        return number
 
     def not_negative(self, name: str) -> Fraction:
         """Return a number that is 0 or above."""
-        found = read_rational(self[name])
-        need(found >= 0, f"{name} is below 0")
-        return found
+        number = read_rational(self[name])
+        need(number >= 0, f"{name} is below 0")
+        return number
 
     def numbers(self, name: str, count: int | None = None) -> list[Fraction]:
         """Return a list of numbers, `count` of them."""
-        found = self[name]
-        need(isinstance(found, list) and count in (None, len(found)), f"{name} is of another size")
-        return [read_rational(text) for text in found]
+        listed = self[name]
+        need(
+            isinstance(listed, list) and count in (None, len(listed)), f"{name} is of another size"
+        )
+        return [read_rational(text) for text in listed]
 
     def interval(self, name: str) -> Interval:
         """Return an interval from its two ends."""
@@ -81,33 +83,33 @@ class Record:
 
     def listed(self, name: str) -> list[Any]:
         """Return a list of anything."""
-        found = self[name]
-        need(isinstance(found, list), f"{name} is not a list")
-        return found
+        entries = self[name]
+        need(isinstance(entries, list), f"{name} is not a list")
+        return entries
 
     def states(self, name: str, count: int | None = None) -> list[str]:
         """Return names of states, `count` of them and none twice."""
-        found = self.listed(name)
-        need(all(isinstance(one, str) for one in found), f"{name} are not names")
+        names = self.listed(name)
+        need(all(isinstance(one, str) for one in names), f"{name} are not names")
         need(
-            count in (None, len(found)) and len(set(found)) == len(found),
+            count in (None, len(names)) and len(set(names)) == len(names),
             f"{name} has other states",
         )
-        return found
+        return names
 
 
 def begins(starts: Record, open_ended: bool = False) -> str:
     """Return in words from where a loop starts; what is not named starts at 0, or anywhere."""
     sides = {name: starts.interval(name) for name in starts.content}
-    told = [
+    named = [
         f"{name}(0) = {float(x.top):.6g}"
         if x.low == x.high
         else f"{name}(0) in [{float(x.bottom):.6g}, {float(x.top):.6g}]"
         for name, x in sides.items()
         if x.low or x.high or open_ended
     ]
-    rest = [] if open_ended else ["all other states 0" if told else "all states 0"]
-    return ", ".join(told + rest)
+    rest = [] if open_ended else ["all other states 0" if named else "all states 0"]
+    return ", ".join(named + rest)
 
 
 def read_split(split: Record, u: Fraction) -> tuple[Fraction, Fraction, Fraction]:

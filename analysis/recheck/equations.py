@@ -40,25 +40,25 @@ class WrittenEquation:
 
         Coordinates without a name among `names` have the same value in x and x_0.
         """
-        found: list[_Slopes] = []
+        values: list[_Slopes] = []
         for operation, *given in self.nodes:
             if operation == "number":
                 number = Interval.of(read_rational(given[0]))
-                found.append((number, number, [ZERO] * len(names)))
+                values.append((number, number, [ZERO] * len(names)))
             elif operation == "symbol":
                 need(given[0] in box, f"no range of {given[0]}")
                 unit = [UNITY if name == given[0] else ZERO for name in names]
-                found.append((box[given[0]], start[given[0]], unit))
+                values.append((box[given[0]], start[given[0]], unit))
             elif operation in ("+", "*", "/", "minimum", "maximum"):
-                found.append(_of_two(operation, *(found[i] for i in given)))
+                values.append(_of_two(operation, *(values[i] for i in given)))
             else:
-                x, x_0, slopes = found[given[0]]
+                x, x_0, slopes = values[given[0]]
                 value, slope = KNOWN_FUNCTIONS.get(operation) or _power(given[1])
                 between, here = x.hull(x_0), value(x)  # of the mean value theorem
                 there = here if x is x_0 else value(x_0)
                 moved = [ZERO if s.low == s.high == 0 else slope(between) * s for s in slopes]
-                found.append((here, there, moved))
-        return found[-1]
+                values.append((here, there, moved))
+        return values[-1]
 
     def on(self, box: _Box) -> Interval:
         """Return the value on a box."""
@@ -115,10 +115,12 @@ def _of_two(operation: str, one: _Slopes, two: _Slopes) -> _Slopes:
     if operation == "+":
         return here, there, [a + b for a, b in both]
     if operation == "*":
-        made = [a * y_0 + x * b for a, b in both]
+        slopes_of_product = [a * y_0 + x * b for a, b in both]
         if len(both) == 1:  # of one coordinate the slope is unique, and both ways enclose it
-            made = [m.meet(a * y + x_0 * b) for m, (a, b) in zip(made, both, strict=True)]
-        return here, there, made
+            slopes_of_product = [
+                m.meet(a * y + x_0 * b) for m, (a, b) in zip(slopes_of_product, both, strict=True)
+            ]
+        return here, there, slopes_of_product
     if operation == "/":
         return here, there, [(a - there * b) / y for a, b in both]
     for (p, p_0, slopes), (q, q_0, _) in ((one, two), (two, one)):

@@ -38,8 +38,8 @@ class Filtered:
 
     def _reference(self) -> list[Fraction]:
         """Check the bounds of yd, yd', ..., over a period, or by the amplitudes."""
-        wanted, sines = self.proof.numbers("reference", self.n + 1), _sines(self.premise)
-        for k, most in enumerate(wanted):
+        bounds, sines = self.proof.numbers("reference", self.n + 1), _sines(self.premise)
+        for k, most in enumerate(bounds):
             if sum(abs(a) * w**k for a, w, _ in sines) <= most:
                 continue
             slowest = Fraction(0)
@@ -48,10 +48,10 @@ class Filtered:
             need(slowest > 0, f"|yd^({k})| <= {float(most):.6g}")
             period = (PI_ENCLOSED * TWO / Interval.of(slowest)).top
             box = {"t": Interval.of(0, period)}
-            made = _derivative(sines, k)
+            derivative = _derivative(sines, k)
             line = f"|yd^({k})| <= {float(most):.6g}"
-            stays(made.near_middle, box, -most, most, line)
-        return wanted
+            stays(derivative.near_middle, box, -most, most, line)
+        return bounds
 
     def _errors(self) -> tuple[list[Fraction], Fraction]:
         """Return bounds of |e_1|, ..., |e_n| while |r| < C, and of |r(0)|.
@@ -81,10 +81,10 @@ class Filtered:
         need(all(len(pair) == 2 and 0 < pair[0] <= pair[1] for pair in ends), "a pole is not > 0")
         coefficients = [Fraction(1), *self.lambdas]
         if all(low == high for low, high in ends):
-            made = [Fraction(1)]
+            product = [Fraction(1)]
             for p, _ in ends:
-                made = [a + p * b for a, b in zip([*made, 0], [0, *made], strict=True)]
-            need(made == coefficients, "the poles are not those of the filter")
+                product = [a + p * b for a, b in zip([*product, 0], [0, *product], strict=True)]
+            need(product == coefficients, "the poles are not those of the filter")
         else:
             signs = [[_horner(coefficients, -p) for p in pair] for pair in ends]
             apart = all(a[1] < b[0] for a, b in pairwise(ends))
@@ -103,15 +103,15 @@ class Filtered:
         stays(self.equation.quotient_on, time | {"v": ALL}, self.G_min, self.G_max, line)
         self.k_1, _, eps = read_split(self.split, Fraction(0))
         self.delta = self.matched + self.G_max * eps
-        own = (a * e for a, e in zip(reversed(self.lambdas), self.errors[1:], strict=True))
-        self.Y_d = self.wanted[self.n] + sum(map(abs, own), Fraction(0))
+        error_terms = (a * e for a, e in zip(reversed(self.lambdas), self.errors[1:], strict=True))
+        self.Y_d = self.wanted[self.n] + sum(map(abs, error_terms), Fraction(0))
 
 
-def told_of_filter(whole: Record) -> str:
+def filter_text(whole: Record) -> str:
     """Return the starts, and what the reader compares with his loop, in words."""
     premise = whole.record("premises")
     gains, lambdas = premise.record("gains"), premise.numbers("lambdas")
-    told = ", ".join(f"{name} = {float(gains.number(name)):.6g}" for name in gains.content)
+    numbers = ", ".join(f"{name} = {float(gains.number(name)):.6g}" for name in gains.content)
     states = ("plant", *(part for part in ("weights", "delta_hat") if part in premise.content))
     sines = (
         f"{float(a):.6g} sin({float(w):.6g} t + {float(c):.6g})" for a, w, c in _sines(premise)
@@ -120,13 +120,14 @@ def told_of_filter(whole: Record) -> str:
         f"{begins(premise.record('starts'))}. Premises: {whole['kind']}; "
         f"{states_text(premise, states)}; "
         f"x{len(lambdas) + 1}' = {WrittenEquation(premise['equation'])}; yd = {' + '.join(sines)}; "
-        f"{split_text(premise.record('actuator'))}; lambda = {[float(a) for a in lambdas]}; {told}"
+        f"{split_text(premise.record('actuator'))}; lambda = {[float(a) for a in lambdas]}; "
+        f"{numbers}"
     )
 
 
 def _sines(premise: Record) -> list[tuple[Fraction, Fraction, Fraction]]:
-    known = premise.record("reference")
-    columns = [known.numbers(name) for name in ("amplitudes", "frequencies", "phases")]
+    reference = premise.record("reference")
+    columns = [reference.numbers(name) for name in ("amplitudes", "frequencies", "phases")]
     need(len(set(map(len, columns))) == 1, "the reference has columns of different sizes")
     return list(zip(*columns, strict=True))
 

@@ -200,12 +200,12 @@ def sin(x: Interval) -> Interval:
         y = Interval(end, end) - whole * Interval.of(round(Fraction(end, whole.low)))
         return _taylor(y, (0, 1, 0, -1)).meet(WITHIN_ONE)
 
-    found = at(x.low).hull(at(x.high))
+    range_of_sine = at(x.low).hull(at(x.high))
     for share, extreme in ((Fraction(1, 4), _UNIT), (Fraction(-1, 4), -_UNIT)):
         turns = x / whole - Interval.of(share)
         if math.floor(turns.top) >= math.ceil(turns.bottom):
-            found = found.hull(Interval(extreme, extreme))
-    return found
+            range_of_sine = range_of_sine.hull(Interval(extreme, extreme))
+    return range_of_sine
 
 
 def cos(x: Interval) -> Interval:

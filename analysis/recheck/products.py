@@ -21,24 +21,26 @@ def one_symbol(name: str) -> SumOfProducts:
 
 def plus(a: SumOfProducts, b: SumOfProducts, scale: Fraction) -> SumOfProducts:
     """Return a + scale b."""
-    made = dict(a)
+    total = dict(a)
     for product, c in b.items():
-        made[product] = made.get(product, Fraction(0)) + scale * c
-    need(all(c.numerator.bit_length() <= _BITS for c in made.values()), "a number is too large")
-    return {product: c for product, c in made.items() if c}
+        total[product] = total.get(product, Fraction(0)) + scale * c
+    need(all(c.numerator.bit_length() <= _BITS for c in total.values()), "a number is too large")
+    return {product: c for product, c in total.items() if c}
 
 
 def _times(a: SumOfProducts, b: SumOfProducts) -> SumOfProducts:
     need(len(a) * len(b) <= _MOST, "an equation is too long")
-    made: SumOfProducts = {}
+    result: SumOfProducts = {}
     for one, c in a.items():
         for two, d in b.items():
             powers: dict[Any, int] = dict(one)
             for atom, n in two:
                 powers[atom] = powers.get(atom, 0) + n
             product = tuple(sorted(powers.items(), key=repr))
-            made = plus(made, {product: c}, d) if product in made else made | {product: c * d}
-    return plus({}, made, Fraction(1))
+            result = (
+                plus(result, {product: c}, d) if product in result else result | {product: c * d}
+            )
+    return plus({}, result, Fraction(1))
 
 
 def _function(operation: str, *arguments: SumOfProducts) -> SumOfProducts:
@@ -48,28 +50,28 @@ def _function(operation: str, *arguments: SumOfProducts) -> SumOfProducts:
 
 def multiplied_out(equation: WrittenEquation) -> SumOfProducts:
     """Return an equation as a sum of products of symbols and functions of sums."""
-    found: list[SumOfProducts] = []
+    sums: list[SumOfProducts] = []
     for operation, *given in equation.nodes:
         if operation == "number":
-            found.append(plus({}, NO_SYMBOLS, read_rational(given[0])))
+            sums.append(plus({}, NO_SYMBOLS, read_rational(given[0])))
         elif operation == "symbol":
-            found.append(one_symbol(given[0]))
+            sums.append(one_symbol(given[0]))
         elif operation == "power":
-            made = NO_SYMBOLS
+            power = NO_SYMBOLS
             for _ in range(given[1]):
-                made = _times(made, found[given[0]])
-            found.append(made)
+                power = _times(power, sums[given[0]])
+            sums.append(power)
         elif operation == "+":
-            found.append(plus(found[given[0]], found[given[1]], Fraction(1)))
+            sums.append(plus(sums[given[0]], sums[given[1]], Fraction(1)))
         elif operation == "*":
-            found.append(_times(found[given[0]], found[given[1]]))
-        elif operation == "/" and found[given[1]].keys() == {()}:
-            found.append(plus({}, found[given[0]], 1 / found[given[1]][()]))
+            sums.append(_times(sums[given[0]], sums[given[1]]))
+        elif operation == "/" and sums[given[1]].keys() == {()}:
+            sums.append(plus({}, sums[given[0]], 1 / sums[given[1]][()]))
         elif operation == "/":
-            found.append(_times(found[given[0]], _function("/", found[given[1]])))
+            sums.append(_times(sums[given[0]], _function("/", sums[given[1]])))
         else:
-            found.append(_function(operation, *(found[i] for i in given)))
-    return found[-1]
+            sums.append(_function(operation, *(sums[i] for i in given)))
+    return sums[-1]
 
 
 def as_equation(total: Mapping[tuple[Any, ...], Fraction]) -> WrittenEquation:

@@ -80,7 +80,7 @@ class EnergyForm:
 
 
 class FollowedModel:
-    """A loop with a reference model, as it stands in the file."""
+    """A loop with a reference model, as the file has it."""
 
     def __init__(self, whole: Record) -> None:
         self.premise, self.proof = whole.record("premises"), whole.record("proof")
@@ -156,8 +156,8 @@ class FollowedModel:
         u = (W_hat * sqrt(psi).top + feedback) / abs(self.gain)
         k_1, k_2, eps = read_split(self.split, u)
         box["v"] = _around(k_2 * u + eps)
-        own = {name: x for name, x in box.items() if name in "tv" or name[1:].isdigit()}
-        value = self.plant.on(own)
+        sides = {name: x for name, x in box.items() if name in "tv" or name[1:].isdigit()}
+        value = self.plant.on(sides)
         need(absolute(value).top < ALL.high, "the plant's equation has a value on the box")
         line = f"|rest| <= {float(most):.6g}"
         need(most >= 0, line)
@@ -222,32 +222,35 @@ def reference_model_bounds(whole: Record) -> dict[str, Fraction]:
     need(loop.law["kind"] in _KINDS, "the modification of the weights is another one")
     fall, all_falls = _KINDS[loop.law["kind"]]
     stages = [Record(stage, "a stage") for stage in loop.proof.listed("stages")]
-    found: dict[str, Fraction] = {}
+    bounds: dict[str, Fraction] = {}
     level = end = Fraction(0)
     for stage in stages:
         C = stage.positive("C")
         D, u, W_hat = loop.region(C, stage.number("rest"))
-        if not found:
+        if not bounds:
             level, end = fall(loop, D, stage, loop.V_0)
             need(level < C, f"V <= {float(level):.6g} is below C = {float(C):.6g}")
             errors = loop.form.errors(level)
-            found = {f"|E_{i + 1}|": e for i, e in enumerate(errors)} | {"|W_hat|": W_hat, "|u|": u}
+            bounds = {f"|E_{i + 1}|": e for i, e in enumerate(errors)} | {
+                "|W_hat|": W_hat,
+                "|u|": u,
+            }
         else:
             need(all_falls and end < C, f"V falls below C = {float(C):.6g}")
             end = min(end, fall(loop, D, stage, Fraction(0))[1])
-    need(bool(found), "there is no stage")
-    return found | {"limsup |E_1|": loop.form.errors(end)[0]}
+    need(bool(bounds), "there is no stage")
+    return bounds | {"limsup |E_1|": loop.form.errors(end)[0]}
 
 
-def told_of_model(whole: Record) -> str:
+def model_text(whole: Record) -> str:
     """Return what the reader compares with his loop, in words."""
     premise = whole.record("premises")
     law, n = premise.record("weights"), len(premise.numbers("K"))
     rows = ((name, [float(x) for x in premise.numbers(name)]) for name in ("K", "a", "P_b"))
     numbers = ", ".join(f"{name} = {row}" for name, row in rows)
     psi = ", ".join(str(WrittenEquation(nodes)) for nodes in premise.listed("regressor"))
-    own = {name: law[name] for name in law.content if name != "kind"}
-    told = ", ".join(f"{name} = {float(law.number(name)):.6g}" for name in own)
+    parameters = {name: law[name] for name in law.content if name != "kind"}
+    listed = ", ".join(f"{name} = {float(law.number(name)):.6g}" for name in parameters)
     gain = "-W_hat^T psi" if premise["gain"] is None else (
         f"(b yd - a^T xm - K^T E - W_hat^T psi) / {float(premise.number('gain')):.6g}")  # fmt: skip
     level = "" if premise["level"] is None else f"V(0) <= {float(premise.number('level')):.6g}, "
@@ -259,5 +262,5 @@ def told_of_model(whole: Record) -> str:
         f"{states_text(premise, ('plant', 'model', 'W_hat'))}; "
         f"x{n}' = {WrittenEquation(premise['equation'])}; u = {gain}; psi = [{psi}]; {numbers}, "
         f"b = {float(premise.number('b')):.6g}; |yd| <= {float(premise.number('command')):.6g}; "
-        f"{split_text(premise.record('actuator'))}; {law['kind']}: {told}"
+        f"{split_text(premise.record('actuator'))}; {law['kind']}: {listed}"
     )

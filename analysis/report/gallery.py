@@ -151,7 +151,7 @@ def write_gallery(
     return Path(folder) / "index.html"
 
 
-def _history(found: Sequence[Entry], draw: Callable[[Trend], Figure] | None) -> dict[str, object]:
+def _history(found: Sequence[Entry], draw: Callable[[Trend], Figure] | None) -> dict[str, Any]:
     """Return what the page shows of studies with several reports."""
     several = trends(
         Revision(folder=e.folder, label=e.revision or e.folder, content=e.content)

@@ -70,7 +70,7 @@ def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path)
 
 
 def labels(name: str, choices: Choices) -> Choice:
-    """Return a choice with its options as they stand in the file."""
+    """Return a choice with its options as the file has them."""
     for label in choices.weights:
         if label not in choices.options:
             raise unknown("option", label, choices.options, f"in the weights of '{name}'")
@@ -117,43 +117,43 @@ def metrics_of(study: Study, folder: Path, signals: frozenset[str]) -> tuple[Met
     if study.metrics is None:
         return ()
     asked = study.metrics
-    known = inspect.signature(tracking_metrics).parameters
+    parameters = inspect.signature(tracking_metrics).parameters
     names = {key: getattr(asked, key) for key in SIGNALS}
     for key, given in names.items():
         if given is None:
-            names[key] = known[key].default if known[key].default in signals else ""
+            names[key] = parameters[key].default if parameters[key].default in signals else ""
     start = study.time.end / 2 if asked.start is None else asked.start
     usual = tracking_metrics(start=start, band=asked.band, swing=asked.swing, **names)
     return (*usual, *(_metric(value, folder) for value in asked.more))
 
 
 def _metric(value: Any, folder: Path) -> Metric:
-    made = option(value, folder)
-    missing = [part for part in METRIC if not hasattr(made, part)]
+    metric = option(value, folder)
+    missing = [part for part in METRIC if not hasattr(metric, part)]
     if missing:
         raise ParameterError(
             f"a metric needs {', '.join(METRIC)}, what {value.get('function')} returns lacks "
             f"{', '.join(missing)}; see nlctl.analysis.metrics.Metric"
         )
-    return made
+    return metric
 
 
 def inputs_of(study: Study, diagrams: Iterable[ct.InputOutputSystem]) -> tuple[float, ...]:
     """Return the value of each input of the diagrams, in their order."""
     labels = [list(diagram.input_labels) for diagram in diagrams]
-    for known in labels:
+    for names in labels:
         for name in study.inputs:
-            if name not in known:
-                raise unknown("input", name, known)
-        for name in known:
+            if name not in names:
+                raise unknown("input", name, names)
+        for name in names:
             if name not in study.inputs:
                 raise ParameterError(
                     f"the loop's input '{name}' is fed by nothing: give its value under [inputs], "
                     "or feed it by a block of the loop, such as a reference"
                 )
-        if known != labels[0]:
+        if names != labels[0]:
             raise ParameterError(
-                f"every option needs its inputs in the same order, got {labels[0]} and {known}"
+                f"every option needs its inputs in the same order, got {labels[0]} and {names}"
             )
     return tuple(study.inputs[name] for name in labels[0])
 
@@ -181,13 +181,13 @@ def experiment(
 
 def faults_of(signal: str, faulty: Faulty) -> dict[str, Fault]:
     """Return the faults that a table under ``[faults]`` describes, by name, all from 0 s on."""
-    found = {}
+    faults = {}
     for kind, size in faulty.model_dump(exclude_none=True).items():
         lasts = size if kind == "dropout" else None
         value = None if size is True or lasts else size
         block = "fault_" + "".join(c if c.isalnum() else "_" for c in f"{signal}_{kind}")
-        found[f"{signal} {kind}"] = Fault(signal, kind, value, at=0.0, until=lasts, name=block)
-    return found
+        faults[f"{signal} {kind}"] = Fault(signal, kind, value, at=0.0, until=lasts, name=block)
+    return faults
 
 
 _SIZED = {"i.i.d.": independent, "Sobol'": sobol, "Latin hypercube": latin_hypercube}

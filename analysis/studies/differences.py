@@ -50,8 +50,8 @@ def origin_differences(first: Path, second: Path) -> str:
     for folder in (first, second):
         checked(folder)
     one, other = (load_run(folder)["origin"] for folder in (first, second))
-    told = [loop_differences(one, other), version_differences(one, other)]
-    return "; ".join(filter(None, told))
+    parts = [loop_differences(one, other), version_differences(one, other)]
+    return "; ".join(filter(None, parts))
 
 
 @as_annotated
@@ -102,14 +102,14 @@ def run_differences(first: Path, second: Path) -> list[str]:
     >>> print(found[1])
     findings.probability.numbers.violations was 0, now 20
     """
-    found, one, other = [], load_result(first), load_result(second)
+    contents, one, other = [], load_result(first), load_result(second)
     for folder in (first, second):
         content = read_json(folder / "results.json")
         del content["origin"]
         for name, key in (("findings", "key"), ("quantities", "name"), ("requirements", "key")):
             content[name] = {part.pop(key): part for part in content[name]}
-        found.append(content)
-    return [*differences_of(*found), *_table_differences(one, other)]
+        contents.append(content)
+    return [*differences_of(*contents), *_table_differences(one, other)]
 
 
 def long_table_differences(first: Path, second: Path, rtol: float = 0.0) -> list[str]:
@@ -125,25 +125,25 @@ def _table_differences(
 
     Of tables of findings only those count that have more lines than `longer_than`.
     """
-    found: list[str] = []
+    differences: list[str] = []
     if (first.rows is None) != (second.rows is None):
-        found.append(f"the main table is {'new' if first.rows is None else 'gone'}")
+        differences.append(f"the main table is {'new' if first.rows is None else 'gone'}")
     elif first.rows is not None and second.rows is not None:
-        found += _differences("rows", first.rows.table, second.rows.table, rtol)
+        differences += _differences("rows", first.rows.table, second.rows.table, rtol)
     others = {finding.key: finding for finding in second.findings}
     for finding in first.findings:
         if finding.key not in others:
-            continue  # told with the findings
+            continue  # reported with the findings
         old, new = finding.tables, others[finding.key].tables
         for name in dict.fromkeys([*old, *new]):
             place = f"{finding.key}.{name}"
             if max(len(t[name]) for t in (old, new) if name in t) <= longer_than:
                 continue
             if name in old and name in new:
-                found += _differences(place, old[name], new[name], rtol)
+                differences += _differences(place, old[name], new[name], rtol)
             else:
-                found.append(f"the table {place} is {'new' if name in new else 'gone'}")
-    return found
+                differences.append(f"the table {place} is {'new' if name in new else 'gone'}")
+    return differences
 
 
 def _differences(place: str, old: pd.DataFrame, new: pd.DataFrame, rtol: float) -> Iterator[str]:

@@ -3,7 +3,7 @@
 study.toml           the study as it was run, with the settings of the command line
 run.json             where the files that it refers to are, and what all is computed from: `origin`
 rows/                the main table, see `nlctl.analysis.robustness.runs.store`
-KEY/finding.json     what one analysis found, its tables beside it in Parquet
+KEY/finding.json     what one analysis found, its tables next to it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
 contents.json        which files there are, with a key of each and of the page, see `whole`;
@@ -125,8 +125,8 @@ def load_run(folder: Path) -> dict[str, Any]:
 def remove_run(folder: Path, *, force: bool = False) -> None:
     """Remove the folder of a run, with its page."""
     if not force:
-        known = {*_OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
-        others = sorted(p.name for p in folder.iterdir() if p.name not in known)
+        names = {*_OWN, *keyed(load_study(folder))} if (folder / "study.toml").exists() else set()
+        others = sorted(p.name for p in folder.iterdir() if p.name not in names)
         if others:
             raise RunFolderError(
                 f"'{folder}' would be replaced, and holds what no run has made ({others[0]}): take "
@@ -135,13 +135,13 @@ def remove_run(folder: Path, *, force: bool = False) -> None:
     shutil.rmtree(folder)
 
 
-def load_study(folder: Path, own: Mapping[str, Kind] | None = None) -> Study:
+def load_study(folder: Path, given: Mapping[str, Kind] | None = None) -> Study:
     """Return the study of a run, as it was begun."""
     path = folder / "study.toml"
     try:
         text = study_text(file_bytes(path))
-        known = dict(own or {})
-        study = from_toml(text, known | stand_ins(read_toml(text), known))
+        kinds = dict(given or {})
+        study = from_toml(text, kinds | stand_ins(read_toml(text), kinds))
     except FileNotFoundError:
         raise RunFolderError(f"'{folder}' holds no run of a study") from None
     except (OSError, ValueError, RecursionError) as error:
@@ -180,8 +180,8 @@ def read_through(folder: Path) -> None:
         if result.rows is not None:
             len(result.rows.table)
         for finding in result.findings:
-            if (own := load_rows(folder / finding.key, origin_key(result.origin))) is not None:
-                len(own.table)
+            if (rows := load_rows(folder / finding.key, origin_key(result.origin))) is not None:
+                len(rows.table)
 
 
 @as_annotated
@@ -189,7 +189,7 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     """Return what is in the folder of a run, finished or not.
 
     Nothing is simulated.  Kinds of analysis of one's own are imported, to draw what they found; a
-    note tells of those that have gone.
+    note names those that have gone.
 
     Parameters
     ----------
@@ -217,9 +217,9 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     return _result_in(folder, *_own_kinds(folder, trust))
 
 
-def _result_in(folder: Path, own: Mapping[str, Kind], gone: Sequence[str]) -> Result:
+def _result_in(folder: Path, kinds: Mapping[str, Kind], gone: Sequence[str]) -> Result:
     """Return what is in a folder that is whole, or say why its parts do not go together."""
-    study, run = load_study(folder, own), load_run(folder)
+    study, run = load_study(folder, kinds), load_run(folder)
     content = shaped(folder / "results.json", ResultsFile, "continue with --resume")
     origin = origin_key(run["origin"])
     if content.pop("origin") != origin:
@@ -283,17 +283,17 @@ def _check_contradictions(result: Result, content: Mapping[str, Any]) -> None:
             )
     for finding in result.findings:
         asked = result.asked[finding.key]
-        told = asked.claim if asked.definition.name != STAND_IN else finding.claim
-        same = finding.claim == told or not (told or finding.is_answered)
+        claim = asked.claim if asked.definition.name != STAND_IN else finding.claim
+        same = finding.claim == claim or not (claim or finding.is_answered)
         if finding.kind != asked.kind or not same or bool(finding.claim) != bool(finding.answer):
             raise RunFolderError(
                 f"'{folder / finding.key}' does not answer what its study asks ({asked.kind}"
-                f"{': ' * bool(told)}{told}): delete it and continue with --resume"
+                f"{': ' * bool(claim)}{claim}): delete it and continue with --resume"
             )
     if digest_of(as_json(result.plain())) != digest_of(as_json(content)):
         raise RunFolderError(
             f"'{folder / 'results.json'}' does not say what the parts of the run say: continue "
-            "with --resume, which makes it anew"
+            "with --resume, which makes it again"
         )
 
 
@@ -310,8 +310,8 @@ def received(folder: Path, *, trust: bool = False) -> Grant:
 
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
     """Return the own kinds that the study of a run names, and what is said of the others."""
-    found, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
-    return found, [f"what it found is told without its figures: {p}" for p in problems]
+    kinds, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
+    return kinds, [f"what it found is reported without its figures: {p}" for p in problems]
 
 
 def _space(study: Study, quantities: pd.DataFrame) -> Space:
@@ -324,12 +324,12 @@ def _space(study: Study, quantities: pd.DataFrame) -> Space:
     return Space(
         quantities=tuple(
             replace(
-                uncertain(own, law),
+                uncertain(given_name, law),
                 name=name,
                 nominal=full[name]["nominal"],
                 unit=full[name]["unit"],
             )
-            for name, (own, law) in names
+            for name, (given_name, law) in names
         ),
         choices=tuple(labels(name, choices) for name, choices in study.choices.items()),
     )

@@ -1,7 +1,7 @@
 """What a kind of analysis is: one record, from its table in a study file to its part of the page.
 
 nlctl's own kinds are the modules of `nlctl.analysis.studies.kinds`.  A kind of one's own is a
-`Kind` in a file beside the study, or in an installed package; a study names it as it names its
+`Kind` in a file next to the study, or in an installed package; a study names it as it names its
 loop::
 
     [[analysis]]
@@ -93,7 +93,7 @@ class Setup:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
-    """What an analysis stands on while it runs.
+    """What an analysis uses while it runs.
 
     Attributes
     ----------
@@ -154,8 +154,8 @@ class Ground:
         whole = self.prepared.experiment.space
         if not names:
             return whole
-        own = dict(zip(self.study.space, whole.quantities, strict=True))
-        return replace(whole, quantities=tuple(own[name] for name in names), choices=())
+        by_name = dict(zip(self.study.space, whole.quantities, strict=True))
+        return replace(whole, quantities=tuple(by_name[name] for name in names), choices=())
 
 
 def _nothing(asked: Any, setup: Setup) -> int:
@@ -236,7 +236,7 @@ class Kind:
 
     Examples
     --------
-    A file ``failures.py`` beside the study has the kind, and the study names it.  A lag with
+    A file ``failures.py`` next to the study has the kind, and the study names it.  A lag with
     T = 0.5 s is at 1 - exp(-2) = 0.86 after 1 s, so that one corner of the box fails:
 
     >>> import tempfile
@@ -395,18 +395,18 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
 def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
     """Run one analysis."""
-    found = asked.definition.run(asked, ground)
-    if found is None:
+    finding = asked.definition.run(asked, ground)
+    if finding is None:
         return None
-    return _headed(key, asked, found)
+    return _headed(key, asked, finding)
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
-    """Return what stands in the place of an analysis that its `runs` or the loop do not admit.
+    """Return what replaces an analysis that its `runs` or the loop do not admit.
 
     What the study claims of it is neither shown nor refuted.
     """
-    found = made(
+    finding = made(
         asked,
         f"Not answered: {error}.",
         claim=asked.claim or "the analysis has an answer",
@@ -415,8 +415,8 @@ def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Find
         runs=runs,
         is_answered=False,
     )
-    return _headed(key, asked, found)
+    return _headed(key, asked, finding)
 
 
-def _headed(key: str, asked: Asked, found: Finding) -> Finding:
-    return replace(found, key=key, title=asked.title or key.replace("-", " ").capitalize())
+def _headed(key: str, asked: Asked, finding: Finding) -> Finding:
+    return replace(finding, key=key, title=asked.title or key.replace("-", " ").capitalize())

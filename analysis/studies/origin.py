@@ -1,7 +1,7 @@
 """What results are computed from: study, equations, wiring, values, versions.
 
 The record is kept with a run (``run.json``), a key of it with every finding and all rows.  Whatever
-adds to a run or draws from it compares first: nothing is said of one loop beside the numbers of
+adds to a run or draws from it compares first: nothing is said of one loop next to the numbers of
 another one.
 """
 
@@ -44,8 +44,8 @@ def origin_of(setup: Setup, prepared: Prepared) -> dict[str, Any]:
     every = [p.system for _, p in prepared.loops]
     for key, asked in keyed(study).items():
         if (experiment := asked.definition.experiment) is not None:
-            own = experiment(asked, setup)
-            for labels, diagram in diagrams(own.space, own.build):
+            widened = experiment(asked, setup)
+            for labels, diagram in diagrams(widened.space, widened.build):
                 name = _compared_name(key, labels)
                 facts["diagrams"][name] = loop_facts(diagram)
                 values[name] = loop_values(diagram, end)
@@ -64,8 +64,8 @@ def unseen_notes(origin: Mapping[str, Any]) -> list[str]:
     """Return what the keys of a run do not see, one sentence for each block."""
     return [
         f"What '{block}' computes depends on what no key can see, so that a change of it would "
-        f"not be noticed: {'; '.join(told)}."
-        for block, told in origin.get("unseen", {}).items()
+        f"not be noticed: {'; '.join(reasons)}."
+        for block, reasons in origin.get("unseen", {}).items()
     ]
 
 
@@ -76,7 +76,7 @@ def _compared_name(key: str, labels: Mapping[str, str]) -> str:
 def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared) -> str:
     """Return in words how the loops of a comparison differ from those of a record.
 
-    They are made anew when the comparison begins, hours later: what they read may have changed.
+    They are made again when the comparison begins, hours later: what they read may have changed.
     """
     end = float(prepared.experiment.timepts[-1])
     names = {_compared_name(key, labels): loop.system for labels, loop in prepared.loops}
@@ -91,12 +91,14 @@ def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared
 def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
     """Return in words how a diagram differs from those of a record; nothing if it does not."""
     now = from_json(as_json(loop_facts(diagram)))
-    found = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
-    return difference_text(min(found, key=len, default=["the study kept no record of its loop"]))
+    differences = [list(fact_differences(before, now)) for before in origin["diagrams"].values()]
+    return difference_text(
+        min(differences, key=len, default=["the study kept no record of its loop"])
+    )
 
 
 def plain_study(study: Study) -> dict[str, Any]:
-    """Return a study as it stands in a record."""
+    """Return a study as a record has it."""
     return from_json(as_json(study.model_dump(mode="json", exclude_unset=True, exclude_none=True)))
 
 
@@ -114,12 +116,12 @@ def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> st
 
 def loop_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """Return what else differs, in words; nothing if nothing does."""
-    found = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
-    return difference_text(found)
+    differences = list(dict.fromkeys([*_settings(before, now), *_diagrams(before, now)]))
+    return difference_text(differences)
 
 
 def _settings(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what differs beside the diagrams."""
+    """Yield what differs besides the diagrams."""
     keys = dict.fromkeys([*before["study"], *now["study"]])
     changed = [key for key in keys if before["study"].get(key) != now["study"].get(key)]
     if changed:
@@ -136,10 +138,10 @@ def _diagrams(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str
         if name not in old or name not in new:
             yield f"the diagram '{name}' is {'new' if name in new else 'gone'}"
             continue
-        found = list(fact_differences(old[name], new[name]))
+        differences = list(fact_differences(old[name], new[name]))
         moved = values_differ(before["values"][name], now["values"][name])
-        if moved and not found:
-            found = [f"the value of {moved[0]} at the same point"]
-        if not found and old[name] != new[name]:
-            found = ["the compiled program"]
-        yield from found
+        if moved and not differences:
+            differences = [f"the value of {moved[0]} at the same point"]
+        if not differences and old[name] != new[name]:
+            differences = ["the compiled program"]
+        yield from differences

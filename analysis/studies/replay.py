@@ -77,14 +77,14 @@ class Replay:
         margins = ", ".join(
             f"{r.key} {self.again[r.key]:.6g}" for r in self.experiment.spec.requirements
         )
-        told = f"Row {self.row}: {self.again['status']}, margins {margins}."
+        outcome = f"Row {self.row}: {self.again['status']}, margins {margins}."
         if not self.differences:
             count = len(self.again)
-            return f"{told} All {count} columns are those of the folder, bit for bit."
+            return f"{outcome} All {count} columns are those of the folder, bit for bit."
         first = self.differences[0]
         return (
-            f"{told} {counted(len(self.differences), 'column differs', 'columns differ')} from the "
-            f"folder, the first is '{first}', {self.stored[first]!r} there and "
+            f"{outcome} {counted(len(self.differences), 'column differs', 'columns differ')} from "
+            f"the folder, the first is '{first}', {self.stored[first]!r} there and "
             f"{self.again[first]!r} now. The loop is the same; "
             f"{self.versions or 'so are all versions: another processor?'}"
         )
@@ -108,7 +108,7 @@ def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False)
     Returns
     -------
     Replay
-        What came out now beside the row of the folder, and what differs.
+        What came out now next to the row of the folder, and what differs.
 
     Raises
     ------
@@ -172,9 +172,9 @@ def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False)
 
 def _table(folder: Path, part: str) -> pd.DataFrame:
     origin = origin_key(load_run(folder)["origin"])
-    found = load_finding(folder, part, origin) if part else None
-    if found is not None and "rows" in found.tables:
-        return found.tables["rows"]
+    finding = load_finding(folder, part, origin) if part else None
+    if finding is not None and "rows" in finding.tables:
+        return finding.tables["rows"]
     rows = load_rows(folder / part, origin)
     if rows is None:
         raise RunFolderError(f"'{folder / part}' keeps no rows")
@@ -200,8 +200,8 @@ def _same(one: Any, other: Any) -> bool:
 def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return all outputs of a row over time."""
     ((loop, _),) = by_diagram(prepared, row)
-    found = simulate_rows(prepared.experiment, loop, row, keep=loop.system.output_labels)
-    return found.time, {name: samples[0] for name, samples in found.signals.items()}
+    run = simulate_rows(prepared.experiment, loop, row, keep=loop.system.output_labels)
+    return run.time, {name: samples[0] for name, samples in run.signals.items()}
 
 
 @as_annotated

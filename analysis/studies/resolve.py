@@ -73,21 +73,21 @@ def checked_definition(name: str, grant: Grant) -> None:
 
 def named_kind(name: str, grant: Grant) -> Kind:
     """Return the kind of analysis ``"path/to/file.py:name"`` or ``"module:name"``."""
-    found = named(name, grant.folder, grant.refuses)
-    if not isinstance(found, Kind):
+    kind = named(name, grant.folder, grant.refuses)
+    if not isinstance(kind, Kind):
         raise ParameterError(
             "a kind of analysis is an nlctl.analysis.studies.Kind, "
-            f"'{name}' is a {type(found).__name__}"
+            f"'{name}' is a {type(kind).__name__}"
         )
-    return found
+    return kind
 
 
 def named(name: str, folder: Path, admits: Admits | None = None) -> Any:
     """Return whatever ``"path/to/file.py:name"`` or ``"module:name"`` is."""
     module, source, attribute = _place(name, folder, admits)
     if not hasattr(module, attribute):
-        known = [key for key in vars(module) if not key.startswith("_")]
-        raise unknown("name", attribute, known, f"in '{source}'")
+        names = [key for key in vars(module) if not key.startswith("_")]
+        raise unknown("name", attribute, names, f"in '{source}'")
     return getattr(module, attribute)
 
 
@@ -128,17 +128,17 @@ def option(value: object, folder: Path) -> Any:
             raise ParameterError(f"{key} needs a text, got {value[key]!r}"[:200])
     arguments = {key: option(part, folder) for key, part in value.items()}
     name = arguments.pop("block", None)
-    made = (
+    function = (
         named_function(arguments.pop("function"), folder)
         if name is None
         else named_block(str(name))
     )
     for key in arguments:
-        check_keyword(made, key)
+        check_keyword(function, key)
     named_as = str(value.get("function", name))
-    check_complete(made, named_as, arguments)
+    check_complete(function, named_as, arguments)
     try:
-        return made(**arguments)
+        return function(**arguments)
     except UsageError:
         raise
     except Exception as error:
@@ -193,10 +193,10 @@ def _frozen(name: str, law: str, parameters: Mapping[str, float]) -> Any:
     if law not in laws:
         raise unknown("law", law, laws, "of scipy.stats")
     shapes = [part.strip() for part in (laws[law].shapes or "").split(",") if part.strip()]
-    known = [*shapes, "loc", *(["scale"] if isinstance(laws[law], stats.rv_continuous) else [])]
+    allowed = [*shapes, "loc", *(["scale"] if isinstance(laws[law], stats.rv_continuous) else [])]
     for key in parameters:
-        if key not in known:
-            raise unknown("parameter", key, known, f"of the law {law}")
+        if key not in allowed:
+            raise unknown("parameter", key, allowed, f"of the law {law}")
     missing = [shape for shape in shapes if shape not in parameters]
     if missing:
         raise ParameterError(f"'{name}': the law {law} needs {', '.join(missing)} as well")

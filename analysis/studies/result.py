@@ -109,14 +109,14 @@ class Result:
         count = len(self.claims)
         if self.holds:
             return f"All {count} claims are shown." if count > 1 else "The claim is shown."
-        told = []
+        sentences = []
         for answer in ("refuted", "not shown yet"):
             these = [finding for finding in self.claims if finding.answer == answer]
             names = [f.key + (f" (needs {f.needs})" if f.needs else "") for f in these]
             if these:
                 which = some_of(len(these), count, "claim", "is", "are")
-                told.append(f"{which} {answer}: {', '.join(names)}.")
-        return " ".join(told)
+                sentences.append(f"{which} {answer}: {', '.join(names)}.")
+        return " ".join(sentences)
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the verdict, and what each analysis found."""
@@ -126,10 +126,10 @@ class Result:
 
     def __getitem__(self, key: str) -> Finding:
         """Return the finding with this key."""
-        found = {finding.key: finding for finding in self.findings}
-        if key not in found:
-            raise unknown("finding", key, found)
-        return found[key]
+        findings = {finding.key: finding for finding in self.findings}
+        if key not in findings:
+            raise unknown("finding", key, findings)
+        return findings[key]
 
     def plain(self) -> dict[str, Any]:
         """Return everything but the tables, as JSON can hold it.

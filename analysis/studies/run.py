@@ -172,15 +172,15 @@ def _through(setup: Setup, prepared: Prepared, folder: Path, way: _Way) -> Resul
         notes += rows.notes
         complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
     for key, asked in every.items() if complete else ():
-        finding, own = load_finding(folder, key, way.key), []
+        finding, sweeps = load_finding(folder, key, way.key), []
         if finding is None and not interrupted:
-            ground = _ground(setup, prepared, rows, folder / key, way, own)
+            ground = _ground(setup, prepared, rows, folder / key, way, sweeps)
             try:
-                finding = _answered(key, asked, ground, own)
+                finding = _answered(key, asked, ground, sweeps)
             except KeyboardInterrupt:
                 interrupted = True
-            notes += [note for done in own for note in done.notes]
-            interrupted = interrupted or any(done.interrupted for done in own)
+            notes += [note for done in sweeps for note in done.notes]
+            interrupted = interrupted or any(done.interrupted for done in sweeps)
             if finding is not None:
                 save_finding(folder, finding, way.key)
         if finding is None:
@@ -192,14 +192,14 @@ def _through(setup: Setup, prepared: Prepared, folder: Path, way: _Way) -> Resul
     )
 
 
-def _answered(key: str, asked: Any, ground: Ground, own: Sequence[Sweep]) -> Finding | None:
+def _answered(key: str, asked: Any, ground: Ground, sweeps: Sequence[Sweep]) -> Finding | None:
     """Run one analysis; what it may not be made of costs it alone, not what others have found."""
     try:
         return answer(key, asked, ground)
     except (StoreError, RunFolderError):
         raise
     except UsageError as error:
-        return unanswered(key, asked, error, sum(done.done for done in own))
+        return unanswered(key, asked, error, sum(done.done for done in sweeps))
 
 
 def _main_rows(
@@ -225,7 +225,7 @@ def _ground(
     rows: Sweep | None,
     folder: Path,
     way: _Way,
-    own: list[Sweep],
+    sweeps: list[Sweep],
 ) -> Ground:
     middle = nominal(prepared.experiment.space)
 
@@ -234,13 +234,13 @@ def _ground(
         return evaluate(prepared, table.assign(**fixed), threads=way.threads)
 
     def run_design(design: Design, of: Prepared | None = None) -> Sweep:
-        if of is not None and (told := compared_differences(way.origin, folder.name, of)):
+        if of is not None and (change := compared_differences(way.origin, folder.name, of)):
             raise RunFolderError(
-                f"the loops of '{folder.name}' have changed since the run began ({told}): put them "
-                "back as they were and continue with --resume"
+                f"the loops of '{folder.name}' have changed since the run began ({change}): put "
+                "them back as they were and continue with --resume"
             )
-        own.append(_swept(of or prepared, design, folder / "rows", way, folder.name))
-        return own[-1]
+        sweeps.append(_swept(of or prepared, design, folder / "rows", way, folder.name))
+        return sweeps[-1]
 
     return Ground(
         study=setup.study,
@@ -283,8 +283,8 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
                 f"'{folder}' holds a run already: continue it with --resume, or take another "
                 "folder with --out"
             )
-        own = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
-        changed = _changed(load_study(folder, own), file.study)
+        kinds = {asked.kind: asked.definition for asked in file.study.analysis if ":" in asked.kind}
+        changed = _changed(load_study(folder, kinds), file.study)
         if changed:
             raise RunFolderError(
                 f"'{folder}' holds a run of another study ({', '.join(changed)} differ): take "
@@ -293,9 +293,9 @@ def _claim(file: StudyFile, folder: Path, resume: bool, force: bool) -> None:
         return
     others = sorted(p.name for p in folder.iterdir() if not p.name.startswith(_OWN))
     if others and not force:
-        told = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
+        listed = ", ".join(others[:3]) + (", ..." if len(others) > 3 else "")
         raise RunFolderError(
-            f"'{folder}' holds files that no run has made ({told}): take another folder with "
+            f"'{folder}' holds files that no run has made ({listed}): take another folder with "
             "--out, or this one with --force"
         )
     (folder / "run.json").unlink(missing_ok=True)  # of a run whose study is gone
@@ -312,9 +312,9 @@ def _stamped(setup: Setup, prepared: Prepared, folder: Path) -> dict[str, Any]:
     if (folder / "run.json").exists():
         before = load_run(folder)["origin"]
         _refuse_another_loop(folder, before, origin)
-        if told := version_differences(before, origin):
+        if change := version_differences(before, origin):
             raise RunFolderError(
-                f"'{folder}' was computed with other versions ({told}): continue it with those, "
+                f"'{folder}' was computed with other versions ({change}): continue it with those, "
                 "or run the study in another folder with --out"
             )
         return before
@@ -325,9 +325,9 @@ def _stamped(setup: Setup, prepared: Prepared, folder: Path) -> dict[str, Any]:
 
 
 def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
-    if told := loop_differences(before, now):
+    if change := loop_differences(before, now):
         raise RunFolderError(
-            f"'{folder}' was computed from another loop than today's ({told}): put the loop back "
+            f"'{folder}' was computed from another loop than today's ({change}): put the loop back "
             "as it was, or run the study in another folder with --out"
         )
 
@@ -342,20 +342,11 @@ def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reopened:
-    """A run whose loop is the one that its results were computed from.
-
-    Attributes
-    ----------
-    file : StudyFile
-    prepared : Prepared
-        Its experiment.
-    versions : str
-        Which versions differ from those of the run, in words; empty if none does.
-    """
+    """A run whose loop is the one that its results were computed from."""
 
     file: StudyFile
-    prepared: Prepared
-    versions: str
+    prepared: Prepared  # its experiment
+    versions: str  # which versions differ from those of the run, in words; empty if none does
 
 
 def reopened(folder: Path, *, trust: bool = False) -> Reopened:

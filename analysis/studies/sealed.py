@@ -32,7 +32,7 @@ __all__ = [
 RUN_FORMAT = 4
 """Of all files of a run folder; others are refused."""
 SEAL = "sha256"
-LARGEST = 200_000_000  # bytes of a file of JSON
+LARGEST_JSON = 200_000_000  # bytes of a file of JSON
 ANEW = "restore it, or run the study in another folder with --out"
 
 
@@ -72,9 +72,9 @@ def read_json(path: Path, remedy: str = ANEW) -> Any:
     if not isinstance(content, dict):
         raise RunFolderError(f"'{path}' is not as it was written: {remedy}")
     if content.get("format") != RUN_FORMAT:
-        known = str(content.get("format", "none"))[:20]
+        written_format = str(content.get("format", "none"))[:20]
         raise RunFolderError(
-            f"'{path}' has the format {known!a}, and this nlctl reads {RUN_FORMAT}: read "
+            f"'{path}' has the format {written_format!a}, and this nlctl reads {RUN_FORMAT}: read "
             "it with the nlctl that wrote it, or run the study again in another folder with --out"
         )
     if content.pop(SEAL, None) != digest_of(content):
@@ -87,7 +87,7 @@ def file_bytes(path: Path) -> bytes:
     """Return what is in a file of a run folder."""
     if path.exists() and not path.is_file():  # a pipe would never end
         raise OSError(errno.EINVAL, "it is not a file")
-    if path.stat().st_size > LARGEST:
+    if path.stat().st_size > LARGEST_JSON:
         raise OSError(errno.EFBIG, "it is larger than any file of a run")
     return path.read_bytes()
 

@@ -122,12 +122,12 @@ def verify(folder: str | Path) -> Wholeness:
     """
     folder = Path(folder)
     content = sealed_record(folder)
-    known = {CONTENTS, *content["files"], *PAGE_FILES}
+    expected = {CONTENTS, *content["files"], *PAGE_FILES}
     every = (path for path in folder.rglob("*") if is_part(path))
     names = (path.relative_to(folder).as_posix() for path in every)
-    found = [*problems_in(folder, content)] or [*_contradictions(folder)]
-    problems = tuple(dict.fromkeys([*found, *page_problems(folder, content)]))
-    told = " ".join(problems)
+    in_files = [*problems_in(folder, content)] or [*_contradictions(folder)]
+    problems = tuple(dict.fromkeys([*in_files, *page_problems(folder, content)]))
+    listed = " ".join(problems)
     return Wholeness(
         folder=folder,
         files=len(content["files"]),
@@ -136,7 +136,7 @@ def verify(folder: str | Path) -> Wholeness:
         done=tuple(content["done"]),
         problems=problems,
         has_page=bool(content["page"]),
-        others=tuple(n for n in sorted(names) if n not in known and f"/{n}'" not in told),
+        others=tuple(n for n in sorted(names) if n not in expected and f"/{n}'" not in listed),
     )
 
 

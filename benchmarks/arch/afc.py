@@ -9,7 +9,7 @@ the model file is followed here.  Its controller is off for the first 0.001 s, w
 nothing.
 
 The exhaust is the one part that is not exact: its ratio arrives when gas that moves with 1/delay
-has gone a unit of way, with a delay that depends on the state.  Here it is looked at every 0.01 s,
+has gone a unit of way, with a delay that depends on the state.  Here it is read every 0.01 s,
 with the controller, and is straight in between (`Exhaust`); Simulink interpolates between its
 steps.
 """
@@ -112,13 +112,13 @@ def wetting(x: Any, u: Any) -> Any:
 def read(ways: Any, ratios: Any, way: Any) -> Any:
     """Return what was sent at a way: straight between what is stored, the newest last."""
     parts = np.clip((way - ways[:-1]) / np.diff(ways), 0.0, 1.0)
-    known = np.where(way >= ways[0], 0.0, np.nan)  # never a guess
-    return ratios[0] + np.sum(parts * np.diff(ratios)) + known
+    after_first = np.where(way >= ways[0], 0.0, np.nan)  # never a guess
+    return ratios[0] + np.sum(parts * np.diff(ratios)) + after_first
 
 
 @nlctl.record
 class Exhaust:
-    """Gas on its way, one unit long: what arrives at a look, and how it changes until the next."""
+    """Gas in transit, one unit long: what arrives at a look, and how it changes until the next."""
 
     inputs, outputs = ("ratio", "way", "pace"), ("arrives", "changes")
     states = (*(f"way{k}" for k in range(STORED)), *(f"ratio{k}" for k in range(STORED)))
@@ -202,17 +202,17 @@ def decided(x: Any, u: Any) -> dict[str, Any]:
     power = np.where(angle >= np.where(power > 0.5, 50.0, 70.0), 1.0, 0.0)
     failed = np.maximum(np.where(measured <= -1.0, 1.0, 0.0), failed)
     feedforward = (failed > 0.5) | (normal < 0.5) | (power > 0.5)
-    wanted = np.where((normal > 0.5) & (power > 0.5), POWER_RATIO, RATIO)
+    ratio = np.where((normal > 0.5) & (power > 0.5), POWER_RATIO, RATIO)
     air = pumped(pressure, speed)
-    error = measured - wanted
+    error = measured - ratio
     integral = np.where(feedforward, integral, integral + 0.01 * 0.14 * error)
     trim = np.where(feedforward, 1.0, np.maximum(1.0 + 0.04 * error + integral, 0.0))
     pressure = pressure + 0.01 * 0.41328 * (flow - air)
     return {
         "states": (seconds, normal, power, failed, pressure, integral),
         "outputs": (
-            np.clip(air / wanted * trim, 0.13, 1.66),
-            wanted,
+            np.clip(air / ratio * trim, 0.13, 1.66),
+            ratio,
             np.where(feedforward, 1.0, 0.0),
         ),
     }
@@ -259,8 +259,8 @@ def engine(**given: Any) -> Any:
 
     def looked(record: Any, name: str, offset: float) -> Any:
         is_discrete = getattr(record, "discrete", False)
-        made = nlctl.block(record, name, dt=LOOK if is_discrete else None)
-        return nlctl.sampled(made, LOOK, offset=offset)
+        system = nlctl.block(record, name, dt=LOOK if is_discrete else None)
+        return nlctl.sampled(system, LOOK, offset=offset)
 
     parts = {
         "intake": Intake(), "controller": looked(Controller(), "controller", LOOK),

@@ -1,6 +1,6 @@
-"""Inputs that are constant for a while, and tables that go on in straight lines.
+"""Inputs that are constant for a while, and tables that continue in straight lines.
 
-Plants of the competition take signals in pieces; their tables go on beyond their ends.
+Plants of the competition take signals in pieces; their tables continue beyond their ends.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ class Pieces:
     @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
-        """The value of the piece; it is looked at when a piece begins, and half of it is slack."""
-        found = p.value[0]
+        """The value of the piece; it is read when a piece begins, and half of it is slack."""
+        value = p.value[0]
         for k in range(1, len(p.value)):
-            found = np.where(t >= (k - 0.5) * p.period, p.value[k], found)
-        return (found,)
+            value = np.where(t >= (k - 0.5) * p.period, p.value[k], value)
+        return (value,)
 
 
 def pieces(signal: str, count: int, period: float, start: float = 0.0) -> Any:
     """Return a block of so many pieces, all equal until their parameters say otherwise."""
-    made = Pieces(outputs=(signal,), value=(start,) * count, period=period)
-    return nlctl.sampled(nlctl.block(made, signal), period)
+    record = Pieces(outputs=(signal,), value=(start,) * count, period=period)
+    return nlctl.sampled(nlctl.block(record, signal), period)
 
 
 def names(signal: str, count: int) -> list[str]:

@@ -90,7 +90,7 @@ class Controller:
 
 @nlctl.record
 class Requirement:
-    """What the requirement looks at: |position - reference| - beta |reference|."""
+    """What the requirement reads: |position - reference| - beta |reference|."""
 
     beta: float = nlctl.param(
         0.03, unit="1", meaning="part of the reference that is allowed", at_least=0

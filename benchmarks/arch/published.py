@@ -140,12 +140,12 @@ ROWS = (
     *(Row(key=key, build=at.plant, signals=PEDALS, formula=formula, until=until, zlscheck=one,
           aristeo=other) for key, formula, until, one, other in _AT),
     *(Row(key=key, build=afc.plant, signals=signals, formula=formula, until=50.0, method="rodas5p",
-          zlscheck=one, aristeo=other, note="exhaust looked at every 0.01 s")
+          zlscheck=one, aristeo=other, note="exhaust read every 0.01 s")
       for key, signals, formula, one, other in _AFC),
     Row(key="NN.03", build=nn.plant, signals=REFERENCE, formula=settles(), until=40.0,
         zlscheck=(50, 1.0), aristeo=(50, 62.8)),
     Row(key="NN.04", build=_WIDER, signals=REFERENCE, formula=settles(), until=40.0,
-        note="no published number at hand"),
+        note="no published number"),
     *(Row(key=key, build=cc.plant, signals=DRIVER, formula=formula, until=100.0, zlscheck=one,
           aristeo=other, suspect=suspect) for key, formula, one, other, suspect in _CC),
     Row(key="SC", build=sc.plant, signals=STEAM, until=35.0, zlscheck=(50, 2.1), aristeo=(50, 1.0),

@@ -40,7 +40,7 @@ suspect: 1.0 of a requirement that others needed many runs for."""
 
 
 @dataclass(frozen=True)
-class Found:
+class Outcome:
     """What the attempts of one row have come to."""
 
     simulations: tuple[int | None, ...]
@@ -68,11 +68,11 @@ def prepared(row: Row, loops: dict[Callable[[], Any], Prepared]) -> Prepared:
     return replace(loops[row.build], experiment=experiment)
 
 
-def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Found:
+def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Outcome:
     """Search a row again and again, each time with other random numbers."""
     counts, searchers, reasons, start = [], [], {}, time.perf_counter()
     for entropy in range(attempts):
-        made = worst_case(
+        worst = worst_case(
             partial(evaluate, ready),
             row.space,
             simulations,
@@ -80,12 +80,12 @@ def attempted(row: Row, ready: Prepared, attempts: int, simulations: int) -> Fou
             target=0.0,
             derivatives=partial(first_order, ready),
         )
-        first = made.first_violation
+        first = worst.first_violation
         counts.append(None if first is None else first + 1)
-        searchers += [] if first is None else [str(made.searchers[first])]
-        reasons |= dict.fromkeys(made.without_derivative)
+        searchers += [] if first is None else [str(worst.searchers[first])]
+        reasons |= dict.fromkeys(worst.without_derivative)
     seconds = time.perf_counter() - start
-    return Found(tuple(counts), tuple(searchers), seconds, tuple(reasons))
+    return Outcome(tuple(counts), tuple(searchers), seconds, tuple(reasons))
 
 
 def cell(result: tuple[int, float] | None) -> str:
@@ -97,19 +97,19 @@ def cell(result: tuple[int, float] | None) -> str:
 
 def best_published(row: Row) -> float:
     """Return the least mean of those who falsified all 50 attempts, or of all if none did."""
-    published = [each for each in (row.zlscheck, row.aristeo) if each is not None]
-    most = max((each[0] for each in published), default=0)
+    published = [result for result in (row.zlscheck, row.aristeo) if result is not None]
+    most = max((result[0] for result in published), default=0)
     means = [mean for count, mean in published if count == most and not np.isnan(mean)]
     return min(means, default=np.nan)
 
 
-def line(row: Row, found: Found, attempts: int) -> tuple[list[str], bool, bool]:
+def line(row: Row, outcome: Outcome, attempts: int) -> tuple[list[str], bool, bool]:
     """Return the cells of a row, whether all attempts falsified, and if the mean is the best."""
-    falsified = found.falsified
+    falsified = outcome.falsified
     mean = float(np.mean(falsified)) if falsified else np.nan
     every = len(falsified) == attempts
     best = every and not mean > best_published(row)
-    names, counts = np.unique(found.searchers, return_counts=True)
+    names, counts = np.unique(outcome.searchers, return_counts=True)
     by = ", ".join(f"{name} {count}" for name, count in zip(names, counts, strict=True))
     cells = [
         row.key,
@@ -118,7 +118,7 @@ def line(row: Row, found: Found, attempts: int) -> tuple[list[str], bool, bool]:
         cell(row.aristeo) + row.suspect * " (suspect)",
         FALCAUN.get(row.key, ""),
         by,
-        f"{found.seconds:.0f}",
+        f"{outcome.seconds:.0f}",
         row.note,
     ]
     return cells, every, best
@@ -130,19 +130,19 @@ def main() -> None:
     parser.add_argument("--rows", nargs="+", choices=[row.key for row in ROWS], metavar="ROW")
     parser.add_argument("--attempts", type=int, default=50)
     parser.add_argument("--simulations", type=int, default=300)
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     warnings.filterwarnings("ignore", category=RuntimeWarning)
     console = Console()
     heads = ["row", "nlctl", "zlscheck", "ARIsTEO", "FalCAuN", "found by", "s", "note"]
     table, loops, whole = Table(*heads), {}, []
     start = time.perf_counter()
-    for row in [row for row in ROWS if not asked.rows or row.key in asked.rows]:
-        found = attempted(row, prepared(row, loops), asked.attempts, asked.simulations)
-        cells, every, best = line(row, found, asked.attempts)
+    for row in [row for row in ROWS if not arguments.rows or row.key in arguments.rows]:
+        outcome = attempted(row, prepared(row, loops), arguments.attempts, arguments.simulations)
+        cells, every, best = line(row, outcome, arguments.attempts)
         whole.append((every, best))
         table.add_row(*cells)
         console.print(" | ".join(cells), highlight=False)
-        for reason in found.reasons[:1]:
+        for reason in outcome.reasons[:1]:
             console.print(f"    no derivative everywhere: {reason[:150]}", highlight=False)
     console.print(table)
     every, best = np.sum(whole, axis=0)

@@ -68,7 +68,7 @@ def solvers(problem: Problem) -> list[Solver]:
         return ta.propagate_grid(problem.times)[-1].T
 
     def ensemble(rtol: float, x1: np.ndarray, threads: int) -> np.ndarray:
-        ta, n, found = batch(rtol), problem.order, []
+        ta, n, trajectories = batch(rtol), problem.order, []
         grid = np.repeat(problem.coarse[:, None], BATCH, axis=1)
         for first in range(0, x1.size, BATCH):
             members = np.minimum(np.arange(first, first + BATCH), x1.size - 1)
@@ -79,8 +79,8 @@ def solvers(problem: Problem) -> list[Solver]:
             ta.reset_cooldowns()
             states = ta.propagate_grid(grid)
             states = states[-1] if isinstance(states, tuple) else states
-            found.append(np.moveaxis(states[:, :n], 2, 0))  # (members, times, n)
-        return np.moveaxis(np.concatenate(found)[: x1.size], 1, 2)
+            trajectories.append(np.moveaxis(states[:, :n], 2, 0))  # (members, times, n)
+        return np.moveaxis(np.concatenate(trajectories)[: x1.size], 1, 2)
 
     return [
         Solver(

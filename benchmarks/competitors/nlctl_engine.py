@@ -28,7 +28,7 @@ def solver(problem: Problem, name: str, method: str) -> Solver:
         ).states
 
     def ensemble(rtol, x1, threads):
-        made = nlctl.ensemble_response(
+        runs = nlctl.ensemble_response(
             compiled,
             problem.coarse,
             initial_state={"plant.x1": x1},
@@ -38,7 +38,7 @@ def solver(problem: Problem, name: str, method: str) -> Solver:
             atol=rtol * 1e-2,
             method=method,
         )
-        return np.stack([made.signals[name] for name in names], axis=1)
+        return np.stack([runs.signals[name] for name in names], axis=1)
 
     return Solver(
         name=name, rhs=compiled.dynamics, run=run, ensemble=ensemble,

@@ -113,32 +113,20 @@ class Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class Solver:
-    """One way to solve a problem.
-
-    Attributes
-    ----------
-    name : str
-    rhs : callable
-        ``rhs(t, x) -> dx``: what is integrated, to be compared with nlctl's before any timing.
-    run : callable
-        ``run(rtol) -> states``, shape (states, 201); the absolute tolerance is rtol / 100.
-    ensemble : callable or None
-        ``ensemble(rtol, x1, threads) -> x``: plant states of each member, shape
-        (members, n, 21).  None: members one after the other, each as slow as one run.
-    tolerances : sequence of float
-        Relative tolerances to choose from, falling.
-    cores : int
-        Number of cores that an ensemble can use.
-    prepare : callable
-        ``prepare(rtol)``: what is done once for a tolerance, such as compiling; it is not timed.
-    """
+    """One way to solve a problem."""
 
     name: str
+    # ``rhs(t, x) -> dx``: what is integrated, to be compared with nlctl's before any timing
     rhs: Callable[[float, Array], Array]
+    # ``run(rtol) -> states``, shape (states, 201); the absolute tolerance is rtol / 100
     run: Callable[[float], Array]
+    # ``ensemble(rtol, x1, threads) -> x``: plant states of each member, shape (members, n,
+    # 21).  None: members one after the other, each as slow as one run.
     ensemble: Callable[[float, Array, int], Array] | None
+    # relative tolerances to choose from, falling
     tolerances: Sequence[float] = tuple(10 ** -(k / 2) for k in range(10, 24))
-    cores: int = 2
+    cores: int = 2  # number of cores that an ensemble can use
+    # ``prepare(rtol)``: what is done once for a tolerance, such as compiling; it is not timed
     prepare: Callable[[float], object] = bool
 
 
@@ -154,28 +142,20 @@ def wrong_equations(problem: Problem, solver: Solver, points: int = 50) -> float
         t = rng.uniform(0, 20)
         x = rng.normal(0, 1, problem.x0.size)
         expected = problem.compiled.dynamics(t, x)
-        found = np.asarray(solver.rhs(t, x))
-        worst = max(worst, float(np.max(np.abs(found - expected) / (1 + np.abs(expected)))))
+        rates = np.asarray(solver.rhs(t, x))
+        worst = max(worst, float(np.max(np.abs(rates - expected) / (1 + np.abs(expected)))))
     return worst
 
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
-    """Largest absolute errors over the 201 times.
+    """Largest absolute errors over the 201 times."""
 
-    Attributes
-    ----------
-    model : str
-        The model of the actuator that was solved: the reference that lies nearest.
-    plant, states : float
-        Error in x_1..x_n, and in all states but the memory of a backlash.
-    truth : float
-        Error in x_1..x_n against the exact play; equal to `plant` where there is no other model.
-    """
-
-    model: str
+    model: str  # the model of the actuator that was solved: the reference that lies nearest
+    # error in x_1..x_n, and in all states but the memory of a backlash
     plant: float
     states: float
+    # error in x_1..x_n against the exact play; equal to `plant` where there is no other model
     truth: float
 
 

@@ -21,7 +21,7 @@ def smooth(rhs, x0, times, rtol):
 def play(centres, x0, times, rtol):
     """Solve Example 2 with the exact play operator, branch by branch.
 
-    A branch ends where the held output meets a side of the gap, or where u turns on a side.
+    A branch ends where the held output meets a side of the gap, or where u reverses on a side.
     """
     t, x, side, held = times[0], x0, 0, 0.0
     solution = np.full((x0.size, times.size), np.nan)

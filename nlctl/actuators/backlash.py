@@ -28,7 +28,7 @@ def play_band(u, p):
 
 @equation
 def play(u, memory, p):
-    """The play operator: the memory, carried along by the nearer side of the gap."""
+    """The play operator: the memory, pushed by the nearer side of the gap."""
     low, high = play_band(u, p)
     return clip(memory, low, high)
 

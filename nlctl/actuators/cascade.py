@@ -30,7 +30,7 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
     Returns
     -------
     control.InterconnectedSystem
-        From u to v; it stands in the place of an actuator.
+        From u to v; it replaces an actuator.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.Intercon
     Examples
     --------
     >>> import nlctl
-    >>> actuator = cascade({"limit": nlctl.Saturation(limit=2), "turned": nlctl.Gain(k=-1)})
+    >>> actuator = cascade({"limit": nlctl.Saturation(limit=2), "inverted": nlctl.Gain(k=-1)})
     >>> print(actuator.output(0, [], [3.0]))
     [-2.]
     """

@@ -43,7 +43,7 @@ class Coulomb:
 
     A force law for velocities that keep their sign, or change it.  It does not hold a mass at
     rest: there the sign chatters, and a run ends as that; `StickSlip` and `LuGre` stick, and so
-    does `nlctl.IdealRelay` in the place of the sign.
+    does `nlctl.IdealRelay` instead of the sign.
 
     Examples
     --------

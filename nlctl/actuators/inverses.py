@@ -68,12 +68,12 @@ class DeadZoneInverse:
     @equation
     def output(t, x, u, p):
         """What the dead zone needs."""
-        (wanted,) = u
-        if wanted > 0:
-            return (wanted / p.slope_r + p.b_r,)
-        if wanted < 0:
-            return (wanted / p.slope_l + p.b_l,)
-        return (wanted,)  # 0, or NaN
+        (desired,) = u
+        if desired > 0:
+            return (desired / p.slope_r + p.b_r,)
+        if desired < 0:
+            return (desired / p.slope_l + p.b_l,)
+        return (desired,)  # 0, or NaN
 
     @staticmethod
     @equation
@@ -90,9 +90,9 @@ class DeadZoneInverse:
 
 
 @equation
-def needed_lines(wanted, p):
+def needed_lines(desired, p):
     """What brings a backlash to the wanted output on its rising and on its falling side."""
-    return wanted / p.m_r + p.c_r, wanted / p.m_l + p.c_l
+    return desired / p.m_r + p.c_r, desired / p.m_l + p.c_l
 
 
 @record
@@ -160,8 +160,8 @@ class BacklashInverse:
     def output(t, x, u, p):
         """What the backlash needs."""
         (side,) = x
-        wanted, u1 = u
-        one, other = needed_lines(wanted, p)
+        desired, u1 = u
+        one, other = needed_lines(desired, p)
         now = moving_side(u1, side)  # +-1, or NaN
         upper, lower = np.maximum(one, other), np.minimum(one, other)
         return (np.where(now > 0, upper, np.where(now < 0, lower, now)),)
@@ -177,8 +177,8 @@ class BacklashInverse:
     @equation
     def switching(t, x, u, p):
         """Where u reverses, and where the lines cross."""
-        wanted, u1 = u
-        one, other = needed_lines(wanted, p)
+        desired, u1 = u
+        one, other = needed_lines(desired, p)
         return u1, one - other
 
 
@@ -235,10 +235,10 @@ class PrandtlIshlinskiiInverse:
         """Memories that fit those of the operator."""
         z = np.broadcast_to(np.asarray(self.v0, dtype=float), (len(self.r),))
         w = np.array(self.w)
-        own = [
+        memories = [
             (self.w_0 + w[: i + 1].sum()) * z[i] + w[i + 1 :] @ z[i + 1 :] for i in range(len(w))
         ]
-        return started("memory", own, len(self.r))
+        return started("memory", memories, len(self.r))
 
     @property
     def gains(self) -> tuple[float, float]:

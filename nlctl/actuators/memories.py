@@ -15,7 +15,7 @@ RELAXATION = 1e3
 """Rate (1/s) at which memories relax onto what they become, in plain `control` alone.
 
 `control.input_output_response` has no hook for accepted steps.  Both engines of
-`nlctl.input_output_response` commit memories instead, and integrate no such rate.
+`nlctl.input_output_response` update memories between steps instead, and integrate no such rate.
 """
 
 

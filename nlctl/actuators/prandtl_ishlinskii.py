@@ -167,7 +167,7 @@ class PrandtlIshlinskii:
 
     Examples
     --------
-    One play of half gap 0.4 with weight 0.5, beside u itself:
+    One play of half gap 0.4 with weight 0.5, next to u itself:
 
     >>> record = nlctl.PrandtlIshlinskii(w_0=1.0, w=(0.5,), r=(0.4,))
     >>> hysteresis = nlctl.block(record, "actuator")

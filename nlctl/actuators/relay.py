@@ -29,7 +29,7 @@ def held_side(side):
     """Side that a relay outputs: its memory's, never that of its input.
 
     Behind a threshold a loop may lead back before the memory has switched, and would never leave
-    it.  Beyond 1 a memory counts as it stands: it jumps, and nothing carries it along.
+    it.  Beyond 1 a memory is its own side: it jumps, and nothing pushes it.
     """
     return kept_side(side) * np.maximum(1.0, np.abs(side))
 
@@ -102,7 +102,7 @@ class Relay:
         return {"side": float(self.v0)}
 
     def check(self) -> None:
-        """It goes off below where it goes on, and starts from one side."""
+        """It switches off below where it switches on, and starts from one side."""
         if not self.off < self.on:
             raise ParameterError(f"Relay needs off < on, got {self.off:g} and {self.on:g}")
         number("Relay", "v0", self.v0)

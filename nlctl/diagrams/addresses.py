@@ -28,25 +28,18 @@ _NUMBERS = (int, float, np.number, np.ndarray)
 
 @dataclass(kw_only=True)
 class Divided:
-    """Overrides, divided between python-control and single blocks.
+    """Overrides, divided between python-control and single blocks."""
 
-    Attributes
-    ----------
-    given : dict
-        What python-control is given.
-    alone : dict
-        What a third-party block alone is to read: by its identity, and by the names it reads.
-    """
-
-    given: dict[str, Any] = field(default_factory=dict)
+    given: dict[str, Any] = field(default_factory=dict)  # what python-control is given
+    # what a third-party block alone is to read: by its identity, and by the names it reads
     alone: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
 def divided(system: System, params: Mapping[str, Any] | None) -> Divided:
     """Divide a user's overrides."""
-    found = Divided()
+    parts = Divided()
     if not params:
-        return found
+        return parts
     law = _Law(system)
     for name, value in params.items():
         if not isinstance(name, str):
@@ -54,10 +47,10 @@ def divided(system: System, params: Mapping[str, Any] | None) -> Divided:
         block, key = law.meant(name)
         law.check(name, value)
         if block is None:
-            found.given[key] = value
+            parts.given[key] = value
         else:
-            found.alone.setdefault(id(block), {})[key] = value
-    return found
+            parts.alone.setdefault(id(block), {})[key] = value
+    return parts
 
 
 class _Law:
@@ -123,25 +116,25 @@ class _Law:
         if not exact:
             end = f".{path}"
             exact = [(s, b) for s, paths, b in self.theirs if any(p.endswith(end) for p in paths)]
-        found = {id(block): (shown, block) for shown, block in exact}
-        twins = len({shown for shown, _ in found.values()}) < len(found)
-        return {f"{s}#{i}" if twins else s: b for i, (s, b) in enumerate(found.values())}
+        blocks = {id(block): (shown, block) for shown, block in exact}
+        twins = len({shown for shown, _ in blocks.values()}) < len(blocks)
+        return {f"{s}#{i}" if twins else s: b for i, (s, b) in enumerate(blocks.values())}
 
     def _bare(self, name: str, base: str) -> str:
         """Return what python-control calls a parameter that is named without its block.
 
         Refuse one that nobody reads, or that means more than one block.
         """
-        own = [f"{p}.{base}" for p, _, b in self.theirs if isinstance(b, Named) and
+        declaring = [f"{p}.{base}" for p, _, b in self.theirs if isinstance(b, Named) and
                base in b.nlctl_own]  # fmt: skip
-        if len(own) > 1:
-            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(own)}")
+        if len(declaring) > 1:
+            raise AmbiguousNameError(f"parameter '{name}' could be {' or '.join(declaring)}")
         is_read = any(may_read(block, base) for _, _, block in self.theirs)
-        if not (own or self.open or base in self.params or is_read):
+        if not (declaring or self.open or base in self.params or is_read):
             self._refuse(name, base)
         others = [b for _, _, b in self.theirs if base not in declared_keys(b)]
-        if own and not any(base in texts_of(f) for b in others for f in (b.updfcn, b.outfcn)):
-            return own[0] + name[len(base) :]
+        if declaring and not any(base in texts_of(f) for b in others for f in (b.updfcn, b.outfcn)):
+            return declaring[0] + name[len(base) :]
         return name
 
     def names(self) -> list[str]:

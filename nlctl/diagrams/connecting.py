@@ -271,8 +271,8 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
     """A controller that is made for plants of one order must not drive one of a higher order."""
     for system in systems:
         for leaf in leaves(system):
-            made = within(leaf.system)
-            order = getattr(made.spec, "plant_order", None) if isinstance(made, Block) else None
+            part = within(leaf.system)
+            order = getattr(part.spec, "plant_order", None) if isinstance(part, Block) else None
             if not isinstance(order, int):
                 continue
             above = f"x{order + 1}"
@@ -286,7 +286,7 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
 
 
 def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
-    """Return parts connected by maps in the place of a diagram: with its signals and parameters.
+    """Return parts connected by maps, to replace a diagram: with its signals and parameters.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.Int
     control.InterconnectedSystem
         With the name, signals and parameters of `before`.
     """
-    made = ct.InterconnectedSystem(
+    diagram = ct.InterconnectedSystem(
         parts,
         inputs=list(before.input_labels) or 0,
         outputs=list(before.output_labels) or 0,
@@ -314,12 +314,12 @@ def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.Int
         connection_type=before.connection_type,
         warn_duplicate=False,
     )
-    made.connect_map, made.input_map, made.output_map = maps
+    diagram.connect_map, diagram.input_map, diagram.output_map = maps
     for name, value in before.params.items():
-        dict.__setitem__(made.params, name, value)
-    if isinstance(made.params, Parameters) and isinstance(before.params, Parameters):
-        made.params.scope = None if before.params.scope is None else made
-    return made
+        dict.__setitem__(diagram.params, name, value)
+    if isinstance(diagram.params, Parameters) and isinstance(before.params, Parameters):
+        diagram.params.scope = None if before.params.scope is None else diagram
+    return diagram
 
 
 def _state_labels(before: Any, parts: Sequence[Any]) -> list[str]:

@@ -61,9 +61,9 @@ def _check_name(systems: Sequence[Any], text: str) -> None:
         return
     if name not in blocks:
         raise unknown("block", name, blocks, f"in '{text}'")
-    own = [*blocks[name].input_labels, *blocks[name].output_labels]
-    if not _is_there(signal, own):
-        raise unknown("signal", signal, own, f"of block '{name}'")
+    signals = [*blocks[name].input_labels, *blocks[name].output_labels]
+    if not _is_there(signal, signals):
+        raise unknown("signal", signal, signals, f"of block '{name}'")
 
 
 def _is_there(signal: str, labels: Any) -> bool:

@@ -61,17 +61,17 @@ def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
     UnknownNameError, AmbiguousNameError, ParameterError
         If a name or a value is refused.
     """
-    found = divided(system, params)
+    parts = divided(system, params)
     blocks = [within(leaf.system) for leaf in leaves(system)]
-    for made in blocks:
-        if "nlctl_overrides" in vars(made):
-            made.nlctl_overrides = found.alone.get(id(made), {})
-    set_parameters(system, found.given)
-    for made in blocks:
-        if "nlctl_overrides" not in vars(made):  # not a run's own
-            for name, value in found.alone.get(id(made), {}).items():
-                set_key(current_parameters(made), name, value)
-    return found.given
+    for leaf_block in blocks:
+        if "nlctl_overrides" in vars(leaf_block):
+            leaf_block.nlctl_overrides = parts.alone.get(id(leaf_block), {})
+    set_parameters(system, parts.given)
+    for leaf_block in blocks:
+        if "nlctl_overrides" not in vars(leaf_block):  # not a run's own
+            for name, value in parts.alone.get(id(leaf_block), {}).items():
+                set_key(current_parameters(leaf_block), name, value)
+    return parts.given
 
 
 def overridden(system: System, params: Mapping[str, Any] | None = None) -> Any:
@@ -94,9 +94,9 @@ def overridden(system: System, params: Mapping[str, Any] | None = None) -> Any:
     UnknownNameError, AmbiguousNameError, ParameterError
         If a name or a value is refused.
     """
-    own = apart(system.system if isinstance(system, StandIn) else system).system
-    override(own, params)
-    return own
+    copied = apart(system.system if isinstance(system, StandIn) else system).system
+    override(copied, params)
+    return copied
 
 
 def parameter_names(system: ct.InputOutputSystem) -> list[str]:
@@ -142,12 +142,12 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     return rows
 
 
-def _third_party_rows(made: Any, path: str) -> list[ParameterRow]:
+def _third_party_rows(system: Any, path: str) -> list[ParameterRow]:
     """Return the numbers that a third-party block declares; nobody says what they mean."""
-    values = current_parameters(made)
+    values = current_parameters(system)
     return [
         ParameterRow(name=f"{path}.{key}", value=values[key], unit="", meaning="", bounds="")
-        for key in declared_keys(made)
+        for key in declared_keys(system)
         if isinstance(key, str) and np.asarray(values[key]).dtype.kind in "fib"
     ]
 
@@ -166,10 +166,12 @@ def samplings(system: Any) -> list[tuple[Any, Any]]:
         Path and owner of the parameters, one for each clock.
     """
     every = [sampling_of(leaf.system) for leaf in leaves(system)]
-    found: dict[int, Any] = {id(made): made for made in every if made is not None}
+    by_identity: dict[int, Any] = {
+        id(sampling): sampling for sampling in every if sampling is not None
+    }
     owners = system.params.owners if isinstance(system.params, Parameters) else {}
     paths = {id(owner): name.rpartition(".")[0] for name, owner in owners.items()}
-    return [(paths.get(key, made.name), made) for key, made in found.items()]
+    return [(paths.get(key, sampling.name), sampling) for key, sampling in by_identity.items()]
 
 
 @as_annotated

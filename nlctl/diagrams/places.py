@@ -69,11 +69,11 @@ def places(
     """
     nested = isinstance(system, ct.InterconnectedSystem)
     outer, outer_parameters = ("", "") if parent is None else (parent.path, parent.parameter_path)
-    own = "" if nested and parent is None else system.name
+    name = "" if nested and parent is None else system.name
     silent = nested and not _is_scoped(system)
     here = Place(
-        path=f"{outer}.{own}" if outer else own,
-        parameter_path=".".join(p for p in (outer_parameters, "" if silent else own) if p),
+        path=f"{outer}.{name}" if outer else name,
+        parameter_path=".".join(p for p in (outer_parameters, "" if silent else name) if p),
         system=system,
         state_offset=offset,
         parent=parent,
@@ -128,22 +128,22 @@ def supplied_blocks(system: Any, how: Supplied | None = None) -> list[Block]:
     DiagramError
         If one is in discrete time, is sampled, or stands in the diagram twice.
     """
-    found: dict[int, Block] = {}
+    supplied: dict[int, Block] = {}
     for leaf in leaves(system):
-        made = within(leaf.system)
-        own = supplied_of(made)
-        if own is None or how not in (None, own):
+        inner = within(leaf.system)
+        supply = supplied_of(inner)
+        if supply is None or how not in (None, supply):
             continue
-        kind = type(made.spec).__name__
-        if made is not leaf.system or not ct.isctime(system) or made.dt not in (0, None):
-            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {own.continuous}")
-        if id(made) in found:
+        kind = type(inner.spec).__name__
+        if inner is not leaf.system or not ct.isctime(system) or inner.dt not in (0, None):
+            raise DiagramError(f"block '{leaf.path}' is {_a(kind)}, which {supply.continuous}")
+        if id(inner) in supplied:
             raise DiagramError(
-                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {own.shared} for "
-                "both: make a block of each"
+                f"{kind} '{leaf.path}' stands in '{system.name}' twice, with one {supply.shared} "
+                "for both: make a block of each"
             )
-        found[id(made)] = made
-    return list(found.values())
+        supplied[id(inner)] = inner
+    return list(supplied.values())
 
 
 def _a(noun: str) -> str:

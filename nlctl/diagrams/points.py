@@ -45,8 +45,8 @@ def values_now(system: System, point: Point) -> tuple[np.ndarray, np.ndarray]:
 
 def rates_and_outputs(system: System, params: Mapping[str, Any] | None = None) -> PointFunction:
     """Return what computes python-control's rates and outputs, with parameters of its own."""
-    own = overridden(system, params)
-    return lambda t, x, u: values_now(own, (t, x, u))
+    copied = overridden(system, params)
+    return lambda t, x, u: values_now(copied, (t, x, u))
 
 
 def agree(
@@ -78,15 +78,15 @@ def explained(
     function: PointFunction, point: Point, base: PointValues, later: float = 0.0
 ) -> PointValues:
     """Return by how much rounded states and inputs explain that values are not `base`."""
-    moved = [np.zeros_like(values) for values in base]
+    moved = [np.zeros_like(returned) for returned in base]
     for near in rounded_points(point, later):
         for place in (near, _opposite(near, point)):
             try:
-                found = function(*place)
+                returned = function(*place)
                 break
             except Exception:  # past the end of what the blocks' functions are defined on
-                found = base
-        for total, a, b in zip(moved, base, found, strict=True):
+                returned = base
+        for total, a, b in zip(moved, base, returned, strict=True):
             np.fmax(total, _TIMES * np.abs(a - b), out=total)
     return tuple(moved)
 

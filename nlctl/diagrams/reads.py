@@ -13,7 +13,7 @@ from ..upstream.control_internals import current_parameters
 from ..upstream.systems import System
 from .third_party import declared_keys
 
-_MOST = 2000  # objects that are looked at
+_MOST = 2000  # objects that are visited
 _VALUES = (0.0, 0.25, 1.0)  # of states and inputs at which it is called
 _CONTAINERS = (tuple, list, set, frozenset)
 
@@ -28,16 +28,16 @@ def may_read(block: Any, key: str) -> bool:
 
 def texts_of(function: Any) -> frozenset[str]:
     """Return all text constants that a function reaches: in code, in what it reads around it."""
-    found: set[str] = set()
+    texts: set[str] = set()
     waiting, seen = [function], set()
     while waiting and len(seen) < _MOST:
         thing = waiting.pop()
         if isinstance(thing, str):
-            found.add(thing)
+            texts.add(thing)
         elif id(thing) not in seen:
             seen.add(id(thing))
             waiting.extend(_reached(thing))
-    return frozenset(found)
+    return frozenset(texts)
 
 
 def _reached(thing: object) -> Iterator[Any]:

@@ -1,6 +1,6 @@
 """What the parameters of a diagram hang on, to see at once that nothing has changed.
 
-To resolve them is python-control's work, block by block.  A run whose diagram stands as it stood at
+To resolve them is python-control's work, block by block.  A run whose diagram is unchanged since
 the run before takes what was resolved then.
 """
 
@@ -31,23 +31,23 @@ class _CanChange(Exception):  # noqa: N818
     """Something can change and stay the same object."""
 
 
-def standing(own: Apart, params: Mapping[str, Any] | None) -> list[Any] | None:
+def standing(copies: Apart, params: Mapping[str, Any] | None) -> list[Any] | None:
     """Return all that parameters hang on, in an order; None where some can change in place.
 
     They are what they were if each of it is the same object.
     """
     try:
-        found = list(_of_mapping(params or {}))
-        for old, _ in own.pairs.values():
-            found += _of_system(old)
+        things = list(_of_mapping(params or {}))
+        for old, _ in copies.pairs.values():
+            things += _of_system(old)
     except _CanChange:
         return None
-    return found
+    return things
 
 
-def handed(own: Apart) -> list[Any]:
+def handed(copies: Apart) -> list[Any]:
     """Return what the equations of the copies have been handed as their parameters."""
-    return [vars(new).get(name) for _, new in own.pairs.values() for name in RESOLVED]
+    return [vars(new).get(name) for _, new in copies.pairs.values() for name in RESOLVED]
 
 
 def _of_system(system: Any) -> Iterator[Any]:

@@ -57,15 +57,9 @@ class _TakesADict(OwnParameters):
 
 
 class Named(_TakesADict):
-    """A third-party block in a diagram of `interconnect`: "P.k" is its own k, and no one else's.
+    """A third-party block in a diagram of `interconnect`: "P.k" is its own k, and no one else's."""
 
-    Attributes
-    ----------
-    nlctl_own : dict
-        Its parameters, by the names that its functions read.
-    """
-
-    nlctl_own: dict[str, Any]
+    nlctl_own: dict[str, Any]  # its parameters, by the names that its functions read
 
     @property
     def params(self) -> Parameters:
@@ -79,10 +73,10 @@ class Named(_TakesADict):
 
     def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read: its own values, overridden."""
-        found, prefix = dict(self.nlctl_own), f"{self.name}."
+        values, prefix = dict(self.nlctl_own), f"{self.name}."
         for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
-            set_key(found, str(name).removeprefix(prefix), value)
-        return found
+            set_key(values, str(name).removeprefix(prefix), value)
+        return values
 
 
 class Overridden(_TakesADict):
@@ -96,10 +90,10 @@ class Overridden(_TakesADict):
 
     def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read."""
-        found = {**self.params, **params}
+        values = {**self.params, **params}
         for name, value in self.nlctl_overrides.items():
-            set_key(found, name, value)
-        return found
+            set_key(values, name, value)
+        return values
 
 
 def set_key(values: dict[str, Any], name: str, value: object) -> None:
@@ -118,14 +112,14 @@ def set_key(values: dict[str, Any], name: str, value: object) -> None:
 def _with(kind: type, base: type) -> type:
     """Return a class of systems of another one that take their parameters in another way."""
     names = {"__module__": base.__module__, "nlctl_kind": kind, "nlctl_base": base}
-    made = type(base.__name__, (kind, base), names)
-    made.__qualname__ = base.__qualname__
-    return made
+    derived = type(base.__name__, (kind, base), names)
+    derived.__qualname__ = base.__qualname__
+    return derived
 
 
 def _again(kind: type, base: type) -> Any:
-    made = _with(kind, base)
-    return object.__new__(made)
+    derived = _with(kind, base)
+    return object.__new__(derived)
 
 
 # -- values of their own ---------------------------------------------------------------------------
@@ -152,16 +146,16 @@ def _named(system: Any, given: Apart) -> Any:
     block = within(system)
     if not _lacks_own(block):
         return system
-    made, values = copy.copy(block), current_parameters(given.of(block))
-    own = {key: values[key] for key in block.params}
-    del made.params
-    made.__class__ = _with(Named, type(block))
-    made.nlctl_own = own
-    set_parameters(made, None)
+    named, values = copy.copy(block), current_parameters(given.of(block))
+    declared = {key: values[key] for key in block.params}
+    del named.params
+    named.__class__ = _with(Named, type(block))
+    named.nlctl_own = declared
+    set_parameters(named, None)
     if block is system:
-        return made
+        return named
     around = copy.copy(system)
-    around.inner = made
+    around.inner = named
     return around
 
 
@@ -169,17 +163,17 @@ def _named_diagram(diagram: Any, parts: list[Any]) -> Any:
     """Return a diagram of other parts, with the values that its parameters have."""
     if all(new is old for new, old in zip(parts, diagram.syslist, strict=True)):
         return diagram
-    made = copy.copy(diagram)
-    made.syslist = parts
+    named = copy.copy(diagram)
+    named.syslist = parts
     params: Any = functools.reduce(operator.or_, (part.params for part in parts), {})
     keys = {base_name(name).rpartition(".")[2] for name in params}
     for name, value in diagram.params.items():
         if name in params or ("." not in name and name not in keys):
             dict.__setitem__(params, name, value)
     if isinstance(diagram.params, Parameters) and diagram.params.scope is not None:
-        params.scope = made
-    made.params = params
-    return made
+        params.scope = named
+    named.params = params
+    return named
 
 
 # -- a diagram of one's own ------------------------------------------------------------------------
@@ -239,15 +233,15 @@ def apart(system: System) -> Apart:
     Apart
         The copy, and which block stands for which.
     """
-    found = Apart(system=None, pairs={})
+    copies = Apart(system=None, pairs={})
 
     def copied(old: Any) -> Any:
         if not isinstance(old, ct.NonlinearIOSystem) or isinstance(old, ct.StateSpace):
             return old
-        if id(old) in found.pairs:
-            return found.pairs[id(old)][1]
+        if id(old) in copies.pairs:
+            return copies.pairs[id(old)][1]
         new: Any = copy.copy(old)
-        found.pairs[id(old)] = old, new
+        copies.pairs[id(old)] = old, new
         if isinstance(old, ct.InterconnectedSystem):
             new.syslist = [copied(part) for part in old.syslist]
         elif within(old) is not old:
@@ -258,10 +252,10 @@ def apart(system: System) -> Apart:
             new.nlctl_overrides = {}
         return new
 
-    found.system = copied(system)
-    for old, new in list(found.pairs.values()):
-        found.connect(old, new)
-    return found
+    copies.system = copied(system)
+    for old, new in list(copies.pairs.values()):
+        copies.connect(old, new)
+    return copies
 
 
 def own_attributes(old: Any) -> set[str]:

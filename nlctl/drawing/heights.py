@@ -207,8 +207,8 @@ def all_heights(plan: LayoutPlan) -> HeightMap:
     offset: dict[tuple[int, int], float] = {}
     half: list[float] = []
     for n, node in enumerate(plan.nodes):
-        own, need = _outlets(plan, n)
-        offset |= {(n, i): d for i, d in own.items()}
+        outlets, need = _outlets(plan, n)
+        offset |= {(n, i): d for i, d in outlets.items()}
         half.append(_up(max(need, node.h / 2, _half_for_inlets(plan, n))))
     centre = _straightened(plan, _centres(plan, offset, half), half, offset)
     shift, lane, total = _bands(plan, centre, half)

@@ -147,12 +147,12 @@ def _edges(gains: np.ndarray, sources: Sequence[Any], targets: Sequence[Any]) ->
     """Bundle the non-zero `gains` (targets by sources) by the blocks that they join."""
     bundles: dict[tuple[int | None, int | None], list[_Signal]] = {}
     for column, row in np.argwhere(np.asarray(gains).T):
-        (source, output, name), (target, port, wanted) = sources[column], targets[row]
+        (source, output, name), (target, port, label) = sources[column], targets[row]
         gain = float(gains[row, column])
         text = _times(gain, name)
         if target is None:  # an external output has a name of its own
             alone = np.count_nonzero(gains[row]) == 1
-            text = wanted if gain == 1 and alone else f"{wanted} = {text}" + " + ..." * (not alone)
+            text = label if gain == 1 and alone else f"{label} = {text}" + " + ..." * (not alone)
         bundles.setdefault((source, target), []).append(_Signal(text, gain, output, port))
     return [_Edge(*ends, tuple(signals)) for ends, signals in bundles.items()]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from .graph import SMALL, Expr, Graph, Untraceable
 
-_MOST = 2048  # elements of an array that are kept one by one
+_MOST = 2048  # elements of an array that are kept individually
 _TABLED = 256  # elements of a constant matrix beyond which each row is a table
 
 
@@ -34,49 +34,33 @@ def is_complex(value: object) -> bool:
 
 @dataclass(eq=False, repr=False)
 class Tracer:
-    """An array of expressions, in the place of an array of floats.
+    """An array of expressions, instead of an array of floats.
 
     One of its axes may be long: along it every cell is a vector (or a number that is repeated).
     Assigning to items changes it, as it changes an array.  A part of a short array is a view, as
     NumPy's are.  A part of a long one knows where it is from: what is assigned to it goes there,
     and it is not read any more once the whole has changed otherwise.
-
-    Attributes
-    ----------
-    graph : Graph
-    values : ndarray of Expr
-        Its shape is the array's without the long axis.
-    axis : int or None
-        The long axis.
-    length : int
-        Size of the long axis, 1 if there is none.
-    origin : (Tracer, int) or None
-        The long array that this is a part of, and how often that had been assigned to.
-    place : range or None
-        Where in the origin a part of one dimension lies.
-    version : int
-        How often a long array has been assigned to.
-    watched : (ndarray of Expr, tuple of Expr) or None
-        Elements of which this long array was made as another shape, and what they were then.
     """
 
     graph: Graph
-    values: np.ndarray
-    axis: int | None = None
-    length: int = 1
+    values: np.ndarray  # its shape is the array's without the long axis
+    axis: int | None = None  # the long axis
+    length: int = 1  # size of the long axis, 1 if there is none
+    # the long array that this is a part of, and how often that had been assigned to
     origin: tuple[Tracer, int] | None = None
-    place: range | None = None
-    version: int = 0
+    place: range | None = None  # where in the origin a part of one dimension lies
+    version: int = 0  # how often a long array has been assigned to
+    # elements of which this long array was made as another shape, and what they were then
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
     methods: ClassVar[Callable[[Tracer, str], Any] | None] = None  # what finds those of arrays
 
     def __getattr__(self, name: str) -> Any:
-        found = None if name.startswith("__") else Tracer.methods
-        if found is None:
+        method = None if name.startswith("__") else Tracer.methods
+        if method is None:
             raise AttributeError(name)
-        return found(self, name)  # pyright: ignore[reportCallIssue]
+        return method(self, name)  # pyright: ignore[reportCallIssue]
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -201,8 +185,8 @@ class Tracer:
     def _place(self, key: Any) -> range | None:
         """Return where a part of one dimension lies in the origin."""
         whole = self.place if self.origin is not None else range(self.length)
-        known = whole is not None and (self.origin is not None or self.axis is not None)
-        is_part = known and isinstance(key, slice) and self.ndim == 1
+        is_contiguous = whole is not None and (self.origin is not None or self.axis is not None)
+        is_part = is_contiguous and isinstance(key, slice) and self.ndim == 1
         return whole[key] if is_part and whole is not None else None
 
     def _at(self, key: Any) -> Tracer:
@@ -246,18 +230,18 @@ class Tracer:
     def reshape(self, *shape: Any, order: Any = "C") -> Tracer:
         """Return the array in another shape."""
         several = len(shape) == 1 and isinstance(shape[0], tuple | list)
-        wanted = tuple(operator.index(n) for n in (shape[0] if several else shape))
+        target = tuple(operator.index(n) for n in (shape[0] if several else shape))
         if order != "C":  # NumPy knows what is a view; of a long array it cannot be written to
-            return self._part(self.elements().reshape(wanted, order=order), None, 1)
-        if self.ndim == 1 and wanted in ((-1,), (self.size,)):
+            return self._part(self.elements().reshape(target, order=order), None, 1)
+        if self.ndim == 1 and target in ((-1,), (self.size,)):
             return self
         if self.axis is not None and self.ndim > 1:
-            return self._part(self.elements().reshape(wanted), None, 1)._as_long_if_many()
+            return self._part(self.elements().reshape(target), None, 1)._as_long_if_many()
         if self.axis is not None:
-            return self._in_rows(wanted)
-        place = self.place if self.ndim == len(wanted) == 1 else None
-        found = self._part(self.cells.reshape(wanted), None, 1, place)
-        return found._as_long_if_many()
+            return self._in_rows(target)
+        place = self.place if self.ndim == len(target) == 1 else None
+        array = self._part(self.cells.reshape(target), None, 1, place)
+        return array._as_long_if_many()
 
     def _in_rows(self, shape: tuple[int, ...]) -> Tracer:
         """Return a long array as a small matrix."""
@@ -274,9 +258,9 @@ class Tracer:
     def as_long(self) -> Tracer:
         """Return elements of a small matrix as a long array of one dimension."""
         pieces = [(e, 1) for e in self.cells.flat]
-        made = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
-        made.watched = (self.values, tuple(self.values.flat))
-        return made
+        array = Tracer(self.graph, as_array(self.graph.joined(pieces)), 0, self.size)
+        array.watched = (self.values, tuple(self.values.flat))
+        return array
 
     def pieces(self) -> list[tuple[Expr, int]]:
         """Return the elements in order, each expression with its number of elements."""
@@ -338,7 +322,7 @@ def traced(graph: Graph, value: object) -> Tracer:
     if isinstance(value, Tracer):
         return value
     if isinstance(value, Special):
-        raise Untraceable(f"{type(value).__name__} in the place of an array")
+        raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, list | tuple):
         parts = [traced(graph, v) for v in value]
         if any(p.shape != parts[0].shape for p in parts):

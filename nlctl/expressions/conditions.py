@@ -72,10 +72,10 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """
     if a.op == "const" and a.data == 0.0:
         return b
-    for root, other, turned in ((a, b, 1), (b, a, -1)):
+    for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
-            return graph.op("sub", *squares[::turned])
+            return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
 
 

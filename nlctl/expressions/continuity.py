@@ -28,12 +28,12 @@ _UNKNOWN = ("call", "solve")  # what they do is not written in the expression
 
 def may_jump(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> bool:
     """Whether expressions have jumps of their own, as far as can be read off."""
-    own = [node for node in needed(exprs, known) if node not in known]
+    inside = [node for node in needed(exprs, known) if node not in known]
     return any(
         node.op in _JUMPING
         or node.op in _UNKNOWN
         or (node.op == "select" and not is_an_extreme(node))
-        for node in own
+        for node in inside
     )
 
 

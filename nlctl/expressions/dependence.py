@@ -18,10 +18,10 @@ def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np
 
     returns (rows, count).
     """
-    found: dict[Expr, np.ndarray] = {}
+    depends: dict[Expr, np.ndarray] = {}
     for node in needed([expr for expr, _ in results]):
-        found[node] = _of_node(node, [found[arg] for arg in node.args], array, count)
-    rows = [np.broadcast_to(found[expr], (size, count)) for expr, size in results]
+        depends[node] = _of_node(node, [depends[arg] for arg in node.args], array, count)
+    rows = [np.broadcast_to(depends[expr], (size, count)) for expr, size in results]
     return np.concatenate([np.zeros((0, count), dtype=bool), *rows])
 
 

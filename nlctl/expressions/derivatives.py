@@ -80,12 +80,12 @@ class _Reader:
 
     def _of_solution(self, node: Expr) -> Expr:
         """Differentiate z = F(z, w): z' = F_z z' + F_w w'; NaN where I - F_z is singular."""
-        found, n = list(self.fixed_points[node.data[0]]), node.size or 1
+        points, n = list(self.fixed_points[node.data[0]]), node.size or 1
 
         def read(seed: Callable[[Expr], Expr | None], of_solution: Expr | None) -> list[Any]:
-            known = {node: of_solution}
-            reader = _Reader(self.graph, seed, self.fixed_points, known, self.differences)
-            return [scalar(self.graph, self._zero_if_none(e)) for e in reader.read(found)]
+            solution = {node: of_solution}
+            reader = _Reader(self.graph, seed, self.fixed_points, solution, self.differences)
+            return [scalar(self.graph, self._zero_if_none(e)) for e in reader.read(points)]
 
         units = [self.graph.table(row) for row in np.eye(n).tolist()]
         columns = [read(lambda _: None, unit) for unit in units]
@@ -138,12 +138,12 @@ class _Reader:
         return self.graph.sum(a, node.args[0].size or 1)
 
     def _function(self, node: Expr, parts: list[Expr | None]) -> Expr | None:
-        found: Expr | None = None
+        change: Expr | None = None
         for i, part in enumerate(parts):
             if part is not None:
                 term = self.graph.op("mul", self.partial(node, i), part)
-                found = self.graph.op("add", found, term) if found else term
-        return found
+                change = self.graph.op("add", change, term) if change else term
+        return change
 
     def partial(self, node: Expr, i: int) -> Expr:
         """Return a partial derivative of a function of the table; its row is traced for that."""

@@ -1,7 +1,7 @@
 """Derivatives of what has none: opaque functions, by differences that are expressions, too.
 
 A call y = f(z) has the derivative (f(z + h z') - f(z - h z')) / (2 h) along z'.  These are two
-more calls, so whoever reads expressions reads them.  The step h moves z by a fixed part of its
+more calls, so all that reads expressions reads them.  The step h moves z by a fixed part of its
 size: what z' is otherwise, such as the unit of a direction, does not matter.
 """
 

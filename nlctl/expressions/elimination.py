@@ -89,8 +89,8 @@ def _bring_up(np: Any, rows: list[list[Any]], i: int, exchanges: list[Any] | Non
 
 def _is_zero(value: object) -> bool:
     """Whether an entry is known to be 0."""
-    known = getattr(value, "only", None)
-    return known is not None and known.op == "const" and known.data == 0.0
+    entry = getattr(value, "only", None)
+    return entry is not None and entry.op == "const" and entry.data == 0.0
 
 
 def substituted(rows: list[list[Any]]) -> list[list[Any]]:

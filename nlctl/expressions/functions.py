@@ -41,8 +41,8 @@ class RealFunction:
         How the Taylor coefficients of f(x(t)) follow from those of x(t).  ``"derivative"``: from
         y' = f'(x) x', where f' is made of functions that have theirs.  ``"steady"``: f is a
         constant between its jumps.  A callable writes the function as a choice, whose side is that
-        on which x(t) goes on, or in others.  ``"unknown"``: the function is refused where they are
-        needed.
+        on which x(t) continues, or in others.  ``"unknown"``: the function is refused where they
+        are needed.
     """
 
     name: str

@@ -32,7 +32,7 @@ SPECIAL = ("erf", "erfc")
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
-    """A function does what expressions cannot say: it is called as it stands instead."""
+    """A function does what expressions cannot say: it is called unchanged instead."""
 
 
 class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused)
@@ -41,40 +41,23 @@ class Ambiguous(Exception):  # noqa: N818 (it ends a trace: the block is refused
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Expr:
-    """One expression.
+    """One expression."""
 
-    Attributes
-    ----------
-    op : str
-        ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
-        ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
-        ``"solve"`` (signals that depend on each other),
-        an operation of `NUMPY`, or NumPy's name of a function.
-    args : tuple of Expr
-    data : object
-        What else it needs: a constant, (array, start, step) of a leaf, index or (start, step) of
-        a part, lengths of what is concatenated, (function, lengths) of a call or a
-        solution.
-    size : int or None
-        Number of elements of a vector, None for a number.
-    kind : str
-        ``"f"`` float, ``"i"`` integer, ``"b"`` truth value.
-    index : int
-        Its place in the graph, after all that it is made of.
-    varies : bool
-        Whether it depends on more than parameters.
-    value : int or None
-        Of an integer: what it is for the parameter values of the trace; None if it depends on
-        more than parameters.
-    """
-
+    # ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
+    # ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
+    # ``"solve"`` (signals that depend on each other), an operation of `NUMPY`, or NumPy's
+    # name of a function
     op: str
     args: tuple[Expr, ...]
+    # what else it needs: a constant, (array, start, step) of a leaf, index or (start, step)
+    # of a part, lengths of what is concatenated, (function, lengths) of a call or a solution
     data: Any
-    size: int | None
-    kind: str
-    index: int
-    varies: bool
+    size: int | None  # number of elements of a vector, None for a number
+    kind: str  # ``"f"`` float, ``"i"`` integer, ``"b"`` truth value
+    index: int  # its place in the graph, after all that it is made of
+    varies: bool  # whether it depends on more than parameters
+    # of an integer: what it is for the parameter values of the trace; None if it depends on
+    # more than parameters
     value: int | None
 
 
@@ -89,14 +72,14 @@ def numpy_function(op: str) -> Any:
 
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
-    found: dict[Expr, None] = {}
+    nodes: dict[Expr, None] = {}
     waiting = list(exprs)
     while waiting:
         expr = waiting.pop()
-        if expr not in found:
-            found[expr] = None
+        if expr not in nodes:
+            nodes[expr] = None
             waiting.extend(expr.args if expr not in known else ())
-    return tuple(sorted(found, key=lambda e: e.index))
+    return tuple(sorted(nodes, key=lambda e: e.index))
 
 
 class OpenCondition(BaseException):  # (what is traced may catch exceptions)
@@ -137,7 +120,7 @@ class Graph:
         self._known: dict[Any, Expr] = {}
 
     def decided(self, condition: Expr) -> bool:
-        """Return whether a condition holds on this path; ask whoever traces if that is open."""
+        """Return whether a condition holds on this path; ask the tracer if that is open."""
         if condition.op == "const":
             return bool(condition.data)
         if condition in self.implied:
@@ -252,11 +235,11 @@ class Graph:
         values = [a.value for a in args]
         if name == "remainder" and values[1] in (0, None):
             raise Untraceable("a remainder by 0, or by an integer that depends on the state")
-        known = None not in values
-        value = int(numpy_function(name)(*values)) if known else None
+        is_constant = None not in values
+        value = int(numpy_function(name)(*values)) if is_constant else None
         if all(a.op == "const" for a in args):
             return self.const(value)
-        simple = None if known else self._simplified(name, *args)
+        simple = None if is_constant else self._simplified(name, *args)
         sizes = {a.size for a in args if a.size is not None}
         return simple or self.node(
             name, *args, size=max(sizes, default=None), kind="i", value=value
@@ -299,10 +282,10 @@ class Graph:
             if a.size is None and all(arg.op == "concat" for arg in args[1:]):
                 return self._choice_of_pieces(*args)
             return args[2] if is_const[0] else self._inner_select(*args)
-        for this, other, known in ((a, b, is_const[-1]), (b, a, is_const[0])):
+        for this, other, is_number in ((a, b, is_const[-1]), (b, a, is_const[0])):
             neutral = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}.get(name)
-            turned = this is b and name in ("div", "sub") and len(args) == 2
-            if known and not turned and neutral is not None and other.data == neutral:
+            is_reversed = this is b and name in ("div", "sub") and len(args) == 2
+            if is_number and not is_reversed and neutral is not None and other.data == neutral:
                 return this
         if name == "sub" and is_const[0] and a.data == 0.0:
             return self.op("neg", b)

@@ -24,15 +24,15 @@ def _item(self: Tracer, key: Any) -> Any:
     if _is_mask(key):
         return Masked(self, key)
     if isinstance(key, Tracer) and key.shape:
-        return _each(self, key)
+        return _items_at(self, key)
     place = _open_place(key)
     return self.item_at(key) if place is None else _gathered(self, key, place)
 
 
-def _each(self: Tracer, places: Tracer) -> Tracer:
+def _items_at(self: Tracer, places: Tracer) -> Tracer:
     """Return elements at places that the state decides, one after the other."""
-    found = [_item(self, k) for k in places.short().reshape(-1)]
-    return traced(self.graph, found).reshape(places.shape + self.shape[1:])
+    items = [_item(self, k) for k in places.short().reshape(-1)]
+    return traced(self.graph, items).reshape(places.shape + self.shape[1:])
 
 
 def _settled(key: object) -> Any:
@@ -91,19 +91,19 @@ def _candidates(self: Tracer, key: Any, place: int) -> tuple[Tracer, range]:
     return chosen, range(int(first), int(last) + 1)
 
 
-def guard(graph: Graph, chosen: Tracer, name: str, bound: float, known: float) -> None:
+def guard(graph: Graph, chosen: Tracer, name: str, bound: float, possible: float) -> None:
     """Note that Python raises an error beyond a bound, unless that is never reached."""
-    if bound != known:
+    if bound != possible:
         graph.guards.append(elementwise(graph, name, chosen, bound).only)
 
 
 def _gathered(self: Tracer, key: object, place: int) -> Any:
     chosen, places = _candidates(self, key, place)
-    found = _item(self, _with(key, place, places[-1]))
+    choice = _item(self, _with(key, place, places[-1]))
     for k in reversed(places[:-1]):
         here = elementwise(self.graph, "eq", chosen, k)
-        found = elementwise(self.graph, "select", here, _item(self, _with(key, place, k)), found)
-    return found
+        choice = elementwise(self.graph, "select", here, _item(self, _with(key, place, k)), choice)
+    return choice
 
 
 def _scattered(self: Tracer, key: object, place: int, value: object) -> None:

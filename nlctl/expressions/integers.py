@@ -12,25 +12,25 @@ _EVERYTHING = (-math.inf, math.inf)
 
 def integer_range(expr: Expr) -> _Range:
     """Return bounds of a number, infinite where none is known."""
-    known: dict[Expr, _Range] = {}
+    ranges: dict[Expr, _Range] = {}
     waiting = [expr]
     while waiting:
         node = waiting[-1]
-        missing = [arg for arg in node.args if arg not in known and node.kind != "b"]
+        missing = [arg for arg in node.args if arg not in ranges and node.kind != "b"]
         if missing:
             waiting += missing
         else:
-            known[node] = (0.0, 1.0) if node.kind == "b" else _of_node(node, known)
+            ranges[node] = (0.0, 1.0) if node.kind == "b" else _of_node(node, ranges)
             waiting.pop()
-    return known[expr]
+    return ranges[expr]
 
 
-def _of_node(node: Expr, known: dict[Expr, _Range]) -> _Range:
+def _of_node(node: Expr, ranges: dict[Expr, _Range]) -> _Range:
     if node.op == "const":
         return float(node.data), float(node.data)
     if node.value is not None:
         return float(node.value), float(node.value)
-    parts = [known[arg] for arg in node.args]
+    parts = [ranges[arg] for arg in node.args]
     if node.op == "select":
         return min(parts[1][0], parts[2][0]), max(parts[1][1], parts[2][1])
     if node.op == "remainder" and parts[1][0] == parts[1][1] > 0:

@@ -36,9 +36,9 @@ def symbol(name: str) -> str:
     >>> symbol("x1"), symbol("p_mean")
     ('x_{1}', 'p_{\\mathrm{mean}}')
     """
-    found = re.fullmatch(r"(.*?)\[(\d+)\]", name)
-    if found:
-        return with_index(symbol(found[1]), str(int(found[2]) + 1))
+    element = re.fullmatch(r"(.*?)\[(\d+)\]", name)
+    if element:
+        return with_index(symbol(element[1]), str(int(element[2]) + 1))
     head, *rest = [part for part in name.split("_") if part] or [name]
     marks = [MARKS[part] for part in rest if part in MARKS]
     rest = [part for part in rest if part not in MARKS]
@@ -88,22 +88,15 @@ def number_text(value: float) -> str:
 
 @dataclass(kw_only=True)
 class LatexWriter:
-    """Writes the formulas of one function.
+    """Writes the formulas of one function."""
 
-    Attributes
-    ----------
-    leaf : callable
-        Takes an array's name and the place in it, and returns the symbol; for a vector the place
-        is that of its first element and the third argument an index.
-    known : mapping
-        Expressions that have a name; those that are used are in `used` afterwards.
-    tables : dict
-        Names of vectors of constants, found on the way.
-    """
-
+    # takes an array's name and the place in it, and returns the symbol; for a vector the
+    # place is that of its first element and the third argument an index
     leaf: Callable[[str, Index], str]
+    # expressions that have a name; those that are used are in `used` afterwards
     known: Mapping[Expr, str] = field(default_factory=dict)
     used: dict[Expr, str] = field(default_factory=dict)
+    # names of vectors of constants, found on the way
     tables: dict[Expr, str] = field(default_factory=dict)
 
     def formula(self, expr: Expr, index: Index | None = None, *, by_name: bool = True) -> str:
@@ -173,13 +166,13 @@ class LatexWriter:
         """Yield the signed terms of a sum, a difference or a negative."""
         flip = {"+": "-", "-": "+"}
         signs = {"add": (sign, sign), "sub": (sign, flip[sign]), "neg": (flip[sign],)}
-        for own, arg in zip(signs[expr.op], expr.args, strict=True):
+        for its_sign, arg in zip(signs[expr.op], expr.args, strict=True):
             if arg.op in signs and arg not in self.known:
-                yield from self._terms(arg, own, index, depth)
+                yield from self._terms(arg, its_sign, index, depth)
                 continue
             text = self._held(arg, index, depth, TERM)
             negative = text.startswith("-")
-            yield f"{flip[own] if negative else own} {text[1:] if negative else text}"
+            yield f"{flip[its_sign] if negative else its_sign} {text[1:] if negative else text}"
 
     def _add(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         text = " ".join(self._terms(expr, "+", index, depth))
@@ -249,13 +242,13 @@ class LatexWriter:
         if expr.op in _WORDS:
             least = [WORD if arg.op == expr.op != "xor" else SUM for arg in expr.args]
             pairs = zip(expr.args, least, strict=True)
-            left, right = (self._held(arg, index, depth, own) for arg, own in pairs)
+            left, right = (self._held(arg, index, depth, least_bound) for arg, least_bound in pairs)
             return f"{left}{_WORDS[expr.op]}{right}", WORD
         raise Untraceable(f"{expr.op} of {expr.data} has no formula")
 
 
 def _product(texts: list[str]) -> str:
-    """Return factors behind each other: a dot between numbers, a thin space beside words."""
+    """Return factors behind each other: a dot between numbers, a thin space next to words."""
     joined = texts[0]
     for text in texts[1:]:
         dot = text[:1].isdigit() or (text.startswith(r"\frac") and joined[-1:].isdigit())

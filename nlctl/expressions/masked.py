@@ -32,12 +32,12 @@ class Masked(Special):
     def operation(self, graph: Graph, name: str, operands: Sequence[Any]) -> Masked:
         """Return an operation on the chosen elements."""
         wholes = []
-        for each in operands:
-            if isinstance(each, Masked):
-                each = each.whole_for(self.mask)
-            elif traced(graph, each).shape:
+        for operand in operands:
+            if isinstance(operand, Masked):
+                operand = operand.whole_for(self.mask)
+            elif traced(graph, operand).shape:
                 raise Untraceable("an array next to elements that a mask chooses")
-            wholes.append(each)
+            wholes.append(operand)
         return Masked(elementwise(graph, name, *wholes), self.mask)
 
     def filled(self, value: object) -> Tracer:
@@ -73,9 +73,9 @@ class MaskedPlaces(Special):
         self.mask = mask
 
 
-def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: Masked, *other: Any) -> Any:
-        operands = (*other, self) if turned else (self, *other)
+        operands = (*other, self) if reflected else (self, *other)
         return self.operation(self.whole.graph, name, operands)
 
     return method
@@ -91,6 +91,6 @@ Masked.__array_ufunc__ = None  # type: ignore[attr-defined]
 Masked.__pow__ = _power  # type: ignore[attr-defined]
 for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
     setattr(Masked, f"__{_name}__", _operator(_op))
-    setattr(Masked, f"__r{_name}__", _operator(_op, turned=True))
+    setattr(Masked, f"__r{_name}__", _operator(_op, reflected=True))
 for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
     setattr(Masked, f"__{_name}__", _operator(_op))

@@ -102,8 +102,8 @@ def _batched(a: Tracer, b: Tracer) -> Tracer:
     """Return the products of many matrices."""
     if a.ndim == 1 or b.ndim == 1:
         column = b.ndim == 1
-        found = _batched(a, b.reshape(-1, 1)) if column else _batched(a.reshape(1, -1), b)
-        return found[..., 0] if column else found[..., 0, :]
+        products = _batched(a, b.reshape(-1, 1)) if column else _batched(a.reshape(1, -1), b)
+        return products[..., 0] if column else products[..., 0, :]
     a, b = a.short()[..., :, :, None], b.short()[..., None, :, :]
     return total(elementwise(a.graph, "mul", a, b), -2)
 
@@ -146,9 +146,9 @@ def _integer(self: Tracer) -> int:
         raise Untraceable("an integer that may have too many values")
     values = range(int(low), int(high) + 1)
     equal = {k: self.graph.op("eq", self.only, self.graph.const(k)) for k in values}
-    found = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
-    self.graph.implied.update({equal[k]: k == found for k in values})
-    return found
+    decided = next((k for k in values[:-1] if self.graph.decided(equal[k])), values[-1])
+    self.graph.implied.update({equal[k]: k == decided for k in values})
+    return decided
 
 
 def _hash(self: Tracer) -> int:

@@ -1,7 +1,7 @@
 """What is known of a comparison with a number from comparisons of the same thing before.
 
 ``if t < 3`` and then ``if t < 7``: where the first holds the second does, and a function with many
-thresholds in a row has few ways through it.  NaN is on no side of any number, so that what did not
+thresholds in a row has few paths through it.  NaN is on no side of any number, so that what did not
 hold before says nothing of where a thing is that may be NaN.
 """
 
@@ -20,20 +20,20 @@ _OPPOSITE = {"lt": "ge", "le": "gt", "gt": "le", "ge": "lt"}
 
 def implied_by(condition: Expr, decisions: Mapping[Expr, bool]) -> bool | None:
     """Return whether a condition holds where others do or do not; None if that is not known."""
-    asked = _with_number(condition)
-    if asked is None:
+    comparison = _with_number(condition)
+    if comparison is None:
         return None
-    thing, order, number = asked
+    thing, order, number = comparison
     is_number = thing.op == "leaf" and thing.data[0] == "t"
-    known = []
+    facts = []
     for other, holds in decisions.items():
-        found = _with_number(other)
-        if found is not None and found[0] is thing:
-            known.append((found[1] if holds else _OPPOSITE[found[1]], found[2]))
+        decided = _with_number(other)
+        if decided is not None and decided[0] is thing:
+            facts.append((decided[1] if holds else _OPPOSITE[decided[1]], decided[2]))
             is_number |= holds
-    if any(_implies(each, (_OPPOSITE[order], number)) for each in known):
+    if any(_implies(fact, (_OPPOSITE[order], number)) for fact in facts):
         return False
-    if is_number and any(_implies(each, (order, number)) for each in known):
+    if is_number and any(_implies(fact, (order, number)) for fact in facts):
         return True
     return None
 
@@ -50,11 +50,11 @@ def _with_number(condition: Expr) -> tuple[Expr, str, float] | None:
     return None
 
 
-def _implies(known: tuple[str, float], asked: tuple[str, float]) -> bool:
+def _implies(fact: tuple[str, float], question: tuple[str, float]) -> bool:
     """Whether one comparison of a thing that is not NaN implies another."""
-    (order, number), (wanted, limit) = known, asked
-    if order[0] != wanted[0] or math.isnan(number) or math.isnan(limit):
+    (order, number), (relation, limit) = fact, question
+    if order[0] != relation[0] or math.isnan(number) or math.isnan(limit):
         return False
     if number == limit:
-        return order == wanted or wanted.endswith("e")
+        return order == relation or relation.endswith("e")
     return number < limit if order[0] == "l" else number > limit

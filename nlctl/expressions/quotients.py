@@ -24,22 +24,22 @@ def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
 
     Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
     """
-    found: dict[Expr, _Quantity] = {}
+    quantities: dict[Expr, _Quantity] = {}
     for node in needed([result]):
         if node is variable:
-            found[node] = _Quantity(node, graph.const(0.0), lambda: graph.const(1.0))
-        elif all(found[arg].quotient is None for arg in node.args):
-            found[node] = _Quantity(node, node)
+            quantities[node] = _Quantity(node, graph.const(0.0), lambda: graph.const(1.0))
+        elif all(quantities[arg].quotient is None for arg in node.args):
+            quantities[node] = _Quantity(node, node)
         else:
-            found[node] = _made(graph, node, [found[arg] for arg in node.args])
-    return _quotient(graph, found[result])
+            quantities[node] = _quantity_of(graph, node, [quantities[arg] for arg in node.args])
+    return _quotient(graph, quantities[result])
 
 
 def _quotient(graph: Graph, quantity: _Quantity) -> Expr:
     return graph.const(0.0) if quantity.quotient is None else quantity.quotient()
 
 
-def _made(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
+def _quantity_of(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
     base = graph.op(node.op, *(part.base for part in parts))
 
     def quotient() -> Expr:
@@ -51,15 +51,15 @@ def _made(graph: Graph, node: Expr, parts: list[_Quantity]) -> _Quantity:
 
 
 def _of_sum(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
-    known = [_quotient(graph, part) for part in (a, b) if part.quotient]
-    return known[0] if len(known) == 1 else graph.op("add", *known)
+    quotients = [_quotient(graph, part) for part in (a, b) if part.quotient]
+    return quotients[0] if len(quotients) == 1 else graph.op("add", *quotients)
 
 
 def _of_difference(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
     if b.quotient is None:
         return _quotient(graph, a)
-    turned = graph.op("neg", _quotient(graph, b))
-    return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else turned
+    negated = graph.op("neg", _quotient(graph, b))
+    return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else negated
 
 
 def _of_negative(graph: Graph, a: _Quantity) -> Expr:

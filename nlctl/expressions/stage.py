@@ -1,6 +1,6 @@
-"""What a traced function finds in the place of NumPy, math and the builtins.
+"""What a traced function finds instead of NumPy, math and the builtins.
 
-Functions are not traced as they stand but as copies whose global names lead here.  What has no
+Functions are traced as copies whose global names lead here.  What has no
 place here refuses tracers, and the function is then called instead of traced.
 """
 
@@ -199,20 +199,20 @@ class Stage:
             return real
         if isinstance(real, np.ufunc):
             self._is_known(real)
-            known = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
-            return Ufunc(self.graph, real, self.for_numbers(real)) if known else (
+            is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
+            return Ufunc(self.graph, real, self.for_numbers(real)) if is_written else (
                 self.for_numbers(real)
             )  # fmt: skip
-        return self._own(real) if self._is_known(real) else self.for_numbers(real)
+        return self._written(real) if self._is_known(real) else self.for_numbers(real)
 
-    def _own(self, real: Any) -> Callable[..., Any]:
+    def _written(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
-        own, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
+        written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
 
         def function(*arguments: Any, **options: Any) -> Any:
             if makes or holds_tracers([*arguments, *options.values()]):
                 options = {k: unwrapped(v) for k, v in options.items()}
-                return own(self.graph, *map(unwrapped, arguments), **options)
+                return written(self.graph, *map(unwrapped, arguments), **options)
             return of_numbers(*arguments, **options)
 
         return function
@@ -247,8 +247,8 @@ class Stage:
                 return value
         if type(value) in (list, tuple):
             return type(value)([self.fresh(v) for v in value])
-        known = isinstance(value, (*_RAW, np.ndarray, type)) or not is_of_a_library(value)
-        return value if known else self._instead_of_object(value)
+        is_plain = isinstance(value, (*_RAW, np.ndarray, type)) or not is_of_a_library(value)
+        return value if is_plain else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
         if name not in MATH:
@@ -293,12 +293,12 @@ class Stage:
         """Return a copy of a class whose methods lead to the stage."""
         if cls not in self.classes:
             bases = tuple(self._type(b) for b in cls.__bases__)
-            made = type(cls)(cls.__name__, bases, {"__module__": cls.__module__})
-            self.classes[cls] = made
+            copied = type(cls)(cls.__name__, bases, {"__module__": cls.__module__})
+            self.classes[cls] = copied
             slots = vars(cls).get("__slots__", ())
             for name, value in vars(cls).items():
                 if name not in (*_KEPT, *((slots,) if isinstance(slots, str) else slots)):
-                    type.__setattr__(made, name, self._member(value))
+                    type.__setattr__(copied, name, self._member(value))
         return self.classes[cls]
 
     def _member(self, value: object) -> Any:
@@ -310,9 +310,9 @@ class Stage:
             parts = (value.fget, value.fset, value.fdel)
             return property(*(None if p is None else self._member(p) for p in parts))
         if isinstance(value, functools.cached_property):
-            made: Any = functools.cached_property(self._member(value.func))
-            made.__set_name__(made, value.attrname or value.func.__name__)
-            return made
+            copied: Any = functools.cached_property(self._member(value.func))
+            copied.__set_name__(copied, value.attrname or value.func.__name__)
+            return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
 
 

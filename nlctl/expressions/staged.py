@@ -94,20 +94,20 @@ class StagedType:
         self.__dict__.update(_real=real, _stage=stage)
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        own, given = WRITTEN.get(self._real), [*arguments, *options.values()]
-        if own is not None and (self._real is np.vectorize or holds_tracers(given)):
-            return own(self._stage.graph, *arguments, **options)
+        written, given = WRITTEN.get(self._real), [*arguments, *options.values()]
+        if written is not None and (self._real is np.vectorize or holds_tracers(given)):
+            return written(self._stage.graph, *arguments, **options)
         return self._stage.for_numbers(self._real)(*arguments, **options)
 
     def __getattr__(self, name: str) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
         if real.__module__.startswith("scipy.spatial.transform"):
             enter_rotations()
-        known = WRITTEN.get((real, name))
-        found = getattr(real, name)
-        if known is None:
-            return stage.for_numbers(found) if callable(found) else found
-        return functools.partial(known, stage.graph)
+        written = WRITTEN.get((real, name))
+        attribute = getattr(real, name)
+        if written is None:
+            return stage.for_numbers(attribute) if callable(attribute) else attribute
+        return functools.partial(written, stage.graph)
 
 
 class StagedObject:
@@ -121,14 +121,16 @@ class StagedObject:
 
     def __getattr__(self, name: str) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
-        found = inspect.getattr_static(type(real), name, None)
-        if name in getattr(real, "__dict__", {}) and not isinstance(found, property):
+        attribute = inspect.getattr_static(type(real), name, None)
+        if name in getattr(real, "__dict__", {}) and not isinstance(attribute, property):
             return stage.instead(getattr(real, name))  # its own is what Python finds first
-        if isinstance(found, property | functools.cached_property) and not is_of_a_library(real):
-            getter = found.fget if isinstance(found, property) else found.func
+        if isinstance(attribute, property | functools.cached_property) and not is_of_a_library(
+            real
+        ):
+            getter = attribute.fget if isinstance(attribute, property) else attribute.func
             return stage.copied(getter)(self)
-        if isinstance(found, FunctionType) and not is_of_a_library(real):
-            return functools.partial(stage.copied(found), self)
+        if isinstance(attribute, FunctionType) and not is_of_a_library(real):
+            return functools.partial(stage.copied(attribute), self)
         if is_of_a_library(real) and callable(getattr(real, name)):
             return stage.for_numbers(getattr(real, name))
         return stage.instead(getattr(real, name))
@@ -145,9 +147,9 @@ def _forwarded(name: str) -> Callable[..., Any]:
 
     def method(self: StagedObject, *rest: Any) -> Any:
         real, stage = self.__dict__["_real"], self.__dict__["_stage"]
-        found = inspect.getattr_static(type(real), name, None)
-        if isinstance(found, FunctionType) and not is_of_a_library(real):
-            return stage.copied(found)(self, *rest)
+        attribute = inspect.getattr_static(type(real), name, None)
+        if isinstance(attribute, FunctionType) and not is_of_a_library(real):
+            return stage.copied(attribute)(self, *rest)
         if name in ("__eq__", "__ne__"):
             raise Untraceable(f"comparison of an object of {type(real).__name__}")
         if name == "__iter__" and hasattr(real, "__iter__"):
@@ -176,7 +178,7 @@ class StagedParent:
     """What ``super()`` is in a method of somebody's object."""
 
     def __init__(self, thing: StagedObject, stage: OnStage, cls: type) -> None:
-        original = {made: real for real, made in stage.classes.items()}.get(cls, cls)
+        original = {copied: real for real, copied in stage.classes.items()}.get(cls, cls)
         order = type(thing.__dict__["_real"]).__mro__
         self.__dict__.update(_thing=thing, _stage=stage, _rest=order[order.index(original) + 1 :])
 
@@ -186,13 +188,15 @@ class StagedParent:
                 return self._bound(vars(cls)[name])
         raise AttributeError(name)
 
-    def _bound(self, found: object) -> Any:
+    def _bound(self, attribute: object) -> Any:
         thing, stage = self.__dict__["_thing"], self.__dict__["_stage"]
-        if isinstance(found, FunctionType):
-            return functools.partial(stage.copied(found), thing)
-        if isinstance(found, property):
-            return stage.copied(found.fget)(thing)
-        return stage.instead(found.__func__ if isinstance(found, staticmethod) else found)
+        if isinstance(attribute, FunctionType):
+            return functools.partial(stage.copied(attribute), thing)
+        if isinstance(attribute, property):
+            return stage.copied(attribute.fget)(thing)
+        return stage.instead(
+            attribute.__func__ if isinstance(attribute, staticmethod) else attribute
+        )
 
 
 _REDUCING = {"add": np.sum, "multiply": np.prod, "maximum": np.max, "minimum": np.min,
@@ -210,9 +214,9 @@ class Ufunc:
         if not holds_tracers([*arguments, *options.values()]):
             return self.plain(*arguments, **options)
         options = {k: unwrapped(v) for k, v in options.items()}
-        return of_ufunc(self.graph, self.real, self._own, arguments, options)
+        return of_ufunc(self.graph, self.real, self._written, arguments, options)
 
-    def _own(self, *arguments: Any) -> Any:
+    def _written(self, *arguments: Any) -> Any:
         if self.real in WRITTEN:
             return WRITTEN[self.real](self.graph, *arguments)
         name = UFUNC_OPERATIONS[self.real.__name__]

@@ -17,7 +17,7 @@ from .ordered import implied_by
 from .stage import Stage
 from .staged import LIBRARIES
 
-PATHS = 128  # ways through one function that are followed
+PATHS = 128  # paths through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
@@ -33,10 +33,10 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
         stage = Stage(graph)
         copy = stage.copied(function)
         run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
-        found = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
-        if found is None:
-            raise Untraceable("it raises an error on every way")
-        return found
+        result = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        if result is None:
+            raise Untraceable("it raises an error on every path")
+        return result
     except Ambiguous:
         raise
     except Exception as error:  # a traced function may raise whatever it likes
@@ -64,17 +64,17 @@ def _followed(
         return _counted(left, result)
     if len(decisions) >= PATHS:
         raise Untraceable("a loop whose end depends on what is computed")
-    known = implied_by(condition, decisions)
-    if known is not None:
-        return _followed(graph, run, {**decisions, condition: known}, left)
+    implied = implied_by(condition, decisions)
+    if implied is not None:
+        return _followed(graph, run, {**decisions, condition: implied}, left)
     yes = _followed(graph, run, {**decisions, condition: True}, left)
     no = _followed(graph, run, {**decisions, condition: False}, left)
     if yes is None or no is None:
-        found = no if yes is None else yes
-        if found is None:
+        result = no if yes is None else yes
+        if result is None:
             return None
-        nan = elementwise(graph, "mul", np.nan, found)
-        yes, no = (nan, found) if yes is None else (found, nan)
+        nan = elementwise(graph, "mul", np.nan, result)
+        yes, no = (nan, result) if yes is None else (result, nan)
     if yes.shape != no.shape:
         raise Untraceable("results of different sizes")
     return elementwise(graph, "select", scalar(graph, condition), yes, no)
@@ -84,7 +84,7 @@ def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
     """Return the result of a way; there are so many left."""
     left[0] -= 1
     if left[0] < 0:
-        raise Untraceable(f"more than {PATHS} ways through it")
+        raise Untraceable(f"more than {PATHS} paths through it")
     return result
 
 
@@ -98,8 +98,8 @@ def _is_raised(error: Exception) -> bool:
     if place is None or place.tb_frame.f_globals.get("__builtins__") is None:
         return False
     code = place.tb_frame.f_code
-    own = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
-    return own and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+    is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
+    return is_staged and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
 
 
 def _place(error: BaseException) -> str:

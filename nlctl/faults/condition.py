@@ -30,14 +30,14 @@ def parse_condition(text: str) -> Condition:
     ``>`` and ``>=`` say the same: the instant at which a signal reaches a level is that at which
     it passes it.
     """
-    found = TEXT.fullmatch(text) if isinstance(text, str) else None
-    if found is None or found[1] != found[3]:
+    match = TEXT.fullmatch(text) if isinstance(text, str) else None
+    if match is None or match[1] != match[3]:
         raise ParameterError(
             f"Fault needs a condition such as when='|e| > 0.5' or when='plant.y < -1', got {text!r}"
         )
     return Condition(
-        signal=found[2],
-        level=float(found[5]),
-        is_magnitude=bool(found[1]),
-        is_below=found[4].startswith("<"),
+        signal=match[2],
+        level=float(match[5]),
+        is_magnitude=bool(match[1]),
+        is_below=match[4].startswith("<"),
     )

@@ -24,24 +24,14 @@ __all__ = ["signal_names", "with_faults"]
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
-    """Where a signal can be cut.
+    """Where a signal can be cut."""
 
-    Attributes
-    ----------
-    diagram : str
-        Path of the diagram that has the wire; empty for the outermost one.
-    side : str
-        ``"output"`` or ``"input"`` of a part of the diagram, or ``"external"`` input of itself.
-    position : int
-        Where it stands among all outputs or inputs of the parts, or the inputs of the diagram.
-    label : str
-        What the fault is called after: ``"actuator_v"``.
-    """
-
-    diagram: str
+    diagram: str  # path of the diagram that has the wire; empty for the outermost one
+    # ``"output"`` or ``"input"`` of a part of the diagram, or ``"external"`` input of itself
     side: Literal["output", "input", "external"]
+    # where it stands among all outputs or inputs of the parts, or the inputs of the diagram
     position: int
-    label: str
+    label: str  # what the fault is called after: ``"actuator_v"``
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +126,7 @@ def _check_timebase(system: ct.InterconnectedSystem, fault: Fault) -> None:
 
 def _spots(system: ct.InterconnectedSystem) -> dict[str, Spot]:
     """Return all signals of a diagram by their qualified names."""
-    found = {
+    spots = {
         label: Spot(diagram="", side="external", position=i, label=label)
         for i, label in enumerate(system.input_labels)
     }
@@ -152,8 +142,8 @@ def _spots(system: ct.InterconnectedSystem) -> dict[str, Spot]:
                     position=offset + i,
                     label=_identifier(f"{place.system.name}_{label}"),
                 )
-                found.setdefault(f"{place.path}.{label}", spot)
-    return found
+                spots.setdefault(f"{place.path}.{label}", spot)
+    return spots
 
 
 def _identifier(text: str) -> str:
@@ -162,7 +152,7 @@ def _identifier(text: str) -> str:
 
 def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
     """Find the signal of a fault, and that of its condition."""
-    spot = _found(spots, fault.signal)
+    spot = _spot(spots, fault.signal)
     if fault.condition is None:
         return _Cut(fault=fault, spot=spot, watched=None)
     inside = f"{spot.diagram}." if spot.diagram else ""
@@ -173,7 +163,7 @@ def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
         for i, label in enumerate(part.input_labels):
             readable[label] = Spot(diagram="", side="external", position=i, label=label)
     try:
-        watched = _found(readable, fault.condition.signal)
+        watched = _spot(readable, fault.condition.signal)
     except UnknownNameError as error:
         raise UnknownNameError(
             f"{error} (the condition of a fault sees the signals of the diagram that the fault "
@@ -182,12 +172,12 @@ def _placed(system: System, spots: Mapping[str, Spot], fault: Fault) -> _Cut:
     return _Cut(fault=fault, spot=spot, watched=watched)
 
 
-def _found(spots: Mapping[str, Spot], name: str) -> Spot:
+def _spot(spots: Mapping[str, Spot], name: str) -> Spot:
     """Return the signal that a name means: the full path, or the end of one; outputs first."""
     for side in ("external", "output", "input"):
-        own = {n: s for n, s in spots.items() if s.side == side}
-        if name in own or any(n.endswith(f".{name}") for n in own):
-            return own[find_name("signal", name, own)]
+        of_side = {n: s for n, s in spots.items() if s.side == side}
+        if name in of_side or any(n.endswith(f".{name}") for n in of_side):
+            return of_side[find_name("signal", name, of_side)]
     raise unknown("signal", name, spots)
 
 
@@ -226,23 +216,23 @@ class _Wires:
         effect = block(cut.fault.effect, name, dt=dt)
         row, column = self._add(effect)
         self._cut(replace(cut.spot, label=""), row, column)
-        made = [effect]
+        blocks = [effect]
         if cut.fault.line is not None:
-            made.append(block(cut.fault.line, _free(f"{name}_line", taken)))
-            before, late = self._add(made[-1])
+            blocks.append(block(cut.fault.line, _free(f"{name}_line", taken)))
+            before, late = self._add(blocks[-1])
             self.connect[before], self.input[before] = self.connect[row], self.input[row]
             self.connect[row + len(effect.input_labels) - 1, late] = 1.0
         if cut.watched is not None:
-            made.append(block(cut.fault.latch, _free(f"{name}_condition", taken)))
-            watch, on = self._add(made[-1])
+            blocks.append(block(cut.fault.latch, _free(f"{name}_condition", taken)))
+            watch, on = self._add(blocks[-1])
             self._read(replace(cut.watched, label=""), watch)
             self.connect[row + 1, on] = self.connect[row + 2, on + 1] = 1.0
-        return made
+        return blocks
 
-    def _add(self, made: Any) -> tuple[int, int]:
+    def _add(self, added: Any) -> tuple[int, int]:
         """Make room for a block; return its first input and output."""
         row, column = self.connect.shape
-        more_in, more_out = made.ninputs, made.noutputs
+        more_in, more_out = added.ninputs, added.noutputs
         self.connect = np.pad(self.connect, ((0, more_in), (0, more_out)))
         self.input = np.pad(self.input, ((0, more_in), (0, 0)))
         self.from_outputs = np.pad(self.from_outputs, ((0, 0), (0, more_out)))

@@ -191,7 +191,7 @@ class StuckAt(_Effect):
 
 @record
 class Late(_Effect):
-    """What a transport delay outputs, in the place of the signal that goes into it."""
+    """What a transport delay outputs, instead of its input signal."""
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""A fault: which signal, what becomes of it, and when."""
+"""A fault: which signal, how it changes, and when."""
 
 from __future__ import annotations
 

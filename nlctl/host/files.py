@@ -10,7 +10,7 @@ from typing import IO
 
 
 def replace_file(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> Path:
-    """Write a file in one step: whoever reads it finds the old content or the new, never half."""
+    """Write a file in one step: readers find the old content or the new, never half."""
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)

@@ -33,12 +33,12 @@ class _SameModules:
     def find_spec(
         name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        found = find_spec(f"nlctl.{name}") if name.startswith(f"{FORMER}.") else None
-        if found is None:
+        spec = find_spec(f"nlctl.{name}") if name.startswith(f"{FORMER}.") else None
+        if spec is None:
             return None
-        is_package = found.submodule_search_locations is not None
+        is_package = spec.submodule_search_locations is not None
         loader: Any = _SameModules
-        return ModuleSpec(name, loader, origin=found.origin, is_package=is_package)
+        return ModuleSpec(name, loader, origin=spec.origin, is_package=is_package)
 
     @staticmethod
     def create_module(spec: ModuleSpec) -> ModuleType:

@@ -10,10 +10,10 @@ __all__ = ["table_html"]
 
 def table_html(heading: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a heading and a table as HTML; every text is escaped."""
-    told = "".join(f"<p>{html.escape(line)}</p>" for line in heading.splitlines())
+    paragraphs = "".join(f"<p>{html.escape(line)}</p>" for line in heading.splitlines())
     titles = "".join(f"<th>{html.escape(title)}</th>" for title in columns)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
-    return f"{told}<table><tr>{titles}</tr>{body}</table>"
+    return f"{paragraphs}<table><tr>{titles}</tr>{body}</table>"
 
 
 def _cell(value: object) -> str:

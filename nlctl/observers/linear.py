@@ -147,8 +147,13 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     gain = _placed(plant, poles) if L is None else np.reshape(L, (plant.nstates, plant.noutputs))
     return LuenbergerObserver(
         known=tuple(plant.input_labels), measured=tuple(plant.output_labels),
-        A=plant.A, B=plant.B, C=plant.C, D=plant.D, L=gain,
+        A=_rows(plant.A), B=_rows(plant.B), C=_rows(plant.C), D=_rows(plant.D), L=_rows(gain),
     )  # fmt: skip
+
+
+def _rows(matrix: object) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix as a tuple of its rows."""
+    return tuple(map(tuple, np.asarray(matrix, dtype=float).tolist()))
 
 
 def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
@@ -159,11 +164,12 @@ def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
             f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got "
             f"{wanted.size}"
         )
+    A, C = np.asarray(plant.A), np.asarray(plant.C)
     equal = np.unique(wanted).size < wanted.size and plant.noutputs == 1
     try:
-        dual = (ct.acker if equal else ct.place)(plant.A.T, plant.C.T, wanted)
+        dual = (ct.acker if equal else ct.place)(A.T, C.T, wanted)
         gain = np.reshape(dual, (plant.noutputs, plant.nstates)).T
-        found = np.sort_complex(np.linalg.eigvals(plant.A - gain @ plant.C))
+        found = np.sort_complex(np.linalg.eigvals(A - gain @ C))
         off = np.max(np.abs(np.poly(found) - np.poly(wanted)))
     except (ValueError, np.linalg.LinAlgError) as error:
         raise ParameterError(

@@ -23,27 +23,13 @@ _JUMPS = (*_ORDERS, *_WHOLE, *_QUOTIENTS, "sign", "heaviside", "copysign", "arct
 
 @dataclass(frozen=True, kw_only=True)
 class Branch:
-    """One side of a jump.
+    """One side of a jump."""
 
-    Attributes
-    ----------
-    now : Expr
-        The side that the arguments are on.
-    level : Expr
-        A smooth function that is at a fixed value where the side is left.
-    extent : Expr
-        Of what size the numbers are that it is the difference of.
-    margin : Expr
-        At least 0 as long as the arguments are on the side that is kept.
-    value : Expr
-        The operation, with the side that is kept.
-    """
-
-    now: Expr
-    level: Expr
-    extent: Expr
-    margin: Expr
-    value: Expr
+    now: Expr  # the side that the arguments are on
+    level: Expr  # a smooth function that is at a fixed value where the side is left
+    extent: Expr  # of what size the numbers are that it is the difference of
+    margin: Expr  # at least 0 as long as the arguments are on the side that is kept
+    value: Expr  # the operation, with the side that is kept
 
 
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
@@ -60,7 +46,7 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
     if op in _WHOLE:
         (z,) = numbers
         now = graph.op(op, z)
-        return _made(graph, now, z, [z], _within(graph, op, z, kept), kept)
+        return _side_of(graph, now, z, [z], _within(graph, op, z, kept), kept)
     if op in _QUOTIENTS:
         over, under = numbers
         z, rounding = graph.op("div", over, under), _QUOTIENTS[op]
@@ -69,11 +55,11 @@ def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch
         now = graph.op("rint", graph.op("div", whole, under))  # as many as the operation takes off
         other = graph.op("sub", over, graph.op("mul", kept, under))
         value = graph.op("select", graph.op("eq", kept, now), rest, other)  # to the last digit
-        return _made(graph, now, z, [z], _within(graph, rounding, z, kept), value)
+        return _side_of(graph, now, z, [z], _within(graph, rounding, z, kept), value)
     return _of_sign(graph, op, numbers, kept)
 
 
-def _made(
+def _side_of(
     graph: Graph, now: Expr, level: Expr, parts: Sequence[Expr], margin: Expr, value: Expr
 ) -> Branch:
     extent = graph.const(0.0)
@@ -89,7 +75,7 @@ def _of_order(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bra
     way = graph.op("sub", graph.op("mul", graph.const(2.0), kept), one)
     margin = graph.op("mul", graph.op("mul", graph.const(_ORDERS[op]), way), level)
     value = graph.op("gt", kept, graph.const(0.5))
-    return _made(graph, now, level, numbers, margin, value)
+    return _side_of(graph, now, level, numbers, margin, value)
 
 
 def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Branch:
@@ -99,7 +85,7 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
     if op == "sign":
         at_zero = graph.op("neg", graph.op("absolute", level))
         margin = graph.op("select", graph.op("eq", kept, const(0.0)), at_zero, margin)
-        return _made(graph, graph.op("sign", level), level, [level], margin, kept)
+        return _side_of(graph, graph.op("sign", level), level, [level], margin, kept)
     below = graph.op("lt", level, const(0.0))
     now = graph.op("select", below, const(-1.0), const(1.0))
     if op == "heaviside":
@@ -107,11 +93,11 @@ def _of_sign(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Bran
     elif op == "copysign":
         value = graph.op("mul", graph.op("absolute", numbers[0]), kept)
     else:  # the angle jumps on the left half of the axis only
-        turned = graph.op("mul", const(math.pi), graph.op("sub", kept, now))
+        reflected = graph.op("mul", const(math.pi), graph.op("sub", kept, now))
         left = graph.op("lt", other, const(0.0))
         angle = graph.op("arctan2", *numbers)
-        value = graph.op("add", angle, graph.op("select", left, turned, const(0.0)))
-    return _made(graph, now, level, [level], margin, value)
+        value = graph.op("add", angle, graph.op("select", left, reflected, const(0.0)))
+    return _side_of(graph, now, level, [level], margin, value)
 
 
 def _within(graph: Graph, rounding: str, z: Expr, kept: Expr) -> Expr:

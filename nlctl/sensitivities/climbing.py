@@ -78,13 +78,13 @@ def _step(
         limits.append(np.maximum(worth.parts + worth.slopes @ (at - place), here.parts))
     bounds = [(0.0, min(reach, max(1.0 - x, 0.0))) for x in at]
     bounds += [(0.0, min(reach, max(x, 0.0))) for x in at]
-    found = linprog(
+    program = linprog(
         [*np.full(2 * k, effort), -1.0], np.vstack(rows), np.concatenate(limits),
         bounds=[*bounds, (None, None)],
     )  # fmt: skip
-    if not found.success:
+    if not program.success:
         return np.zeros(k), 0.0
-    return found.x[:k] - found.x[k : 2 * k], float(found.x[-1]) - here.least
+    return program.x[:k] - program.x[k : 2 * k], float(program.x[-1]) - here.least
 
 
 class _SettledError(Exception):
@@ -93,15 +93,15 @@ class _SettledError(Exception):
 
 def lower_cost(worth_of: WorthOf, start: np.ndarray) -> None:
     """Go where the cost is as low as margins allow."""
-    own, first = _Patient(worth_of), worth_of(start)
+    cached, first = _Patient(worth_of), worth_of(start)
     scale = abs(first.cost) or 1.0 if np.isfinite(first.cost) else 1.0
     within: Any = {
-        "type": "ineq", "fun": lambda x: own(x).parts - _ROOM, "jac": lambda x: own(x).slopes
+        "type": "ineq", "fun": lambda x: cached(x).parts - _ROOM, "jac": lambda x: cached(x).slopes
     }  # fmt: skip
     try:
         minimize(
-            lambda x: own(x).cost / scale if np.isfinite(own(x).cost) else -LOST_MARGIN, start,
-            jac=lambda x: own(x).cost_slopes / scale, method="SLSQP",
+            lambda x: cached(x).cost / scale if np.isfinite(cached(x).cost) else -LOST_MARGIN,
+            start, jac=lambda x: cached(x).cost_slopes / scale, method="SLSQP",
             bounds=[(0.0, 1.0)] * start.size, constraints=[within] if first.parts.size else [],
             options={"ftol": 1e-6, "maxiter": 1000},
         )  # fmt: skip

@@ -17,15 +17,10 @@ Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
 
 @dataclass(frozen=True, kw_only=True)
 class Direction:
-    """Where everything that equations read goes.
+    """Where everything that equations read goes."""
 
-    Attributes
-    ----------
-    of : mapping
-        For ``"x"``, ``"t"``, ``"u"``, ``"p"`` what gives some of its rows, None where they stand
-        still.
-    """
-
+    # for ``"x"``, ``"t"``, ``"u"``, ``"p"`` what gives some of its rows, None where they
+    # stand still
     of: Mapping[str, Taken] = field(default_factory=dict)
 
     def __call__(self, leaf: Expr) -> Expr | None:
@@ -53,12 +48,12 @@ def taken(graph: Graph, pieces: Sequence[SomeRows]) -> Taken:
     """Return what gives some of the rows that expressions make up, and stands still behind them."""
     whole, rows = graph.joined(list(pieces)) if pieces else None, sum(size for _, size in pieces)
 
-    def found(start: int, step: int, size: int | None) -> Expr | None:
+    def rows_of(start: int, step: int, size: int | None) -> Expr | None:
         if whole is None or start >= rows:
             return None
         return graph.item(whole, start) if size is None else graph.part(whole, start, step, size)
 
-    return found
+    return rows_of
 
 
 def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: range) -> Direction:
@@ -70,7 +65,7 @@ def from_time(graph: Graph, time: Expr | None, inputs: int, first: int, lines: r
     def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
         if start in lines:
             raise CompileError(
-                "when something jumps depends on a delayed signal, whose rate nobody keeps: put a "
+                "when something jumps depends on a delayed signal, whose rate is not kept: put a "
                 "lag behind the delay (nlctl.Lag), or take differences of runs"
             )
         if start >= inputs:
@@ -86,20 +81,20 @@ def rows_replaced(
     graph: Graph, pieces: Sequence[SomeRows], instead: Mapping[int, Expr]
 ) -> list[SomeRows]:
     """Return pieces with other numbers in some of their rows."""
-    found: list[SomeRows] = []
+    replaced: list[SomeRows] = []
     row = 0
     for expr, size in pieces:
         inside = sorted(k - row for k in instead if row <= k < row + size)
         at = 0
         for k in inside:
             if k > at:
-                found.append(_part(graph, expr, at, k - at))
-            found.append((instead[row + k], 1))
+                replaced.append(_part(graph, expr, at, k - at))
+            replaced.append((instead[row + k], 1))
             at = k + 1
         if at < size:
-            found.append(_part(graph, expr, at, size - at) if at else (expr, size))
+            replaced.append(_part(graph, expr, at, size - at) if at else (expr, size))
         row += size
-    return found
+    return replaced
 
 
 def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
@@ -130,8 +125,8 @@ def _leading(graph: Graph, op: str, args: Sequence[Expr], direction: Direction) 
     pair = list(map(graph.number, args))
     if op == "absolute":
         pair.append(graph.op("neg", pair[0]))
-    made = slopes(graph, pair, direction, {})
-    rates = [graph.const(0.0) if rate is None else rate for rate in made]
+    changes = slopes(graph, pair, direction, {})
+    rates = [graph.const(0.0) if rate is None else rate for rate in changes]
     order = "lt" if op == "minimum" else "gt"
     ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))
     first = graph.op("or", graph.op(order, *pair), ahead)

@@ -42,9 +42,9 @@ class Fit:
     values : ndarray of shape (k,)
         The least squares.
     covariance : ndarray of shape (k, k)
-        From the Fisher matrix; infinite for what data do not tell.
+        From the Fisher matrix; infinite for what data do not determine.
     unidentifiable : tuple of str
-        Parameters that data do not tell, or not apart from each other.
+        Parameters that data do not determine, or not apart from each other.
     noise : float
         Standard deviation of the residuals, in units of `sigma`.
     freedom : int
@@ -230,26 +230,26 @@ def fit(
     )  # fmt: skip
     search.response(start)
     derivatives: Any = search.jacobian  # SciPy takes functions as well as texts
-    found = least_squares(
+    optimum = least_squares(
         search.residuals, start, derivatives, bounds, x_scale=np.where(start, abs(start), 1.0),
         xtol=1e-12, ftol=1e-12, gtol=1e-12, max_nfev=max_evaluations,
     )  # fmt: skip
-    return _found(search, found)
+    return _fit_of(search, optimum)
 
 
-def _found(search: _Search, found: Any) -> Fit:
+def _fit_of(search: _Search, optimum: Any) -> Fit:
     """Return what a search has led to."""
-    residuals, jacobian = search.residuals(found.x), search.jacobian(found.x)
-    freedom = residuals.size - found.x.size
+    residuals, jacobian = search.residuals(optimum.x), search.jacobian(optimum.x)
+    freedom = residuals.size - optimum.x.size
     noise = float(np.sqrt(residuals @ residuals / freedom)) if freedom else np.nan
-    covariance, unknown = _covariance(jacobian, search.scale(found.x), noise)
-    response = search.response(found.x)
+    covariance, unknown = _covariance(jacobian, search.scale(optimum.x), noise)
+    response = search.response(optimum.x)
     assert response is not None
     return Fit(
-        names=tuple(search.names), values=found.x, covariance=covariance,
+        names=tuple(search.names), values=optimum.x, covariance=covariance,
         unidentifiable=tuple(n for n, u in zip(search.names, unknown, strict=True) if u),
-        noise=noise, freedom=freedom, response=response, success=bool(found.status > 0),
-        message=str(found.message),
+        noise=noise, freedom=freedom, response=response, success=bool(optimum.status > 0),
+        message=str(optimum.message),
         residuals={
             name: (row - response.values[i]) / search.sigma[i]
             for i, (name, row) in enumerate(search.data.items())
@@ -306,7 +306,7 @@ class _Search:
         return self._last
 
     @property
-    def _known(self) -> np.ndarray:
+    def _has_datum(self) -> np.ndarray:
         return np.isfinite(np.stack(list(self.data.values())))
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
@@ -315,18 +315,18 @@ class _Search:
         try:
             values = self.response(x).values
         except (DivergedError, ParameterError):  # it ends before, or no block takes these values
-            return np.full(int(self._known.sum()), _LOST)
-        return np.nan_to_num((values - rows) / self.sigma[:, None], nan=_LOST)[self._known]
+            return np.full(int(self._has_datum.sum()), _LOST)
+        return np.nan_to_num((values - rows) / self.sigma[:, None], nan=_LOST)[self._has_datum]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Return their derivatives; where there are none, 0."""
-        made = self.response(x).derivatives / self.sigma[:, None, None]
-        return np.nan_to_num(np.moveaxis(made, 1, 2)[self._known])
+        derivatives = self.response(x).derivatives / self.sigma[:, None, None]
+        return np.nan_to_num(np.moveaxis(derivatives, 1, 2)[self._has_datum])
 
 
 def _data(data: Any, times: np.ndarray, sigma: Any) -> dict[str, np.ndarray]:
     """Return the data as rows over time."""
-    found = {}
+    rows = {}
     for name, samples in data.items():
         row = as_numbers(samples)
         if row is None or row.shape != times.shape:
@@ -337,22 +337,22 @@ def _data(data: Any, times: np.ndarray, sigma: Any) -> dict[str, np.ndarray]:
             )
         if np.isinf(row).any():
             raise ParameterError(f"data of '{name}' have an infinite number: gaps are NaN")
-        found[name] = row.astype(float)
-    if not found:
+        rows[name] = row.astype(float)
+    if not rows:
         raise ParameterError("data need at least one signal, {'y': samples}")
     if isinstance(sigma, Mapping):
-        for name in found:
+        for name in rows:
             if name not in sigma:
                 raise ParameterError(f"sigma has no standard deviation for '{name}'")
-    return found
+    return rows
 
 
 def _sigmas(data: Mapping[str, np.ndarray], sigma: Any) -> np.ndarray:
     """Return the noise of each signal."""
-    each = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in data]
-    for name, value in zip(data, each, strict=True):
+    deviations = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in data]
+    for name, value in zip(data, deviations, strict=True):
         number("fit", f"sigma of '{name}'", value, above=0)
-    return np.array(each, dtype=float)
+    return np.array(deviations, dtype=float)
 
 
 def _sought(

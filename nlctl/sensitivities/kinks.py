@@ -54,15 +54,15 @@ def _free(
     decide, where this condition switches, are what they are.
     """
     others = [n for n in needed(roots) if n.op in COMPARISONS and n is not condition]
-    found: dict[Expr, Expr] = {}
+    truths: dict[Expr, Expr] = {}
     row = 0
     for node, there in zip(others, replaced_parts(graph, others, on_it), strict=True):
         leaves = (e for e in needed([there]) if e.op in ("leaf", "call", "solve"))
         if any(leaf.op != "leaf" or leaf.data[0] != "p" for leaf in leaves):
             where = (_TRUTHS, row, 1 if node.size else 0)
             truth = graph.node("leaf", data=where, size=node.size, varies=True)
-            found[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
-    return found
+            truths[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
+    return truths
 
 
 def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
@@ -72,7 +72,7 @@ def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
         if node.op == "leaf" and node.data[0] in rows:
             array, start, step = node.data
             rows[array] = max(rows[array], start + step * ((node.size or 1) - 1) + 1)
-    found = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
+    arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
     size = np.where(p == 0.0, 1.0, np.abs(p))[:, None]
-    found["p"] = p[:, None] + _NEAR * size * rng.normal(size=(p.size, _POINTS))
-    return found
+    arrays["p"] = p[:, None] + _NEAR * size * rng.normal(size=(p.size, _POINTS))
+    return arrays

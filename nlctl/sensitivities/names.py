@@ -50,22 +50,22 @@ class VariedQuantity:
 def observed_signals(compiled: Compiled, names: Sequence[str] | str | None) -> list[Observed]:
     """Return signals by their names; None for the outputs of the diagram."""
     system, read = compiled.system, compiled.schedule
-    own: list[str] = list(system.output_labels or [])
-    known = {
+    outputs: list[str] = list(system.output_labels or [])
+    signals = {
         f"{node.path}.{label}": Observed(name="", combination={Output(i, k): 1.0})
         for i, node in enumerate(read.nodes)
         for k, label in enumerate(node.system.output_labels or [])
     }
-    known |= {name: Observed(name="", state=i) for i, name in enumerate(state_names(system))}
-    known |= {
+    signals |= {name: Observed(name="", state=i) for i, name in enumerate(state_names(system))}
+    signals |= {
         name: Observed(name="", combination=combination)
-        for name, combination in zip(own, read.outputs, strict=False)
+        for name, combination in zip(outputs, read.outputs, strict=False)
     }
-    wanted = _checked("of", own if names is None else names)
-    full = [name if name in known else find_name("signal", name, known) for name in wanted]
+    asked_for = _checked("of", outputs if names is None else names)
+    full = [name if name in signals else find_name("signal", name, signals) for name in asked_for]
     return [
-        Observed(name=name, combination=known[k].combination, state=known[k].state)
-        for name, k in zip(wanted, full, strict=True)
+        Observed(name=name, combination=signals[k].combination, state=signals[k].state)
+        for name, k in zip(asked_for, full, strict=True)
     ]
 
 
@@ -73,11 +73,11 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
     """Return parameters and initial states by their names."""
     states = {name: i for i, name in enumerate(state_names(compiled.system))}
     parameters = float_parameters(compiled)
-    found = []
+    quantities = []
     for name in _checked("with_respect_to", names):
         if name.endswith(_AT_START):
             state = find_name("state", name.removesuffix(_AT_START), states)
-            found.append(VariedQuantity(name=name, state=states[state]))
+            quantities.append(VariedQuantity(name=name, state=states[state]))
             continue
         if name not in parameters and name in states:
             raise unknown("parameter", name, [*parameters, f"{name}{_AT_START}"])
@@ -86,8 +86,8 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
         _check_moves(compiled, owner, full)
         check_enters_alone(owner, full)
         lowest, highest = declared_bounds(owner, full)
-        found.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
-    return found
+        quantities.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
+    return quantities
 
 
 def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
@@ -101,7 +101,7 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
     if supplied_of(owner.system) is PAST and key == "delay":
         raise CompileError(
             f"'{name}' is a delay: a derivative by it needs the rate of what is delayed, which "
-            "nobody keeps; take differences of runs"
+            "is not kept; take differences of runs"
         )
 
 

@@ -9,21 +9,11 @@ __all__ = ["StatePlaces"]
 
 @dataclass(frozen=True, kw_only=True)
 class StatePlaces:
-    """States of a program with derivatives, one group behind the other.
+    """States of a program with derivatives, one group behind the other."""
 
-    Attributes
-    ----------
-    states : int
-        Of the diagram; their derivatives follow, those by one quantity together.
-    by : int
-        Number of quantities.
-    branches : int
-        Number of sides of jumps that are kept.
-    """
-
-    states: int
-    by: int
-    branches: int = 0
+    states: int  # of the diagram; their derivatives follow, those by one quantity together
+    by: int  # number of quantities
+    branches: int = 0  # number of sides of jumps that are kept
 
     def derivative(self, j: int) -> int:
         """Return where the derivatives by quantity `j` begin."""

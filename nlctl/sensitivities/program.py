@@ -33,29 +33,18 @@ _LATE = 0.5  # of a step and the root of the relative tolerance: how far behind 
 
 @dataclass(frozen=True, kw_only=True)
 class Differentiated:
-    """A diagram, compiled with its derivatives.
-
-    Attributes
-    ----------
-    compiled : Compiled
-    places : StatePlaces
-    extended : Extended
-    sides : KeptSides
-    outputs : int
-        Number of the signals that are outputs.
-    saltation : Saltation
-    """
+    """A diagram, compiled with its derivatives."""
 
     compiled: Compiled
     places: StatePlaces
     extended: Extended
     sides: KeptSides
-    outputs: int
+    outputs: int  # number of the signals that are outputs
     saltation: Saltation
 
 
 def parameters_with(
-    made: Extended,
+    extended_program: Extended,
     quantities: Sequence[VariedQuantity],
     p: np.ndarray,
     scale: np.ndarray,
@@ -63,21 +52,21 @@ def parameters_with(
     span: float,
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives."""
-    size, late = made.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
-    found = np.concatenate([p, np.zeros(size - p.size)])
-    layout = made.layout
+    size, late = extended_program.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
+    whole = np.concatenate([p, np.zeros(size - p.size)])
+    layout = extended_program.layout
     for j, quantity in enumerate(quantities):
-        for i in range(made.lines):
-            own = layout[made.schedule.lines[made.line(j, i)].block or 0]
-            original = layout[made.schedule.lines[i].block or 0]
-            found[own["delay"].offset] = p[original["delay"].offset]
+        for i in range(extended_program.lines):
+            slots = layout[extended_program.schedule.lines[extended_program.line(j, i)].block or 0]
+            original = layout[extended_program.schedule.lines[i].block or 0]
+            whole[slots["delay"].offset] = p[original["delay"].offset]
             if quantity.place == original["before"].offset:
-                found[own["before"].offset] = scale[j]
+                whole[slots["before"].offset] = scale[j]
     given = {"scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late}
     for name, value in given.items():
-        slot = made.slot(name)
-        found[slot.offset : slot.offset + slot.size] = value
-    return found
+        slot = extended_program.slot(name)
+        whole[slot.offset : slot.offset + slot.size] = value
+    return whole
 
 
 def with_its_derivatives(
@@ -90,24 +79,26 @@ def with_its_derivatives(
     """Compile a diagram with its derivatives."""
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
-    made = extended(compiled, combinations, by)
-    whole = parameters_with(made, quantities, p, np.ones(by), settings, 1.0)
-    source = equation_parts(compiled, made, whole)
+    extended_program = extended(compiled, combinations, by)
+    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, 1.0)
+    source = equation_parts(compiled, extended_program, whole)
     sides = sides_of(source, n * (1 + by))
     places = StatePlaces(states=n, by=by, branches=sides.rows)
     seeds = [_seed(source, places, j, quantity) for j, quantity in enumerate(quantities)]
-    kept = [s.state for s in signals if s.state in source.carried]
+    kept = [s.state for s in signals if s.state in source.driven]
     maker = _Maker(
-        source=source, sides=sides, places=places, seeds=seeds, wanted=kept,
+        source=source, sides=sides, places=places, seeds=seeds, observed=kept,
         saltation=Saltation(source=source, sides=sides, places=places, seeds=seeds),
     )  # fmt: skip
     outputs = len(combinations) + len(kept)
-    schedule = with_derivatives(compiled, made, places.size, outputs * (1 + by), by)
-    found = replace(compiled, schedule=schedule, program=maker.program(), original=None, apart=None)
-    found.__dict__["equations"] = maker.equations()
+    schedule = with_derivatives(compiled, extended_program, places.size, outputs * (1 + by), by)
+    differentiated = replace(
+        compiled, schedule=schedule, program=maker.program(), original=None, apart=None
+    )
+    differentiated.__dict__["equations"] = maker.equations()
     return Differentiated(
-        compiled=found, places=places, extended=made, sides=sides, outputs=outputs,
-        saltation=maker.saltation,
+        compiled=differentiated, places=places, extended=extended_program, sides=sides,
+        outputs=outputs, saltation=maker.saltation,
     )  # fmt: skip
 
 
@@ -115,8 +106,8 @@ def _seed(
     source: EquationParts, places: StatePlaces, j: int, quantity: VariedQuantity
 ) -> Direction:
     """Return the direction in which everything goes by a quantity."""
-    graph, made = source.graph, source.extended
-    scale = graph.leaf("p", made.slot("scale").offset + j, None)
+    graph, extended_program = source.graph, source.extended
+    scale = graph.leaf("p", extended_program.slot("scale").offset + j, None)
 
     def of_states(start: int, step: int, size: int | None) -> Expr | None:
         if start >= places.states:
@@ -125,9 +116,9 @@ def _seed(
         return graph.node("leaf", data=where, size=size, varies=True)
 
     def of_inputs(start: int, step: int, size: int | None) -> Expr | None:
-        if not 0 <= start - source.inputs < made.lines:
+        if not 0 <= start - source.inputs < extended_program.lines:
             return None
-        first = source.inputs + made.line(j, start - source.inputs)
+        first = source.inputs + extended_program.line(j, start - source.inputs)
         return graph.node("leaf", data=("u", first, step), size=size, varies=True)
 
     def of_parameters(start: int, step: int, size: int | None) -> Expr | None:
@@ -150,7 +141,7 @@ class _Maker:
     places: StatePlaces
     seeds: Sequence[Direction]
     saltation: Saltation
-    wanted: Sequence[int]
+    observed: Sequence[int]
 
     def program(self) -> Program:
         """Return the arrays of the program."""
@@ -173,33 +164,35 @@ class _Maker:
             jumping.append((owner + 2, places.grazing, places.grazing + 1))
             guards[:0] = [owner + 2] * len(self.saltation.turning)
         sampled = [places.derivative(j) + i for j in range(by) for i in before.sampled]
-        made = replace(
+        program = replace(
             before,
             layout=source.extended.layout,
             guards=(*guards, *([owner] if self.sides.watches else [])),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
         )
-        made.__dict__["meetings"] = before.meetings
-        return made
+        program.__dict__["meetings"] = before.meetings
+        return program
 
     def equations(self) -> Equations:
         """Return what the program computes."""
-        found = self.source.found
-        located = tuple(replace(each, bends=False) for each in found.conditions.located)
+        equations = self.source.equations
+        located = tuple(
+            replace(condition, bends=False) for condition in equations.conditions.located
+        )
         results: dict[str, list[tuple[int, Tracer]]] = {
             "dx": self._flow(),
             "g": self._switching(),
-            "m": found.results["m"],
+            "m": equations.results["m"],
             "y": self._outputs(),
         }
-        if found.results.get("reset") or self.sides.watches or self.source.carried:
+        if equations.results.get("reset") or self.sides.watches or self.source.driven:
             results["reset"] = self._resets()
-        for name in found.results:
+        for name in equations.results:
             if name.startswith("sample"):
                 results[name] = self._samples(name)
         return replace(
-            found, results=results, conditions=replace(found.conditions, located=located)
+            equations, results=results, conditions=replace(equations.conditions, located=located)
         )
 
     # -- results ---------------------------------------------------------------------------------
@@ -207,17 +200,19 @@ class _Maker:
     def _along(self, pieces: Sequence[SomeRows], j: int) -> list[SomeRows]:
         """Return the derivatives of pieces by a quantity."""
         graph = self.source.graph
-        made = self.source.slopes([e for e, _ in pieces], self.seeds[j])
+        changes = self.source.slopes([e for e, _ in pieces], self.seeds[j])
         zero = graph.const(0.0)
-        return [(zero if e is None else e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+        return [
+            (zero if e is None else e, size) for e, (_, size) in zip(changes, pieces, strict=True)
+        ]
 
     def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
         """Return pieces as arrays with their rows."""
-        found = []
+        rows = []
         for expr, size in pieces:
-            found.append((first, _array(self.source.graph, expr, size)))
+            rows.append((first, _array(self.source.graph, expr, size)))
             first += size
-        return found
+        return rows
 
     def _flow(self) -> list[tuple[int, Tracer]]:
         pieces, places = list(self.source.flow), self.places
@@ -227,43 +222,43 @@ class _Maker:
         return self._rows(0, [*pieces, (self.source.graph.const(0.0), rest)])
 
     def _outputs(self) -> list[tuple[int, Tracer]]:
-        graph, pieces = self.source.graph, self.source.found.pieces("y")
+        graph, pieces = self.source.graph, self.source.equations.pieces("y")
         count = sum(size for _, size in pieces) - sum(size for _, size in self.source.arriving)
-        own, arriving = _divided(graph, pieces, count)
-        own += [(self.source.carried[m], 1) for m in self.wanted]
-        shown = ((self._shown(own, j), self._shown(arriving, j)) for j in range(self.places.by))
-        parts = [(own, arriving), *shown]
+        leading, arriving = _divided(graph, pieces, count)
+        leading += [(self.source.driven[m], 1) for m in self.observed]
+        shown = ((self._shown(leading, j), self._shown(arriving, j)) for j in range(self.places.by))
+        parts = [(leading, arriving), *shown]
         return self._rows(0, [p for k in (0, 1) for part in parts for p in part[k]])
 
     def _shown(self, numbers: Sequence[SomeRows], j: int) -> list[SomeRows]:
-        """Return the derivatives of numbers, of memories that are carried as they are kept."""
+        """Return the derivatives of numbers, of memories that are driven as they are kept."""
         return [(e, 1) for e in self.sides.kept([e for e, _ in self._along(numbers, j)])]
 
     def _switching(self) -> list[tuple[int, Tracer]]:
         source = self.source
-        first = source.program.switching + source.found.conditions.rows
-        found = [(row, array) for row, array in source.found.results["g"] if row < first]
-        found = [(row, array) for row, array in found if array.size]
+        first = source.program.switching + source.equations.conditions.rows
+        switching = [(row, array) for row, array in source.equations.results["g"] if row < first]
+        switching = [(row, array) for row, array in switching if array.size]
         rows = [apart for apart, _ in self.saltation.turning]
-        rows += [self.sides.carried] if source.carried else []
+        rows += [self.sides.driven] if source.driven else []
         rows += source.guards
         rows += [self.sides.margin] if self.sides.watches else []
-        return [*found, *self._rows(first, [(e, 1) for e in rows])]
+        return [*switching, *self._rows(first, [(e, 1) for e in rows])]
 
     def _resets(self) -> list[tuple[int, Tracer]]:
         source = self.source
-        own = source.found.results.get("reset", [])
-        pieces = [p for _, array in own for p in array.pieces()]
+        resets = source.equations.results.get("reset", [])
+        pieces = [p for _, array in resets for p in array.pieces()]
         guards: dict[int, list[Expr]] = {}
         for i, guard in zip(source.program.guards, source.guards, strict=True):
             guards.setdefault(i, []).append(guard)
-        for (i, begin, _), (_, array) in zip(source.program.jumping, own, strict=True):
+        for (i, begin, _), (_, array) in zip(source.program.jumping, resets, strict=True):
             pieces += self.saltation.at_reset(begin, array.pieces(), guards[i])
         if self.sides.watches:
             pieces += self.saltation.at_conditions()
-        turned = self.saltation.at_turns()
-        if turned:
-            pieces += [(e, 1) for e in turned.values()]
+        reversed_levels = self.saltation.at_turns()
+        if reversed_levels:
+            pieces += [(e, 1) for e in reversed_levels.values()]
             pieces += self.sides.now[len(self.sides.sides) :]
         if self.saltation.turning:
             pieces.append((self.saltation.at_touch(), 1))
@@ -271,12 +266,12 @@ class _Maker:
 
     def _samples(self, name: str) -> list[tuple[int, Tracer]]:
         graph, count = self.source.graph, len(self.source.program.sampled)
-        found = list(self.source.found.results[name])
-        for row, array in self.source.found.results[name]:
+        samples = list(self.source.equations.results[name])
+        for row, array in self.source.equations.results[name]:
             for j in range(self.places.by):
-                found += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
-        found += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
-        return found
+                samples += self._rows(row + count * (1 + j), self._along(array.pieces(), j))
+        samples += self._rows(count * (1 + self.places.by), [(graph.leaf("t", 0, None), 1)])
+        return samples
 
 
 def _array(graph: Any, expr: Expr, size: int) -> Tracer:

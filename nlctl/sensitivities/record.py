@@ -138,5 +138,5 @@ class SensitivityResponse:
             f"  of               {', '.join(self.signals)}",
             f"  with respect to  {', '.join(self.with_respect_to)}",
         ]
-        lines += [f"  {each}" for each in self.missing]
+        lines += [f"  {lack}" for lack in self.missing]
         return "\n".join(lines)

@@ -97,7 +97,7 @@ def sensitivity_response(
     Warns
     -----
     InexactWarning
-        If a function is called as it stands: its derivatives are differences.
+        If a function is called unchanged: its derivatives are differences.
 
     Examples
     --------
@@ -121,10 +121,10 @@ def sensitivity_response(
         method=method, solve_ivp_method=None, solve_ivp_kwargs=None, rtol=rtol, atol=atol,
         max_steps=max_steps, max_step=max_step,
     )  # fmt: skip
-    asked = RunWithDerivatives(
+    run = RunWithDerivatives(
         times=checked_times(timepts), inputs=inputs, initial_state=initial_state, params=params,
         of=of, with_respect_to=with_respect_to, settings=settings, audit=audit,
     )  # fmt: skip
     if not isinstance(diagram, Compiled):
         diagram = compile(sized(diagram, inputs, initial_state), params=params)
-    return differentiated_run(diagram, asked)
+    return differentiated_run(diagram, run)

@@ -35,62 +35,31 @@ _STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 @dataclass(frozen=True, kw_only=True)
 class When:
-    """How the time at which something happens moves.
+    """How the time at which something happens moves."""
 
-    Attributes
-    ----------
-    moves : list of Expr
-        Its derivative by each quantity.
-    grazes : Expr
-        Whether what it depends on is there at a rate of 0.
-    apart : Expr
-        Whether two conditions say different things.
-    happens : Expr
-        Whether anything happens at a time that moves.
-    """
-
-    moves: list[Expr]
-    grazes: Expr
-    apart: Expr
-    happens: Expr
+    moves: list[Expr]  # its derivative by each quantity
+    grazes: Expr  # whether what it depends on is there at a rate of 0
+    apart: Expr  # whether two conditions say different things
+    happens: Expr  # whether anything happens at a time that moves
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
-    """A condition that may have been met.
+    """A condition that may have been met."""
 
-    Attributes
-    ----------
-    met : Expr
-        Whether it was.
-    moves : list of Expr
-        The derivative by each quantity of the time at which it was.
-    grazes : Expr
-        Whether it was at a rate of 0.
-    """
-
-    met: Expr
-    moves: list[Expr]
-    grazes: Expr
+    met: Expr  # whether it was
+    moves: list[Expr]  # the derivative by each quantity of the time at which it was
+    grazes: Expr  # whether it was at a rate of 0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Saltation:
-    """What becomes of derivatives at conditions and resets.
-
-    Attributes
-    ----------
-    source : EquationParts
-    sides : KeptSides
-    places : StatePlaces
-    seeds : sequence of Direction
-        In which direction everything goes by each quantity.
-    """
+    """How derivatives jump at conditions and resets."""
 
     source: EquationParts
     sides: KeptSides
     places: StatePlaces
-    seeds: Sequence[Direction]
+    seeds: Sequence[Direction]  # in which direction everything goes by each quantity
 
     def at_conditions(self) -> list[SomeRows]:
         """Return what follows the states where a side has been left."""
@@ -123,21 +92,21 @@ class Saltation:
         rows: dict[int, Expr] = {}
         for expr, size in states:
             rows |= {begin + len(rows): graph.item(expr, k) for k in range(size)}
-        rows |= self._carried_after(rows)
+        rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
         sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
         when = self._when_fallen(guards)
         together = graph.op("lt", self.sides.margin, graph.const(0.0))
-        broken, found = graph.op("or", when.grazes, together), []
+        broken, after = graph.op("or", when.grazes, together), []
         for j, move in enumerate(when.moves):
-            found += self._jumped(j, rows, before, behind, move, broken)
-        found.append((self._first(places.grazing, when.grazes), 1))
-        found.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
-        found.append((graph.leaf("t", 0, None), 1))
-        found.append((self._first(places.at_reset, together), 1))
+            after += self._jumped(j, rows, before, behind, move, broken)
+        after.append((self._first(places.grazing, when.grazes), 1))
+        after.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        after.append((graph.leaf("t", 0, None), 1))
+        after.append((self._first(places.at_reset, together), 1))
         kept = {m: rows.get(m, kept) for m, kept in self.sides.memories.items()}
-        return [*found, *((e, 1) for e in self.sides.kept(list(kept.values())))]
+        return [*after, *((e, 1) for e in self.sides.kept(list(kept.values())))]
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
@@ -147,7 +116,7 @@ class Saltation:
         nearly met.  With memories that switch, what is at rest has levels that are noise, and
         nothing is looked for.
         """
-        graph, found = self.source.graph, []
+        graph, turns = self.source.graph, []
         for side in () if self.source.switched else self.sides.sides:
             for k in range(0 if side.timed else side.rows):
                 level, extent = (graph.item(e, k) for e in (side.here.level, side.here.extent))
@@ -160,8 +129,8 @@ class Saltation:
                 apart = graph.op("sub", still, graph.op("mul", level, rate))
                 near = graph.op("le", graph.op("absolute", level), noise)
                 touched = graph.op("and", near, cause.grazes)
-                found.append((apart, graph.op("and", touched, cause.met)))
-        return found
+                turns.append((apart, graph.op("and", touched, cause.met)))
+        return turns
 
     def _jumps_at(self, side: KeptSide) -> Expr:
         """Return whether the flow would be another on the other side of a comparison."""
@@ -173,10 +142,10 @@ class Saltation:
         return self._differ([(e, piece) for e, piece in zip(exprs, flow, strict=True)])
 
     def at_touch(self) -> Expr:
-        """Return when a condition was first touched, where a level has turned."""
+        """Return when a condition was first touched, where a level has reversed."""
         graph, touched = self.source.graph, self.source.graph.const(False)
-        for _, each in self.turning:
-            touched = graph.op("or", touched, each)
+        for _, touch in self.turning:
+            touched = graph.op("or", touched, touch)
         return self._first(self.places.grazing, touched)
 
     def change(self, level: Expr, seed: Direction) -> list[Expr | None]:
@@ -185,57 +154,57 @@ class Saltation:
 
     def at_turns(self) -> dict[int, Expr]:
         """Return what derivatives of memories become where these turn, by their states."""
-        places, carried = self.places, self.source.carried
+        places, driven = self.places, self.source.driven
         return {
-            places.derivative(j) + m: self._kept(j, m, turned=True)
+            places.derivative(j) + m: self._kept(j, m, at_turn=True)
             for j in range(places.by)
-            for m in carried
+            for m in driven
         }
 
     # -- states ----------------------------------------------------------------------------------
 
     def _states(self, j: int) -> list[SomeRows]:
         """Return the derivatives of all states by a quantity, in the pieces of the flow."""
-        graph, row, found = self.source.graph, self.places.derivative(j), []
+        graph, row, pieces = self.source.graph, self.places.derivative(j), []
         for _, size in self.source.flow:
-            found.append((graph.leaf("x", row, size if size > 1 else None), size))
+            pieces.append((graph.leaf("x", row, size if size > 1 else None), size))
             row += size
-        return rows_replaced(graph, found, {m: self._kept(j, m) for m in self.source.carried})
+        return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.driven})
 
-    def _kept(self, j: int, m: int, turned: bool = False) -> Expr:
-        """Return the derivative of a memory, which while it is carried along nobody keeps.
+    def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
+        """Return the derivative of a memory, which is integrated only while it is not driven.
 
-        A step ends a little behind where it has turned.
+        A step ends a little behind where it has reversed.
         """
         graph = self.source.graph
         kept = self.sides.memories[m]
-        become = self.source.carried[m]
+        become = self.source.driven[m]
         (change,) = self.change(become, self.seeds[j])
-        found = graph.const(0.0) if change is None else change
-        if turned and change is not None:
+        derivative = graph.const(0.0) if change is None else change
+        if at_turn and change is not None:
             late, flowing = self._late(become), list(self.source.flow)
             for i in range(self.places.by):
                 rates = self.source.slopes([e for e, _ in self.source.flow], self.seeds[i])
                 zero = graph.const(0.0)
                 sizes = (size for _, size in self.source.flow)
                 flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
-            forward = self.source.time(flowing, known=False)
+            forward = self.source.time(flowing, delays_move=False)
             (rate,) = self.source.slopes([change], forward)
             if rate is not None:
-                found = graph.op("sub", found, graph.op("mul", late, rate))
-        (found,) = self.sides.kept([found])
+                derivative = graph.op("sub", derivative, graph.op("mul", late, rate))
+        (derivative,) = self.sides.kept([derivative])
         moved = graph.op("ne", graph.leaf("x", m, None), kept)
-        own = graph.leaf("x", self.places.derivative(j) + m, None)
-        return graph.op("select", moved, found, own)
+        integrated = graph.leaf("x", self.places.derivative(j) + m, None)
+        return graph.op("select", moved, derivative, integrated)
 
     def _late(self, become: Expr) -> Expr:
-        """Return how long ago what carries a memory along has turned, 0 at a break.
+        """Return how long ago what drives a memory has reversed, 0 at a break.
 
         Where it turns is located by a difference of rates: a little too early or too late.
         """
         graph, source = self.source.graph, self.source
         zero = graph.const(0.0)
-        forward = source.time(source.flow, known=False)
+        forward = source.time(source.flow, delays_move=False)
         (rate,) = self.source.slopes([become], forward)
         (bend,) = self.source.slopes([rate or zero], forward)
         if bend is None:
@@ -264,12 +233,12 @@ class Saltation:
         of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
         changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
         state, left = graph.joined(arriving), graph.joined(list(behind))
-        found = []
+        jumped = []
         for k in range(self.places.states):
             moved = changes[k] if k in changes else graph.item(state, k)
             moved = graph.op("sub", moved, graph.op("mul", graph.item(left, k), move))
-            found.append((graph.op("select", broken, graph.const(0.0), moved), 1))
-        return found
+            jumped.append((graph.op("select", broken, graph.const(0.0), moved), 1))
+        return jumped
 
     def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
         """Return the derivatives of expressions, with memories as they are kept.
@@ -283,36 +252,36 @@ class Saltation:
                 return None
             return graph.node("leaf", data=(_WAY, start, step), size=size, varies=True)
 
-        made = source.slopes(exprs, Direction(of={**of, "x": place}))
+        changes = source.slopes(exprs, Direction(of={**of, "x": place}))
         zero = graph.const(0.0)
-        found = self.sides.kept([e or zero for e in made])
-        leaves = [e for e in needed(found) if e.op == "leaf" and e.data[0] == _WAY]
+        kept = self.sides.kept([e or zero for e in changes])
+        leaves = [e for e in needed(kept) if e.op == "leaf" and e.data[0] == _WAY]
         ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
-        return replaced_parts(graph, found, ways)
+        return replaced_parts(graph, kept, ways)
 
-    def _carried_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
-        """Return what becomes of memories that are carried along where other states jump.
+    def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
+        """Return driven memories after a jump of other states.
 
-        First they are what has carried them until then.
+        First they are what has driven them until then.
         """
-        carried = self.source.carried
+        driven = self.source.driven
         return {
             m: self.source.with_states([become], {**rows, m: become})[0]
-            for m, become in carried.items()
+            for m, become in driven.items()
         }
 
     def _after(self, rows: dict[int, Expr], pieces: Sequence[SomeRows]) -> list[SomeRows]:
         """Return expressions behind a jump of some states, and what memories switch to by it."""
-        source, carried = self.source, self.source.carried
-        rows = {k: self.sides.kept([e])[0] if k in carried else e for k, e in rows.items()}
+        source, driven = self.source, self.source.driven
+        rows = {k: self.sides.kept([e])[0] if k in driven else e for k, e in rows.items()}
         held = [
             (m, c) for m, c in zip(source.program.memory, source.committed, strict=True)
             if m in source.switched
         ]  # fmt: skip
         switched = source.with_states([c for _, c in held], rows)
         instead = {**rows, **dict(zip((m for m, _ in held), switched, strict=True))}
-        made = source.with_states([e for e, _ in pieces], instead)
-        return [(e, size) for e, (_, size) in zip(made, pieces, strict=True)]
+        changed = source.with_states([e for e, _ in pieces], instead)
+        return [(e, size) for e, (_, size) in zip(changed, pieces, strict=True)]
 
     def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]]) -> Expr:
         """Return whether expressions differ by more than rounding."""
@@ -330,8 +299,8 @@ class Saltation:
     def _first(self, place: int, happens: Expr) -> Expr:
         """Return when something has first happened, now at the latest if it does."""
         graph = self.source.graph
-        known, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
-        return graph.op("select", happens, graph.op("minimum", known, now), known)
+        earlier, now = graph.leaf("x", place, None), graph.leaf("t", 0, None)
+        return graph.op("select", happens, graph.op("minimum", earlier, now), earlier)
 
     # -- when ------------------------------------------------------------------------------------
 
@@ -348,26 +317,26 @@ class Saltation:
                     for e in (side.kept, side.before.now, side.before.level, side.before.extent)
                 )
                 left = graph.op("and", graph.op("ne", kept, now), free)
-                rate, made = self._met(left, level, extent, self.sides.flow_before)
-                causes += [made] if rate is not None else []
+                rate, cause = self._met(left, level, extent, self.sides.flow_before)
+                causes += [cause] if rate is not None else []
         return self._of_causes(causes)
 
     def _when_fallen(self, guards: Sequence[Expr]) -> When:
         """Return how the time moves at which a guard has fallen: the nearest to 0."""
         graph = self.source.graph
         far = nearest = graph.const(_FAR)
-        yes, known = graph.const(True), []
+        yes, fallen_guards = graph.const(True), []
         for guard in guards:
             size = graph.op("absolute", guard)
-            rate, made = self._met(yes, guard, size, self.source.flow)
+            rate, cause = self._met(yes, guard, size, self.source.flow)
             if rate is not None:
                 fallen = graph.op("lt", guard, graph.const(0.0))
                 ago = graph.op("absolute", graph.op("div", guard, rate))
                 ago = graph.op("select", fallen, ago, far)
-                known.append((ago, made))
+                fallen_guards.append((ago, cause))
                 nearest = graph.op("minimum", nearest, ago)
         return self._of_causes(
-            [replace(made, met=graph.op("le", ago, nearest)) for ago, made in known]
+            [replace(cause, met=graph.op("le", ago, nearest)) for ago, cause in fallen_guards]
         )
 
     def _met(
@@ -379,7 +348,7 @@ class Saltation:
         (rate,) = self.source.slopes([level], forward)
         if rate is None:
             return None, Cause(met=met, moves=[], grazes=graph.const(False))
-        (bend,) = self.source.slopes([rate], source.time(flow, known=False))
+        (bend,) = self.source.slopes([rate], source.time(flow, delays_move=False))
         noise = self._noise(extent)
         bent = graph.op("absolute", graph.const(0.0) if bend is None else bend)
         least = graph.op("mul", graph.op("mul", graph.const(2.0), bent), noise)

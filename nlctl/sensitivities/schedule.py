@@ -34,24 +34,14 @@ class ScheduleWithRates(Schedule):
 
 @dataclass(frozen=True, kw_only=True)
 class Extended:
-    """A schedule with a line for the derivatives of each delayed signal.
-
-    Attributes
-    ----------
-    schedule : Schedule
-    layout : mapping
-        StatePlaces of all parameters, behind those of the diagram.
-    owner : int
-        The block that conditions belong to; memories that turn belong to the next, and what
-        turns before a condition to the one behind.
-    lines : int
-        Number of delayed signals.
-    """
+    """A schedule with a line for the derivatives of each delayed signal."""
 
     schedule: Schedule
-    layout: dict[int, dict[str, Slot]]
+    layout: dict[int, dict[str, Slot]]  # StatePlaces of all parameters, behind those of the diagram
+    # the block that conditions belong to; memories that turn belong to the next, and what
+    # turns before a condition to the one behind
     owner: int
-    lines: int
+    lines: int  # number of delayed signals
 
     def line(self, j: int, i: int) -> int:
         """Return which line the derivative by quantity `j` of delayed signal `i` has."""
@@ -83,7 +73,7 @@ def _nothing(t: float, x: Any, u: Any, params: Any) -> Any:
 def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     """Return the schedule of a diagram with room for its derivatives by so many quantities."""
     read = compiled.schedule
-    own, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
+    before, arriving = len(read.nodes), read.outputs[compiled.system.noutputs or 0 :]
     delays = [_derivative_of(read, i, j) for j in range(by) for i in range(len(read.lines))]
     nothing = Node(
         path="derivatives", system=ct.ss([], [], [], []), state_offset=read.system.nstates or 0,
@@ -94,10 +84,10 @@ def extended(compiled: Compiled, outputs: Sequence[Any], by: int) -> Extended:
     given |= {
         "system": stand_in(read.system, read.system.nstates or 0, len(outputs)),
         "nodes": nodes,
-        "order": (*read.order, *range(own, len(nodes))),
-        "unknown": (*read.unknown, *(frozenset() for _ in range(own, len(nodes)))),
+        "order": (*read.order, *range(before, len(nodes))),
+        "unknown": (*read.unknown, *(frozenset() for _ in range(before, len(nodes)))),
         "outputs": (*outputs, *arriving),
-        "lines": (*read.lines, *(Signal(own + i, 0) for i in range(len(delays)))),
+        "lines": (*read.lines, *(Signal(before + i, 0) for i in range(len(delays)))),
         "watched": (),
     }
     return Extended(
@@ -110,49 +100,53 @@ def _derivative_of(read: Schedule, i: int, j: int) -> Node:
     """Return the delay of a derivative: like that of the signal, and 0 before the run."""
     spec = read.nodes[read.lines[i].block or 0].system.current_spec
     name = f"derivative_{j}_{i}"
-    made = TransportDelay(delay=spec.delay, varying=spec.varying)
+    delay = TransportDelay(delay=spec.delay, varying=spec.varying)
     return Node(
-        path=name, system=block(made, name), state_offset=read.system.nstates or 0,
+        path=name, system=block(delay, name), state_offset=read.system.nstates or 0,
         inputs=({},), direct=np.zeros((1, 1), dtype=bool),
     )  # fmt: skip
 
 
 def _layout(compiled: Compiled, delays: int, by: int) -> dict[int, dict[str, Slot]]:
     """Return the places of all parameters: those of the diagram stay where they are."""
-    before, own = compiled.program.layout, len(compiled.schedule.nodes)
-    at, found = length(before), {i: dict(before[i]) for i in range(own)}
-    for i in range(own, own + delays):
-        found[i] = {
+    before, count = compiled.program.layout, len(compiled.schedule.nodes)
+    at, layout = length(before), {i: dict(before[i]) for i in range(count)}
+    for i in range(count, count + delays):
+        layout[i] = {
             name: Slot(name=name, offset=at + k, shape=(), kind="f")
             for k, name in enumerate(("delay", "before"))
         }
         at += 2
-    found[own + delays] = {
+    layout[count + delays] = {
         "scale": Slot(name="scale", offset=at, shape=(by,), kind="f"),
         "rtol": Slot(name="rtol", offset=at + by, shape=(), kind="f"),
         "atol": Slot(name="atol", offset=at + by + 1, shape=(), kind="f"),
         "late": Slot(name="late", offset=at + by + 2, shape=(), kind="f"),
     }
-    found |= {own + delays + k: {} for k in range(1, _OWNERS)}
+    layout |= {count + delays + k: {} for k in range(1, _OWNERS)}
     for k in range(len(compiled.schedule.samplings)):
-        found[own + delays + _OWNERS + k] = dict(before[own + k])
-    return found
+        layout[count + delays + _OWNERS + k] = dict(before[count + k])
+    return layout
 
 
 def with_derivatives(
-    compiled: Compiled, made: Extended, states: int, outputs: int, by: int
+    compiled: Compiled, extended_program: Extended, states: int, outputs: int, by: int
 ) -> Schedule:
     """Return the schedule of the program: what arrives, and what leaves which line at once."""
     from ..native.histories import direct_lines
 
-    direct, lines = direct_lines(compiled.schedule), made.schedule.lines
+    direct, lines = direct_lines(compiled.schedule), extended_program.schedule.lines
     arriving = []
     for j in range(-1, by):
         for row in direct:
-            reached = [made.line(other, int(i)) for i in np.flatnonzero(row) for other in {-1, j}]
+            reached = [
+                extended_program.line(other, int(i))
+                for i in np.flatnonzero(row)
+                for other in {-1, j}
+            ]
             arriving.append({lines[k]: 1.0 for k in reached})
     return replace(
-        made.schedule,
+        extended_program.schedule,
         system=stand_in(compiled.system, states, outputs),
         outputs=(*({} for _ in range(outputs)), *arriving),
     )

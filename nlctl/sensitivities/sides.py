@@ -17,27 +17,13 @@ __all__ = ["KeptSide", "KeptSides", "sides_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class KeptSide:
-    """One jump, or as many as it has elements.
+    """One jump, or as many as it has elements."""
 
-    Attributes
-    ----------
-    kept : Expr
-        The side that is kept, a state.
-    here : Branch
-        By what everything is now.
-    before : Branch
-        By what everything was on the sides that are kept.
-    timed : bool
-        Whether it is of t alone.
-    node : Expr or None
-        The operation in the equations.
-    """
-
-    kept: Expr
-    here: Branch
-    before: Branch
-    timed: bool
-    node: Expr | None = None
+    kept: Expr  # the side that is kept, a state
+    here: Branch  # by what everything is now
+    before: Branch  # by what everything was on the sides that are kept
+    timed: bool  # whether it is of t alone
+    node: Expr | None = None  # the operation in the equations
 
     @property
     def rows(self) -> int:
@@ -47,23 +33,14 @@ class KeptSide:
 
 @dataclass(frozen=True, kw_only=True)
 class KeptSides:
-    """The sides of all jumps.
-
-    Attributes
-    ----------
-    source : EquationParts
-    sides : tuple of KeptSide
-    memories : mapping
-        Of states of memories, what is kept of them: far away while they are carried along, and
-        where they stand otherwise.
-    before : mapping
-        What stands, on the sides that are kept, for parts of the equations.
-    """
+    """The sides of all jumps."""
 
     source: EquationParts
     sides: tuple[KeptSide, ...]
+    # of states of memories, what is kept of them: far away while they are driven, and where
+    # they stand otherwise
     memories: dict[int, Expr]
-    before: dict[Expr, Expr]
+    before: dict[Expr, Expr]  # what stands, on the sides that are kept, for parts of the equations
 
     @property
     def rows(self) -> int:
@@ -80,8 +57,8 @@ class KeptSides:
     def flow_before(self) -> list[SomeRows]:
         """The derivatives of the states on the sides that are kept."""
         flow = self.source.flow
-        made = self.earlier([e for e, _ in flow])
-        return [(e, size) for e, (_, size) in zip(made, flow, strict=True)]
+        earlier = self.earlier([e for e, _ in flow])
+        return [(e, size) for e, (_, size) in zip(earlier, flow, strict=True)]
 
     def earlier(self, exprs: Sequence[Expr]) -> list[Expr]:
         """Return expressions on the sides that are kept."""
@@ -103,8 +80,8 @@ class KeptSides:
         return sum(side.rows for side in self.sides)
 
     @property
-    def carried(self) -> Expr:
-        """What is at least 0 as long as every memory that is carried along is where it was."""
+    def driven(self) -> Expr:
+        """What is at least 0 as long as every memory that is driven is where it was."""
         graph, same = self.source.graph, self.source.graph.const(True)
         for m, kept in self.memories.items():
             if m not in self.source.switched:
@@ -114,63 +91,65 @@ class KeptSides:
     @property
     def margin(self) -> Expr:
         """What is at least 0 as long as nothing has left the side that is kept."""
-        graph, found = self.source.graph, []
+        graph, margins = self.source.graph, []
         one, behind = graph.const(1.0), graph.const(-1.0)
         for side in self.sides:
             for k in range(side.rows):
                 kept, now = graph.item(side.kept, k), graph.item(side.here.now, k)
                 if side.timed:
                     same = graph.op("eq", kept, now)
-                    found.append(graph.op("select", same, one, behind))
+                    margins.append(graph.op("select", same, one, behind))
                 else:
-                    found.append(graph.item(side.here.margin, k))
+                    margins.append(graph.item(side.here.margin, k))
         for m in self.source.switched:
             same = graph.op("eq", graph.leaf("x", m, None), self.memories[m])
-            found.append(graph.op("select", same, one, behind))
-        return reduce(lambda a, b: graph.op("minimum", a, b), found, one)
+            margins.append(graph.op("select", same, one, behind))
+        return reduce(lambda a, b: graph.op("minimum", a, b), margins, one)
 
 
 def sides_of(source: EquationParts, first: int) -> KeptSides:
     """Return the sides of all jumps of a diagram."""
     graph = source.graph
-    wanted = [(node, node.op, node.args) for node in source.jumps]
-    wanted += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]
-    sizes = [next((a.size for a in args if a.size), None) for _, _, args in wanted]
+    jumps = [(node, node.op, node.args) for node in source.jumps]
+    jumps += [(None, "ge", (expr, graph.const(0.0))) for expr in _of_memories(source)]
+    sizes = [next((a.size for a in args if a.size), None) for _, _, args in jumps]
     behind = first + sum(size or 1 for size in sizes)
     memories = {m: graph.leaf("x", behind + k, None) for k, m in enumerate(source.program.memory)}
     before: dict[Expr, Expr] = {}
-    found, timed = [], _timed([e for _, _, args in wanted for e in args])
-    for (node, op, args), size in zip(wanted, sizes, strict=True):
+    sides, timed = [], _timed([e for _, _, args in jumps for e in args])
+    for (node, op, args), size in zip(jumps, sizes, strict=True):
         kept, first = graph.leaf("x", first, size), first + (size or 1)
         leaves = source.leaves(args, memories)
         earlier = replaced_parts(graph, list(args), {**leaves, **before})
         there = branch_of(graph, op, earlier, kept)
-        found.append(KeptSide(
+        sides.append(KeptSide(
             kept=kept, here=branch_of(graph, op, args, kept), before=there, node=node,
             timed=all(a in timed or not a.varies for a in args),
         ))  # fmt: skip
         if node is not None:
             before[node] = there.value
-    return KeptSides(source=source, sides=tuple(found), memories=memories, before=before)
+    return KeptSides(source=source, sides=tuple(sides), memories=memories, before=before)
 
 
 def _of_memories(source: EquationParts) -> list[Expr]:
     """Return the switching functions of the blocks whose memories jump."""
     nodes = source.extended.schedule.nodes
-    own = {
+    jumping_blocks = {
         i for i, node in enumerate(nodes) for m in source.switched
         if node.state_offset <= m < node.state_offset + node.size
     }  # fmt: skip
     pairs = zip(source.owners, source.switching, strict=True)
-    return [expr for i, expr in pairs if i in own and expr.varies]
+    return [expr for i, expr in pairs if i in jumping_blocks and expr.varies]
 
 
 def _timed(exprs: Sequence[Expr]) -> set[Expr]:
     """Return which parts vary with t and with nothing else."""
-    found: set[Expr] = set()
+    timed: set[Expr] = set()
     for node in needed(exprs):
-        own = node.op == "leaf" and node.data[0] == "t"
+        is_time = node.op == "leaf" and node.data[0] == "t"
         moved = [a for a in node.args if a.varies]
-        if own or (moved and all(a in found for a in moved) and node.op not in ("call", "solve")):
-            found.add(node)
-    return found
+        if is_time or (
+            moved and all(a in timed for a in moved) and node.op not in ("call", "solve")
+        ):
+            timed.add(node)
+    return timed

@@ -40,48 +40,27 @@ __all__ = ["EquationParts", "equation_parts"]
 
 @dataclass(frozen=True, kw_only=True)
 class EquationParts:
-    """The equations of a diagram, row by row.
+    """The equations of a diagram, row by row."""
 
-    Attributes
-    ----------
-    found : Equations
-    extended : Extended
-    program : Program
-        Of the diagram itself.
-    inputs : int
-        Number of the diagram's inputs.
-    switching : list of Expr
-        Switching functions that blocks declare.
-    guards : list of Expr
-    committed : list of Expr
-        What each memory would become.
-    switched : frozenset of int
-        States of memories that jump, and are not carried along.
-    owners : tuple of int
-        The block of each switching function.
-    p : ndarray
-        Parameters near which the equations are looked at.
-    """
-
-    found: Equations
+    equations: Equations
     extended: Extended
-    program: Program
-    inputs: int
-    switching: list[Expr]
+    program: Program  # of the diagram itself
+    inputs: int  # number of the diagram's inputs
+    switching: list[Expr]  # switching functions that blocks declare
     guards: list[Expr]
-    committed: list[Expr]
-    switched: frozenset[int]
-    owners: tuple[int, ...]
-    p: np.ndarray
+    committed: list[Expr]  # what each memory would become
+    switched: frozenset[int]  # states of memories that jump, and are not driven
+    owners: tuple[int, ...]  # the block of each switching function
+    p: np.ndarray  # parameters near which the equations are evaluated
 
     @property
     def graph(self) -> Graph:
         """Where the expressions are kept."""
-        return self.found.graph
+        return self.equations.graph
 
     @property
-    def carried(self) -> dict[int, Expr]:
-        """What memories would become that are carried along, by their states."""
+    def driven(self) -> dict[int, Expr]:
+        """The next values of driven memories, by their states."""
         pairs = zip(self.program.memory, self.committed, strict=True)
         return {m: expr for m, expr in pairs if m not in self.switched}
 
@@ -89,56 +68,55 @@ class EquationParts:
     def flow(self) -> list[SomeRows]:
         """The derivatives of the states; memories stand still."""
         still = dict.fromkeys(self.program.memory, self.graph.const(0.0))
-        return rows_replaced(self.graph, self.found.pieces("dx"), still)
+        return rows_replaced(self.graph, self.equations.pieces("dx"), still)
 
     @cached_property
     def arriving(self) -> list[SomeRows]:
         """What arrives at the delays."""
-        return _behind(self.graph, self.found.pieces("y"), len(self.extended.schedule.outputs)
+        return _behind(self.graph, self.equations.pieces("y"), len(self.extended.schedule.outputs)
                        - self.extended.lines)  # fmt: skip
 
     @cached_property
     def jumps(self) -> list[Expr]:
         """The operations at which the flow may jump."""
-        inside = [e for each in self.found.fixed_points.values() for e in each]
+        inside = [e for fixed_point in self.equations.fixed_points.values() for e in fixed_point]
         if jumping(inside):
             raise CompileError(
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
                 "on both sides; put a lag into the loop"
             )
         roots = [e for e, _ in (*self.flow, *self.arriving)]
-        roots += self.carried.values()
+        roots += self.driven.values()
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
 
     def time(
-        self, pieces: Sequence[SomeRows], time: Expr | None = None, known: bool = True
+        self, pieces: Sequence[SomeRows], time: Expr | None = None, delays_move: bool = True
     ) -> Direction:
         """Return the direction in which everything goes with these rates of the states.
 
-        By `time`, 1 if it is None.  If the rates of delayed signals need not be `known`, they
-        count as 0.
+        By `time`, 1 if it is None.  The rates of delayed signals count as 0 unless `delays_move`.
         """
         first = self.extended.schedule.ninputs - self.extended.schedule.rates
-        lines = range(self.inputs, first if known else self.inputs)
+        lines = range(self.inputs, first if delays_move else self.inputs)
         outside = from_time(self.graph, time, self.inputs, first, lines)
         return Direction(of={**outside.of, "x": taken(self.graph, pieces)})
 
     def moving(self, flow: Sequence[SomeRows], committed: Sequence[Expr]) -> list[SomeRows]:
-        """Return the rates of all states, those of memories that are carried along included."""
+        """Return the rates of all states, those of memories that are driven included."""
         pairs = zip(self.program.memory, committed, strict=True)
-        carried = {m: expr for m, expr in pairs if m not in self.switched}
-        if not carried:
+        driven = {m: expr for m, expr in pairs if m not in self.switched}
+        if not driven:
             return list(flow)
         direction = self.time(flow)
-        ahead = one_sided(self.graph, list(carried.values()), direction)
+        ahead = one_sided(self.graph, list(driven.values()), direction)
         rates = self.slopes(ahead, direction)
         zero = self.graph.const(0.0)
-        return rows_replaced(self.graph, flow, dict(zip(carried, (r or zero for r in rates),
+        return rows_replaced(self.graph, flow, dict(zip(driven, (r or zero for r in rates),
                                                         strict=True)))  # fmt: skip
 
     def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
         """Return the derivatives of expressions along a direction, None where they are 0."""
-        return slopes(self.graph, exprs, direction, self.found.fixed_points)
+        return slopes(self.graph, exprs, direction, self.equations.fixed_points)
 
     def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
         """Return expressions with others in the places of some states."""
@@ -146,7 +124,7 @@ class EquationParts:
 
     def leaves(self, exprs: Iterable[Expr], instead: Mapping[int, Expr]) -> dict[Expr, Expr]:
         """Return what stands for the leaves of expressions that read some states."""
-        found = {}
+        replacements = {}
         for leaf in needed(exprs):
             if leaf.op != "leaf" or leaf.data[0] != "x":
                 continue
@@ -155,37 +133,40 @@ class EquationParts:
             if not any(row in instead for row in rows):
                 continue
             parts = [instead.get(r, self.graph.leaf("x", r, None)) for r in rows]
-            found[leaf] = self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
-        return found
+            replacements[leaf] = (
+                self.graph.joined([(e, 1) for e in parts]) if leaf.size else parts[0]
+            )
+        return replacements
 
 
-def equation_parts(compiled: Compiled, made: Extended, p: np.ndarray) -> EquationParts:
+def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray) -> EquationParts:
     """Return what a diagram computes."""
     program = compiled.program
-    found = equations(made.schedule, made.layout, p, program.meetings)
-    graph, first = found.graph, program.switching + found.conditions.rows
-    rows = _single(graph, found.results["g"])
+    computed = equations(extended_program.schedule, extended_program.layout, p, program.meetings)
+    graph, first = computed.graph, program.switching + computed.conditions.rows
+    rows = _single(graph, computed.results["g"])
     del graph.lengths["x"]  # there are more of them now
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
     return EquationParts(
-        found=found, extended=made, program=program, inputs=compiled.system.ninputs or 0,
+        equations=computed, extended=extended_program, program=program,
+        inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
-        committed=list(_single(graph, found.results["m"]).values()),
+        committed=list(_single(graph, computed.results["m"]).values()),
         switched=frozenset(jump), owners=tuple(owners), p=p,
     )  # fmt: skip
 
 
 def _single(graph: Graph, results: Sequence[tuple[int, Tracer]]) -> dict[int, Expr]:
     """Return the expression of each row of some results."""
-    found: dict[int, Expr] = {}
+    single: dict[int, Expr] = {}
     for row, array in results:
         for expr, size in array.pieces():
-            found |= {row + k: graph.item(expr, k) for k in range(size)}
+            single |= {row + k: graph.item(expr, k) for k in range(size)}
             row += size
-    return found
+    return single
 
 
 def _jumps(node: Node) -> bool:
@@ -195,23 +176,23 @@ def _jumps(node: Node) -> bool:
         return True
     try:
         given = traced_arguments(graph, system, slots_of(system))
-        made = trace(graph, system.spec.commit, lambda: given)
+        committed = trace(graph, system.spec.commit, lambda: given)
     except Untraceable as error:
         raise CompileError(
             f"block '{node.path}' has a memory that is not an expression ({error}): its "
             "derivatives are not known; take differences of runs"
         ) from None
-    return may_jump([e for e, _ in made.pieces()])
+    return may_jump([e for e, _ in committed.pieces()])
 
 
 def _behind(graph: Graph, pieces: Sequence[SomeRows], first: int) -> list[SomeRows]:
     """Return the rows of pieces from one on."""
-    found, row = [], 0
+    rest_of_pieces, row = [], 0
     for expr, size in pieces:
         cut = min(max(first - row, 0), size)
         if cut < size:
             rest = size - cut
             part = graph.item(expr, cut) if rest == 1 else graph.part(expr, cut, 1, rest)
-            found.append((part if expr.size else expr, rest))
+            rest_of_pieces.append((part if expr.size else expr, rest))
         row += size
-    return found
+    return rest_of_pieces

@@ -162,15 +162,15 @@ def tune(
     >>> print(found["plant.a"], round(found.margin, 4), round(1 - np.exp(-2) / 0.5, 4))
     2.0 0.7293 0.7293
     """
-    asked, start = _asked(
+    problem, start = _problem(
         diagram, (space, spec, cost, samples), (timepts, inputs, initial_state, params),
         {"rtol": rtol, "atol": atol, "max_steps": max_steps},
     )  # fmt: skip
     number("tune", "budget", budget, above=0)
     starts = integer("tune", "starts", starts, at_least=1)
-    runs = Runs(asked)
-    message = _searched(runs, asked.cube(start), float(budget), starts, seed)
-    return _found(runs, start, message)
+    runs = Runs(problem)
+    message = _searched(runs, problem.cube(start), float(budget), starts, seed)
+    return _tuned(runs, start, message)
 
 
 class _SpentError(Exception):
@@ -184,11 +184,11 @@ def _searched(runs: Runs, start: np.ndarray, budget: float, starts: int, seed: i
     try:
         _climb(runs, start, budget)
         for _ in range(starts - 1):
-            if runs.counted + some * len(runs.asked.samples) >= budget:
+            if runs.counted + some * len(runs.problem.samples) >= budget:
                 return "the budget is spent"
             drawn = points.random(some)
-            found = runs.at(drawn, "Sobol'")
-            _climb(runs, max(zip(drawn, found, strict=True), key=lambda p: p[1].rank)[0], budget)
+            worths = runs.at(drawn, "Sobol'")
+            _climb(runs, max(zip(drawn, worths, strict=True), key=lambda p: p[1].rank)[0], budget)
     except _SpentError:
         return "the budget is spent"
     except KeyboardInterrupt:
@@ -200,7 +200,7 @@ def _searched(runs: Runs, start: np.ndarray, budget: float, starts: int, seed: i
 
 def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
     """Search from one start as long as there are runs."""
-    cost = runs.asked.cost
+    cost = runs.problem.cost
 
     def worth_of(cube: np.ndarray) -> Worth:
         if runs.counted >= budget:
@@ -213,19 +213,19 @@ def _climb(runs: Runs, start: np.ndarray, budget: float) -> None:
         lower_cost(worth_of, start)
 
 
-def _found(runs: Runs, first: np.ndarray, message: str) -> Tuned:
+def _tuned(runs: Runs, first: np.ndarray, message: str) -> Tuned:
     """Return what was found, with what each gain has bought."""
-    asked, k, start = runs.asked, first.size, runs.asked.cube(first)
+    problem, k, start = runs.problem, first.size, runs.problem.cube(first)
     best, without = _plainest(runs, start)
-    each = [np.where(np.arange(k) == j, best, start) for j in range(k)]
-    before, after, *alone = runs.at(np.array([start, best, *each]))
+    single = [np.where(np.arange(k) == j, best, start) for j in range(k)]
+    before, after, *alone = runs.at(np.array([start, best, *single]))
     return Tuned(
-        names=asked.names, low=asked.low, high=asked.high, start=first,
-        values=np.where(best == start, first, asked.values(best)),
-        before=_by_key(asked, before), after=_by_key(asked, after),
+        names=problem.names, low=problem.low, high=problem.high, start=first,
+        values=np.where(best == start, first, problem.values(best)),
+        before=_by_key(problem, before), after=_by_key(problem, after),
         alone=np.array([worth.goal for worth in alone]),
         put_back=np.array([worth.goal for worth in without]),
-        cost=asked.cost.key if asked.cost else "", history=_history(runs),
+        cost=problem.cost.key if problem.cost else "", history=_history(runs),
         plain_runs=runs.plain, differentiated_runs=runs.differentiated,
         counted_runs=runs.counted, notes=notes(runs, before, best), message=message,
     )  # fmt: skip
@@ -242,13 +242,13 @@ def _plainest(runs: Runs, start: np.ndarray) -> tuple[np.ndarray, list[Worth]]:
         if not same:
             return best, without
         j = max(same, key=lambda j: without[j].rank)
-        best, worth = others[j], max(worth, without[j], key=lambda each: each.rank)
+        best, worth = others[j], max(worth, without[j], key=lambda candidate: candidate.rank)
 
 
-def _by_key(asked: TuningProblem, worth: Worth) -> dict[str, float]:
+def _by_key(problem: TuningProblem, worth: Worth) -> dict[str, float]:
     """Return the least margins over the samples, and the mean cost."""
-    found = {m.key: float(worth.table[:, j].min()) for j, m in enumerate(asked.margins)}
-    return found if asked.cost is None else found | {asked.cost.key: worth.cost}
+    margins = {m.key: float(worth.table[:, j].min()) for j, m in enumerate(problem.margins)}
+    return margins if problem.cost is None else margins | {problem.cost.key: worth.cost}
 
 
 def _history(runs: Runs) -> Any:
@@ -257,13 +257,13 @@ def _history(runs: Runs) -> Any:
 
     rows = [
         {"by": by, "runs": count, "margin": worth.least, "cost": worth.cost}
-        | dict(zip(runs.asked.names, runs.asked.values(cube), strict=True))
+        | dict(zip(runs.problem.names, runs.problem.values(cube), strict=True))
         for by, count, cube, worth in runs.history
     ]
     return pd.DataFrame(rows)
 
 
-def _asked(
+def _problem(
     diagram: Any, what: tuple[Any, ...], given: tuple[Any, ...], how: dict[str, Any]
 ) -> tuple[TuningProblem, np.ndarray]:
     """Return what is asked of runs, and the gains to start from."""
@@ -273,31 +273,31 @@ def _asked(
         diagram = compile_diagram(sized(diagram, inputs, initial_state), params=params)
     margins = _margins(spec, cost)
     params, initial_state = dict(params or {}), dict(initial_state or {})
-    own = _own_values(diagram, params, initial_state)
-    rows = [_row(diagram, name, value, own) for name, value in _bounds(space)]
+    present = _present_values(diagram, params, initial_state)
+    rows = [_row(diagram, name, value, present) for name, value in _bounds(space)]
     start, low, high = np.array([row[1:] for row in rows], dtype=float).T
-    asked = TuningProblem(
+    problem = TuningProblem(
         diagram=diagram, times=_times(timepts, margins), inputs=inputs, params=params,
         initial_state=initial_state, names=tuple(row[0] for row in rows), low=low, high=high,
         samples=checked_samples(samples or {}, [row[0] for row in rows]), margins=margins,
         cost=cost, how=how,
     )  # fmt: skip
-    return asked, start
+    return problem, start
 
 
 def _margins(spec: Any, cost: Any) -> tuple[MetricLike, ...]:
     """Return the requirements of a spec, of several, or of one."""
-    each = getattr(spec, "requirements", spec)
-    each = tuple(each) if isinstance(each, Iterable) else (each,)
-    for metric in each if cost is None else (*each, cost):
+    metrics = getattr(spec, "requirements", spec)
+    metrics = tuple(metrics) if isinstance(metrics, Iterable) else (metrics,)
+    for metric in metrics if cost is None else (*metrics, cost):
         if not (hasattr(metric, "signals") and hasattr(metric, "function")):
             raise ParameterError(
                 "tune needs requirements such as nlctl.analysis.robustness.Requirement and a cost "
                 f"such as nlctl.analysis.metrics.Metric, got {metric!r}"
             )
-    if not each and cost is None:
+    if not metrics and cost is None:
         raise ParameterError("tune needs at least one requirement or a cost, got neither")
-    return each
+    return metrics
 
 
 def _times(timepts: Any, margins: Sequence[Any]) -> np.ndarray:
@@ -329,23 +329,23 @@ def _bounds(space: Any) -> list[tuple[str, Any]]:
     return rows
 
 
-def _own_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
+def _present_values(diagram: Compiled, params: Any, initial_state: Any) -> dict[str, float]:
     """Return what parameters and initial states are before anything is tuned."""
     p = diagram.parameter_vector(params)
-    own = {name: float(p[place]) for name, (place, _) in float_parameters(diagram).items()}
+    present = {name: float(p[place]) for name, (place, _) in float_parameters(diagram).items()}
     x0 = state_array(diagram.system, initial_state)
-    return own | {f"{n}(0)": float(x0[i]) for i, n in enumerate(state_names(diagram.system))}
+    return present | {f"{n}(0)": float(x0[i]) for i, n in enumerate(state_names(diagram.system))}
 
 
 def _row(
-    diagram: Compiled, name: str, value: Any, own: Mapping[str, float]
+    diagram: Compiled, name: str, value: Any, present: Mapping[str, float]
 ) -> tuple[str, float, float, float]:
     """Return the full name of a gain, where its search starts, and its bounds."""
-    full = name if name in own else find_name("parameter", name, own)
+    full = name if name in present else find_name("parameter", name, present)
     row = as_numbers(value)
     if row is None or row.shape not in ((2,), (3,)):
         raise ParameterError(f"'{name}' needs (low, high) or (start, low, high), got {value!r}")
-    start, low, high = row if row.size == 3 else (own[full], *row)
+    start, low, high = row if row.size == 3 else (present[full], *row)
     if not (np.isfinite([low, high]).all() and low < high):
         raise ParameterError(f"'{name}' needs finite bounds low < high, got {low:g}, {high:g}")
     if not low <= start <= high:

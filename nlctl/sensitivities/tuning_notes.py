@@ -36,7 +36,7 @@ def _start(runs: Runs, before: Worth) -> Iterator[str]:
 def _flat(runs: Runs) -> Iterator[str]:
     """Yield which requirements none of the gains moves."""
     tables = np.stack([worth.table for _, _, _, worth in runs.history])
-    for j, metric in enumerate(runs.asked.metrics):
+    for j, metric in enumerate(runs.problem.metrics):
         values = tables[:, :, j]
         if runs.slope_of[j] == 0.0 and np.all(np.ptp(values, axis=0) == 0.0):
             yield (
@@ -47,7 +47,7 @@ def _flat(runs: Runs) -> Iterator[str]:
 
 def _idle(runs: Runs) -> Iterator[str]:
     """Yield which parameters nothing depends on."""
-    names = [n for n, most in zip(runs.asked.names, runs.moved, strict=True) if most == 0.0]
+    names = [n for n, most in zip(runs.problem.names, runs.moved, strict=True) if most == 0.0]
     if names:
         are = "are" if len(names) > 1 else "is"
         yield f"nothing that is asked depends on {', '.join(names)}, which {are} left at the start"
@@ -55,15 +55,15 @@ def _idle(runs: Runs) -> Iterator[str]:
 
 def _at_bounds(runs: Runs, cube: np.ndarray) -> Iterator[str]:
     """Yield which gains end at a bound."""
-    asked = runs.asked
-    ends = ((cube <= _AT_BOUND, asked.low), (cube >= 1.0 - _AT_BOUND, asked.high))
-    found = [
-        f"{asked.names[j]} at {bound[j]:g}"
+    problem = runs.problem
+    ends = ((cube <= _AT_BOUND, problem.low), (cube >= 1.0 - _AT_BOUND, problem.high))
+    at_bounds = [
+        f"{problem.names[j]} at {bound[j]:g}"
         for is_there, bound in ends
         for j in np.flatnonzero(is_there & (runs.moved > 0.0))
     ]
-    if found:
-        yield f"the search ended at a bound, which may be too narrow: {', '.join(found)}"
+    if at_bounds:
+        yield f"the search ended at a bound, which may be too narrow: {', '.join(at_bounds)}"
 
 
 def _without_derivatives(runs: Runs) -> Iterator[str]:

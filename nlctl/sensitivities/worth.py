@@ -28,38 +28,22 @@ _NEAREST = 6  # parts of a requirement that count: the lowest
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TuningProblem:
-    """Which runs are made, and what is asked of them.
-
-    Attributes
-    ----------
-    diagram : Compiled
-    times, inputs, params, initial_state
-        As `nlctl.ensemble_response` takes them.
-    samples : tuple of dict
-        What else is set in each run.
-    names : tuple of str
-        What is tuned.
-    low, high : ndarray of shape (k,)
-    margins : tuple of MetricLike
-        Larger is better, > 0 holds.
-    cost : MetricLike or None
-        Smaller is better.
-    how : mapping
-        Tolerances and steps of the runs.
-    """
+    """Which runs are made, and what is asked of them."""
 
     diagram: Compiled
+    # as `nlctl.ensemble_response` takes them
     times: np.ndarray
     inputs: Any
     params: Mapping[str, Any]
     initial_state: Mapping[str, Any]
-    samples: tuple[Mapping[str, float], ...]
-    names: tuple[str, ...]
+    samples: tuple[Mapping[str, float], ...]  # what else is set in each run
+    names: tuple[str, ...]  # what is tuned
+    # (k,)
     low: np.ndarray
     high: np.ndarray
-    margins: tuple[MetricLike, ...]
-    cost: MetricLike | None
-    how: Mapping[str, Any]
+    margins: tuple[MetricLike, ...]  # larger is better, > 0 holds
+    cost: MetricLike | None  # smaller is better
+    how: Mapping[str, Any]  # tolerances and steps of the runs
 
     @property
     def metrics(self) -> tuple[MetricLike, ...]:
@@ -85,8 +69,8 @@ class TuningProblem:
         low, high = self._ends
         inside = low + np.clip(cube, 0.0, 1.0) * (high - low)
         powers = np.exp(np.where(self._as_powers, inside, 0.0))
-        found = np.clip(np.where(self._as_powers, powers, inside), self.low, self.high)
-        return np.select([cube <= 0.0, cube >= 1.0], [self.low, self.high], found)
+        gains = np.clip(np.where(self._as_powers, powers, inside), self.low, self.high)
+        return np.select([cube <= 0.0, cube >= 1.0], [self.low, self.high], gains)
 
     def cube(self, values: np.ndarray) -> np.ndarray:
         """Return the point of the unit cube of some gains."""
@@ -107,26 +91,15 @@ class TuningProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Worth:
-    """What one choice of gains is worth.
+    """What one choice of gains is worth."""
 
-    Attributes
-    ----------
-    table : ndarray of shape (samples, metrics)
-        Margins, then the cost.
-    count : int
-        Number of margins.
-    parts : ndarray of shape (n,)
-        What margins are the least of, in all samples; empty if there are no derivatives.
-    slopes : ndarray of shape (n, k)
-        Their derivatives by coordinates of the unit cube.
-    cost_slopes : ndarray of shape (k,)
-        Those of the mean cost.
-    """
-
-    table: np.ndarray
-    count: int
+    table: np.ndarray  # (samples, metrics): Margins, then the cost
+    count: int  # number of margins
+    # (n,): what margins are the least of, in all samples; empty if there are no derivatives
     parts: np.ndarray = field(default_factory=lambda: np.empty(0))
+    # (n, k): their derivatives by coordinates of the unit cube
     slopes: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    # (k,): those of the mean cost
     cost_slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
@@ -170,22 +143,22 @@ class Worth:
 class Runs:
     """Makes runs, counts them, and keeps what each choice of gains was worth."""
 
-    def __init__(self, asked: TuningProblem) -> None:
-        self.asked = asked
+    def __init__(self, problem: TuningProblem) -> None:
+        self.problem = problem
         self.plain = self.differentiated = 0
         self.why = ""  # there are no derivatives at all
         self.lacking: dict[str, int] = {}  # why there were none, and how often
         self.kinked: dict[str, int] = {}
         self.at_first: dict[str, dict[str, None]] = {}  # of what, by what the start is at a kink
-        self.moved = np.zeros(len(asked.names))  # the largest derivative of anything by each
-        self.slope_of = np.zeros(len(asked.margins) + 1)  # the largest derivative of each
+        self.moved = np.zeros(len(problem.names))  # the largest derivative of anything by each
+        self.slope_of = np.zeros(len(problem.margins) + 1)  # the largest derivative of each
         self.history: list[tuple[str, float, np.ndarray, Worth]] = []
 
     @property
     def counted(self) -> float:
         """Number of runs; one with k derivatives counts as 1 + 0.7 k."""
-        each = 1.0 + PER_DERIVATIVE * len(self.asked.names)
-        return self.plain + each * self.differentiated
+        effort = 1.0 + PER_DERIVATIVE * len(self.problem.names)
+        return self.plain + effort * self.differentiated
 
     def best(self) -> tuple[np.ndarray, Worth]:
         """Return the best gains so far, the first of equals, and what they are worth."""
@@ -194,11 +167,11 @@ class Runs:
 
     def at(self, points: np.ndarray, chosen_by: str = "") -> list[Worth]:
         """Return what gains at points of the unit cube are worth, without derivatives."""
-        asked = self.asked
-        found = [self._worth(table) for table in self._tables(points, asked.metrics)]
-        for cube, worth in zip(points, found, strict=True) if chosen_by else ():
+        problem = self.problem
+        worths = [self._worth(table) for table in self._tables(points, problem.metrics)]
+        for cube, worth in zip(points, worths, strict=True) if chosen_by else ():
             self.history.append((chosen_by, self.counted, cube, worth))
-        return found
+        return worths
 
     def with_slopes(self, cube: np.ndarray, chosen_by: str) -> Worth:
         """Return what gains are worth, with derivatives or, where there are none, differences."""
@@ -211,23 +184,23 @@ class Runs:
 
     def _note(self, worth: Worth) -> None:
         """Keep which gains have ever moved anything, and which numbers have ever been moved."""
-        asked = self.asked
-        whose = np.repeat(np.arange(len(asked.margins)), [len(parts) for parts in asked.parts])
+        problem = self.problem
+        whose = np.repeat(np.arange(len(problem.margins)), [len(parts) for parts in problem.parts])
         rows = np.vstack([np.abs(worth.slopes), np.abs(worth.cost_slopes)])
         self.moved = np.maximum(self.moved, rows.max(axis=0))
-        most = np.append(np.tile(whose, len(asked.samples)), len(asked.margins))
+        most = np.append(np.tile(whose, len(problem.samples)), len(problem.margins))
         np.maximum.at(self.slope_of, most, rows.max(axis=1))
 
     def _tables(self, points: np.ndarray, metrics: Sequence[MetricLike]) -> np.ndarray:
         """Return numbers of plain runs, shape (points, samples, metrics)."""
-        asked, size = self.asked, len(self.asked.samples)
-        values = np.repeat(asked.values(points), size, axis=0)
-        given = dict(zip(asked.names, values.T, strict=True))
-        for name in asked.samples[0]:
-            given[name] = np.tile([sample[name] for sample in asked.samples], len(points))
+        problem, size = self.problem, len(self.problem.samples)
+        values = np.repeat(problem.values(points), size, axis=0)
+        given = dict(zip(problem.names, values.T, strict=True))
+        for name in problem.samples[0]:
+            given[name] = np.tile([sample[name] for sample in problem.samples], len(points))
         params, start = _split(given)
         try:
-            found = self._ensemble(params, start, metrics)
+            numbers = self._ensemble(params, start, metrics)
         except ParameterError:  # one of these values, or several of a block together
             if not self.history:
                 raise
@@ -235,55 +208,56 @@ class Runs:
                 return np.concatenate([self._tables(p[None, :], metrics) for p in points])
             return np.full((1, size, len(metrics)), np.nan)
         self.plain += len(values)
-        return found.reshape(len(points), size, -1)
+        return numbers.reshape(len(points), size, -1)
 
     def _ensemble(
         self, params: Mapping[str, Any], start: Mapping[str, Any], metrics: Sequence[MetricLike]
     ) -> np.ndarray:
         """Return numbers of plain runs, shape (runs, metrics)."""
-        asked = self.asked
+        problem = self.problem
         count = len(next(iter((params or start).values())))
         table = ensemble_response(
-            asked.diagram, asked.times, asked.inputs, {**asked.initial_state, **start},
-            params={**asked.params, **params}, metrics=metrics, **asked.how,
+            problem.diagram, problem.times, problem.inputs, {**problem.initial_state, **start},
+            params={**problem.params, **params}, metrics=metrics, **problem.how,
         ).table  # fmt: skip
         if len(table) < count:
             raise KeyboardInterrupt
         return table[[m.key for m in metrics]].to_numpy(dtype=float)
 
     def _worth(self, table: np.ndarray, **more: Any) -> Worth:
-        count = len(self.asked.margins)
+        count = len(self.problem.margins)
         table = table.copy()
         table[:, :count] = _graded(table[:, :count])
         return Worth(table=table, count=count, **more)
 
     def _by_derivatives(self, cube: np.ndarray) -> Worth | None:
         """Return what gains are worth, with derivatives; None where there are none."""
-        asked, values, each = self.asked, self.asked.values(cube), []
-        signals = list(dict.fromkeys(s for m in asked.metrics for s in m.signals))
-        for sample in asked.samples:
-            params, start = _split(dict(zip(asked.names, values, strict=True)) | dict(sample))
+        problem, values, numbers = self.problem, self.problem.values(cube), []
+        signals = list(dict.fromkeys(s for m in problem.metrics for s in m.signals))
+        for sample in problem.samples:
+            params, start = _split(dict(zip(problem.names, values, strict=True)) | dict(sample))
             try:
-                made = sensitivity_response(
-                    asked.diagram, asked.times, asked.inputs, {**asked.initial_state, **start},
-                    of=signals, with_respect_to=list(asked.names),
-                    params={**asked.params, **params}, **asked.how,
+                run = sensitivity_response(
+                    problem.diagram, problem.times, problem.inputs,
+                    {**problem.initial_state, **start}, of=signals,
+                    with_respect_to=list(problem.names), params={**problem.params, **params},
+                    **problem.how,
                 )  # fmt: skip
             except (CompileError, AlgebraicLoopError) as error:
                 self.why = str(error)
                 return None
             except DivergedError:
-                made = None
+                run = None
             except ParameterError:  # no block takes these together: of the start that is an error
                 if not self.history:
                     raise
-                made = None
+                run = None
             self.differentiated += 1
-            each.append(self._lost() if made is None else self._numbers(made))
-            if not all(np.isfinite(slopes).all() for slopes in each[-1][2:]):
+            numbers.append(self._lost() if run is None else self._numbers(run))
+            if not all(np.isfinite(slopes).all() for slopes in numbers[-1][2:]):
                 return None
-        rates = asked.rates(values)
-        table, parts, slopes, cost_slopes = map(np.array, zip(*each, strict=True))
+        rates = problem.rates(values)
+        table, parts, slopes, cost_slopes = map(np.array, zip(*numbers, strict=True))
         return self._worth(
             table, parts=_graded(parts).reshape(-1), slopes=slopes.reshape(-1, rates.size) * rates,
             cost_slopes=cost_slopes.mean(axis=0) * rates,
@@ -291,68 +265,68 @@ class Runs:
 
     def _lost(self) -> tuple[np.ndarray, ...]:
         """Return the numbers of a run that does not reach its end."""
-        asked, k = self.asked, len(self.asked.names)
-        parts = sum(map(len, asked.parts))
-        table = np.full(len(asked.metrics), np.nan)
+        problem, k = self.problem, len(self.problem.names)
+        parts = sum(map(len, problem.parts))
+        table = np.full(len(problem.metrics), np.nan)
         return table, np.full(parts, np.nan), np.zeros((parts, k)), np.zeros(k)
 
-    def _numbers(self, made: Any) -> tuple[np.ndarray, ...]:
+    def _numbers(self, run: Any) -> tuple[np.ndarray, ...]:
         """Return margins and cost, parts of margins, and their derivatives by gains."""
-        asked, k = self.asked, len(self.asked.names)
-        for each in made.missing:
-            self.lacking[each.why] = self.lacking.get(each.why, 0) + 1
+        problem, k = self.problem, len(self.problem.names)
+        for lack in run.missing:
+            self.lacking[lack.why] = self.lacking.get(lack.why, 0) + 1
         values, slopes, table = [], [], []
         if not self.history:
-            self._look_for_kinks(made)
-        for metric, parts, rows in zip(asked.margins, asked.parts, asked.rows, strict=True):
-            own = np.array([_value(part, made) for part in parts])
-            lowest = _lowest(own, [len(row) for row in rows])
-            counting = np.full(own.size, -LOST_MARGIN)
-            counting[lowest] = own[lowest]
+            self._look_for_kinks(run)
+        for metric, parts, rows in zip(problem.margins, problem.parts, problem.rows, strict=True):
+            values_of_parts = np.array([_value(part, run) for part in parts])
+            lowest = _lowest(values_of_parts, [len(row) for row in rows])
+            counting = np.full(values_of_parts.size, -LOST_MARGIN)
+            counting[lowest] = values_of_parts[lowest]
             values.append(counting)
-            slopes.append(np.zeros((own.size, k)))
+            slopes.append(np.zeros((values_of_parts.size, k)))
             for i in lowest:
-                slopes[-1][i] = self._gradient(metric.key, parts[i], made)
-            table.append(_value(metric, made) if len(parts) > 1 else own[0])
+                slopes[-1][i] = self._gradient(metric.key, parts[i], run)
+            table.append(_value(metric, run) if len(parts) > 1 else values_of_parts[0])
         cost_slopes = np.zeros(k)
-        if asked.cost is not None:
-            table.append(_value(asked.cost, made))
-            cost_slopes = self._gradient(asked.cost.key, asked.cost, made)
+        if problem.cost is not None:
+            table.append(_value(problem.cost, run))
+            cost_slopes = self._gradient(problem.cost.key, problem.cost, run)
         none = np.zeros((0, k))
         return (
             np.array(table), np.concatenate([np.empty(0), *values]),
             np.concatenate([none, *slopes]), cost_slopes,
         )  # fmt: skip
 
-    def _gradient(self, key: str, metric: MetricLike, made: Any) -> np.ndarray:
+    def _gradient(self, key: str, metric: MetricLike, run: Any) -> np.ndarray:
         """Return the derivatives of a number of a run, at a kink those of the middle."""
-        found = metric_gradient(metric, made)
-        if found.one_sided:
+        gradient = metric_gradient(metric, run)
+        if gradient.one_sided:
             self.kinked[key] = self.kinked.get(key, 0) + 1
-        return 0.5 * (found.above + found.below)
+        return 0.5 * (gradient.above + gradient.below)
 
-    def _look_for_kinks(self, made: Any) -> None:
+    def _look_for_kinks(self, run: Any) -> None:
         """Keep what the start is at a kink of, and by what."""
-        for metric in self.asked.metrics:
-            for name in metric_gradient(metric, made).one_sided:
+        for metric in self.problem.metrics:
+            for name in metric_gradient(metric, run).one_sided:
                 self.at_first.setdefault(metric.key, {})[name] = None
 
     def _by_differences(self, cube: np.ndarray) -> Worth:
         """Return what gains are worth, with differences of runs towards the middle of the box."""
-        asked, count = self.asked, len(self.asked.margins)
-        every = (part for parts in asked.parts for part in parts)
+        problem, count = self.problem, len(self.problem.margins)
+        every = (part for parts in problem.parts for part in parts)
         parts = tuple(_Part(metric=part, key=f"part {i}") for i, part in enumerate(every))
         steps = np.where(cube < 0.5, _STEP, -_STEP)
         points = np.vstack([cube, cube + np.diag(steps)])
-        here, *moved = self._tables(points, (*asked.metrics, *parts))
-        wide = len(asked.metrics)
-        rates = [(each - here) / h for each, h in zip(moved, steps, strict=True)]
+        here, *moved = self._tables(points, (*problem.metrics, *parts))
+        wide = len(problem.metrics)
+        rates = [(table - here) / h for table, h in zip(moved, steps, strict=True)]
         slopes = np.nan_to_num(np.stack(rates, axis=2))
         return self._worth(
             here[:, :wide], parts=_graded(here[:, wide:]).reshape(-1),
             slopes=slopes[:, wide:].reshape(-1, cube.size),
             cost_slopes=slopes[:, count:wide].mean(axis=0).reshape(-1)
-            if asked.cost is not None else np.zeros(cube.size),
+            if problem.cost is not None else np.zeros(cube.size),
         )  # fmt: skip
 
 
@@ -392,20 +366,20 @@ def _lowest(values: np.ndarray, lengths: Sequence[int]) -> np.ndarray:
 
     Others are least where they end, at what the piece next to them has, too.
     """
-    found, first = [], 0
+    lowest, first = [], 0
     for length in lengths:
         row = np.pad(values[first : first + length], 1, constant_values=np.inf)
-        found.append(first + np.flatnonzero((row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])))
+        lowest.append(first + np.flatnonzero((row[1:-1] < row[:-2]) & (row[1:-1] <= row[2:])))
         first += length
-    every = np.concatenate(found)
+    every = np.concatenate(lowest)
     return every[np.argsort(values[every], kind="stable")[:_NEAREST]]
 
 
-def _value(metric: MetricLike, made: Any) -> float:
+def _value(metric: MetricLike, run: Any) -> float:
     """Return a number of a run with derivatives."""
-    inside = (made.time >= metric.start) & (made.time <= metric.end)
-    places = [made.signals.index(signal) for signal in metric.signals]
-    return float(metric.function(made.time[inside], *made.values[places][:, inside].copy()))
+    inside = (run.time >= metric.start) & (run.time <= metric.end)
+    places = [run.signals.index(signal) for signal in metric.signals]
+    return float(metric.function(run.time[inside], *run.values[places][:, inside].copy()))
 
 
 def _split(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

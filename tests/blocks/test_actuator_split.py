@@ -126,7 +126,7 @@ def test_a_band_that_a_user_declares_is_tried_and_never_called_proved():
 @each_row(
     ("spec", "told"),
     [
-        (nlctl.Gain(k=-1.0), "Gain breaks Assumption 1: its gain is -1"),
+        (nlctl.Gain(k=-1.0), "Gain violates Assumption 1: its gain is -1"),
         (nlctl.SumOfSines(order=2), "SumOfSines has no known split"),
     ],
 )

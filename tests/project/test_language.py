@@ -1,5 +1,6 @@
 """Text uses the field's terms: comments, docstrings, messages and pages of the documentation."""
 
+import ast
 import io
 import re
 import tokenize
@@ -20,6 +21,34 @@ TERMS = {  # what is not said -> what is
     r"\bring of signals\b": "algebraic loop",
     r"\b(blocks?|diagrams?) (is|are) joined\b|\bjoined by dots\b": "connected",
     r"(?<!there )(?<!There )\bis no (?!better|worse|more|longer|calm|news|sharper)\w": "is not a",
+}
+PLAIN = {  # the same, in the rooms of which each word was weighed
+    r"\b(told|tells?)\b": "reported, printed, stated, shown",
+    r"\bbeside\b": "next to",
+    r"\bin the place of\b": "instead of, as",
+    r"\bas (it|they) stands?\b": "unchanged, as written",
+    r"\bdear(er|ly)?\b": "costly",
+    r"\bgo(es)? on\b": "continues",
+    r"\b(becomes?|became) of\b": "how it changes, how it ended",
+    r"\blooked (at|between|through|into)\b": "reads, examines, tries",
+    r"\bturned\b": "reversed, inverted",
+    r"\bcarr(y|ies|ied) (it |them )?along\b": "driven, pushed",
+    r"\bwhoever\b": "a function that, readers",
+    r"\bon (its|their) way\b": "running, in transit",
+    r"\banew\b": "again",
+    r"\bh(old|olds|eld) (\w+ ){0,6}against\b": "compares with",
+    r"\bAsked:": "settings",
+}
+ROOMS = (  # where these hold
+    *(f"analysis/{name}" for name in ("intervals", "lyapunov", "metrics", "recheck")),
+    *("analysis/robustness", "analysis/studies", "benchmarks", "campaign"),
+    *(f"nlctl/{name}" for name in ("actuators", "diagrams", "drawing", "expressions", "faults")),
+    *("nlctl/host", "nlctl/sensitivities"),
+)
+ELSEWHERE = ("analysis/studies/page/",)
+VAGUE = {"each", "found", "made", "own", "told", "wanted"}  # a variable names the thing
+OFFERED = {  # keywords of functions that users call
+    *(("boundary", "made"), ("from_toml", "own"), ("replay_figure", "made")),
 }
 ALLOWED = (  # names that are kept, and the text of sources that are shipped compiled
     *("is no progress", "is no event", "is no method's", "is no discrete-time"),
@@ -65,6 +94,47 @@ def test_the_fields_terms_are_used(everything, term, instead):
         and not any(name in text for name in ALLOWED)
     ]
     assert [place for place, _ in found] == [], f"say {instead}: {found}"
+
+
+@pytest.mark.parametrize(("term", "instead"), PLAIN.items(), ids=PLAIN.values())
+def test_plain_words_are_used(everything, term, instead):
+    """Each of these words stops a native reader of the field."""
+    found = [
+        (place, text)
+        for place, text in everything
+        if place.startswith(tuple(f"{room}/" for room in ROOMS))
+        and not place.startswith(ELSEWHERE)
+        and re.search(term, re.sub(r"\{[^}]*\}|``?[^`]*``?|>>>.*", "", text))
+    ]
+    assert [place for place, _ in found] == [], f"say {instead}: {found}"
+
+
+def vague_names(tree, function=None):
+    """Yield the vague names that functions bind, each with its function and line."""
+    for node in ast.iter_child_nodes(tree):
+        inside = node if isinstance(node, ast.FunctionDef | ast.Lambda) else function
+        bound = None
+        if isinstance(node, ast.arg):
+            bound = node.arg
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            bound = node.id
+        if function is not None and bound in VAGUE:
+            yield getattr(function, "name", "lambda"), bound, node.lineno
+        yield from vague_names(node, inside)
+
+
+def test_variables_name_the_thing():
+    """One cannot search for `found`: nearly every function would have one."""
+    paths = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
+    assert len(paths) > 300
+    vague = [
+        f"{name}:{line}: {bound}"
+        for path in paths
+        if not (name := path.relative_to(ROOT).as_posix()).startswith(ELSEWHERE)
+        for function, bound, line in vague_names(ast.parse(path.read_text(encoding="utf-8")))
+        if (function, bound) not in OFFERED
+    ]
+    assert vague == []
 
 
 def test_there_is_text_to_look_at(everything):

@@ -155,5 +155,5 @@ def test_a_study_with_the_former_name_is_read_and_warned_of(tmp_path):
     assert said.stdout.startswith("study.toml is a valid study.\n")
     assert said.stderr.count("'analysis' is 'nlctl.analysis' now") == 1
     path.write_text(former.replace("paper.loops:example_1", "cli.main:main"), encoding="utf-8")
-    with pytest.raises(StudyError, match=r"'nlctl\.analysis\.cli\.main' makes nothing of a loop"):
+    with pytest.raises(StudyError, match=r"'nlctl\.analysis\.cli\.main' does nothing with a loop"):
         read_study(path)

@@ -13,7 +13,7 @@ def jumps(law, params):
     compiled = nlctl.compile(block(law, params, ("x", "y")))
     nlctl.sensitivity_response(compiled, [0, 1e-3], with_respect_to=["plant.a"])
     (kept,) = compiled.cache.of(_Kept)
-    return len(kept.made.sides.sides)
+    return len(kept.differentiated.sides.sides)
 
 
 def dead_zone(t, x, u, p):

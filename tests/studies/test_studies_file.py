@@ -92,7 +92,7 @@ kind = "regional"
     assert lines["analysis[0].limt"] == 31
     assert said["analysis[1].kind"] == "is missing"
     assert "unknown kind 'moris'; nearest: 'morris'" in said["analysis[2].kind"]
-    assert "looks at the main table: add [runs]" in said["analysis[3]"]  # its own number
+    assert "needs the main table: add [runs]" in said["analysis[3]"]  # its own number
     assert lines["analysis[3]"] == 39
     assert "greater than or equal to 0, got -1" in said["study.seed"]
 

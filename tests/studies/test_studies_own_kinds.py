@@ -261,9 +261,7 @@ def test_a_kind_needs_the_main_table_where_it_says_so(tmp_path):
     """A study without [runs] is told so before anything runs."""
     path = written(tmp_path, '[[analysis]]\nkind = "spread.py:spread"\n')
     path.write_text(path.read_text().replace("[runs]\nsize = 64\n", ""))
-    with pytest.raises(
-        StudyError, match=r"'spread.py:spread' looks at the main table: add \[runs\]"
-    ):
+    with pytest.raises(StudyError, match=r"'spread.py:spread' needs the main table: add \[runs\]"):
         read_study(path)
 
 

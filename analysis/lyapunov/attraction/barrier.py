@@ -289,7 +289,7 @@ def _face(box: Box, i: int, end: int) -> Box:
 def _first_samples(problem: _Problem) -> None:
     """Take corners and random points of each set; of faces those where the motion leaves."""
     rng = np.random.default_rng(0)
-    found: dict[str, list[np.ndarray]] = {"start": [], "unsafe": []}
+    samples: dict[str, list[np.ndarray]] = {"start": [], "unsafe": []}
     for claim in problem.claims[:-1]:
         corners = np.array(list(itertools.islice(itertools.product(*claim.box.cell), 64)))
         low, high = np.array(claim.box.low), np.array(claim.box.high)
@@ -299,8 +299,8 @@ def _first_samples(problem: _Problem) -> None:
             i = int(np.argmin(high - low))
             outwards = 1 if low[i] == problem.box.high[i] else -1
             points = points[outwards * problem.motion.at(points)[:, i] >= 0]
-        found[claim.kind].append(points)
-    problem.samples = {kind: np.concatenate(parts) for kind, parts in found.items()}
+        samples[claim.kind].append(points)
+    problem.samples = {kind: np.concatenate(parts) for kind, parts in samples.items()}
     problem.pool = rng.uniform(problem.box.low, problem.box.high, (_POOL, problem.motion.order))
 
 
@@ -316,13 +316,13 @@ def _attempt(problem: _Problem, k: float, max_boxes: int) -> tuple[np.ndarray, i
             continue
         reason = ""
         for claim in problem.claims:
-            found = _decided(claim, coefficients, max_boxes)
-            boxes += found.boxes
-            if found.holds:
+            decision = _decided(claim, coefficients, max_boxes)
+            boxes += decision.boxes
+            if decision.holds:
                 continue
             reason = reason or claim.what
             points = problem.samples[claim.kind]
-            added = found.point[: problem.motion.order]
+            added = decision.point[: problem.motion.order]
             problem.samples[claim.kind] = np.concatenate([points, added[None]])
         if not reason:
             return coefficients, boxes, ""

@@ -25,25 +25,15 @@ _INSIDE = 1 - 1e-6  # of that level, so that the faces can be proved
 
 @dataclass(frozen=True, kw_only=True)
 class Quadratic:
-    """V = (x - at)^T P (x - at) along a motion.
-
-    Attributes
-    ----------
-    motion : StateRates
-    P : ndarray of shape (n, n)
-    at : ndarray of shape (n,)
-    falls : BoxCode
-        Positive at once where V' > -1e-9, V <= level and V >= floor: the sides are the states,
-        then level and floor.
-    inside : BoxCode
-        level - V, of the same sides.
-    """
+    """V = (x - at)^T P (x - at) along a motion."""
 
     motion: StateRates
-    P: np.ndarray
-    at: np.ndarray
+    P: np.ndarray  # (n, n)
+    at: np.ndarray  # (n,)
+    # positive at once where V' > -1e-9, V <= level and V >= floor: the sides are the states,
+    # then level and floor
     falls: BoxCode
-    inside: BoxCode
+    inside: BoxCode  # level - V, of the same sides
 
     def largest_in(self, box: Box) -> float:
         """Return the largest level whose set lies in a box, to rounding."""
@@ -90,31 +80,16 @@ def _form(graph: Graph, P: np.ndarray, at: np.ndarray, x: list[Expr]) -> Expr:
 
 @dataclass(frozen=True, kw_only=True)
 class ProvedLevel:
-    """What is known of the levels of one V.
-
-    Attributes
-    ----------
-    V : Quadratic
-    level : float
-        Proved; 0 where nothing is.
-    floor : float
-        Below it the linear part decides.
-    above : float
-        A level that is not proved, as near as was asked for; that of the box where all below is.
-    refuted : ndarray or None
-        A point with V' >= -1e-9 and V <= `above`.
-    boxes : int
-    reason : str
-        Why there is nothing beyond `level`.
-    """
+    """What is known of the levels of one V."""
 
     V: Quadratic
-    level: float
-    floor: float
+    level: float  # proved; 0 where nothing is
+    floor: float  # below it the linear part decides
+    # a level that is not proved, as near as was asked for; that of the box where all below is
     above: float
-    refuted: np.ndarray | None
+    refuted: np.ndarray | None  # a point with V' >= -1e-9 and V <= `above`
     boxes: int
-    reason: str
+    reason: str  # why there is nothing beyond `level`
 
     @property
     def volume(self) -> float:
@@ -134,13 +109,13 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
     floor, high, trial = low, fits, fits
     refuted, reason = None, "the box: take a larger one"
     while True:
-        found = _fall(V, trial, floor, box, max_boxes)
-        boxes += found.boxes
-        if found.holds:
+        fall = _fall(V, trial, floor, box, max_boxes)
+        boxes += fall.boxes
+        if fall.holds:
             low = trial
         else:
-            high, refuted = trial, found.point[: V.motion.order] if found.holds is False else None
-            reason = "V' >= 0 at a point" if found.holds is False else "undecided: raise max_boxes"
+            high, refuted = trial, fall.point[: V.motion.order] if fall.holds is False else None
+            reason = "V' >= 0 at a point" if fall.holds is False else "undecided: raise max_boxes"
         if low >= fits or high - low <= tol * low:
             break
         trial = 0.5 * (low + high) if high < 4 * low else float(np.sqrt(low * high))

@@ -28,18 +28,10 @@ __all__ = ["StateRates", "motion_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class StateRates:
-    """Rates x' = f(x).
+    """Rates x' = f(x)."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        States.
-    rates : tuple of Expr
-        Of the leaves ``x[0], x[1], ...``.
-    """
-
-    names: tuple[str, ...]
-    rates: tuple[Expr, ...]
+    names: tuple[str, ...]  # states
+    rates: tuple[Expr, ...]  # of the leaves ``x[0], x[1], ...``
 
     @property
     def order(self) -> int:
@@ -54,24 +46,24 @@ class StateRates:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """Return the rates at points, an array of shape (points, states)."""
-        found = evaluate_expressions(self.rates, {"x": np.asarray(points, dtype=float).T})
-        return np.stack([np.broadcast_to(v, len(points)) for v in found], axis=1)
+        rates = evaluate_expressions(self.rates, {"x": np.asarray(points, dtype=float).T})
+        return np.stack([np.broadcast_to(v, len(points)) for v in rates], axis=1)
 
     @cached_property
     def slopes(self) -> BoxCode:
         """Code of all df_i/dx_j, row by row."""
         graph, rates, leaves = self.in_graph()
-        one, zero, found = graph.const(1.0), graph.const(0.0), []
+        one, zero, slopes = graph.const(1.0), graph.const(0.0), []
         for rate in rates:
             for leaf in leaves:
                 (slope,) = tangents(graph, [rate], lambda e, j=leaf: one if e is j else None)
-                found.append(zero if slope is None else slope)
-        return enclosed(found, self.order)
+                slopes.append(zero if slope is None else slope)
+        return enclosed(slopes, self.order)
 
     def jacobian(self, point: np.ndarray) -> np.ndarray:
         """Return df/dx at a point."""
-        found = evaluate_expressions(self.slopes.expressions, {"x": point[:, None]})
-        return np.array([float(np.ravel(v)[0]) for v in found]).reshape(self.order, -1)
+        slopes = evaluate_expressions(self.slopes.expressions, {"x": point[:, None]})
+        return np.array([float(np.ravel(v)[0]) for v in slopes]).reshape(self.order, -1)
 
     @cached_property
     def jumps(self) -> bool:

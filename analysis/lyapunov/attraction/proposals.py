@@ -43,9 +43,9 @@ def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> I
     for factor in (1.15, 1.4, 2.0):
         z = factor * unit @ root.T
         rates = motion.at(at + z)
-        known = np.all(np.isfinite(rates), axis=1)
-        square = np.sum(z[known] ** 2, axis=1)
-        falls = [2 * np.einsum("ki,ij,kj->k", z[known], E, rates[known]) for E in basis]
+        finite = np.all(np.isfinite(rates), axis=1)
+        square = np.sum(z[finite] ** 2, axis=1)
+        falls = [2 * np.einsum("ki,ij,kj->k", z[finite], E, rates[finite]) for E in basis]
         limits = [
             at_least(basis, np.eye(n)),
             at_least([-(A.T @ E + E @ A) for E in basis], _RATE * np.eye(n)),

@@ -194,9 +194,9 @@ def _grown(best: ProvedLevel, box: Box, tol: float, max_boxes: int) -> tuple[Pro
             break
         before = best
         for P in fitted(best.V.motion, best.V.at, before.V.P, before.level):
-            found = largest_level(quadratic_of(best.V.motion, P, best.V.at), box, tol, max_boxes)
-            boxes += found.boxes
-            best = found if found.volume > best.volume else best
+            trial = largest_level(quadratic_of(best.V.motion, P, best.V.at), box, tol, max_boxes)
+            boxes += trial.boxes
+            best = trial if trial.volume > best.volume else best
         if best.volume <= 1.01 * before.volume:
             break
     return best, boxes

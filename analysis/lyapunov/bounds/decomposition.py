@@ -221,7 +221,7 @@ def _own_gains(actuator: Any) -> tuple[float, float]:
         )
     if not k[0] > 0:
         raise DecompositionError(
-            f"{name} breaks Assumption 1: its gain is {k[0]:g}, and k >= k_1 > 0 is wanted"
+            f"{name} violates Assumption 1: its gain is {k[0]:g}, and k >= k_1 > 0 is needed"
         )
     return k
 

@@ -34,8 +34,8 @@ def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
     common = math.lcm(*(c.denominator for c in coefficients))
     polynomial = fmpz_poly([int(c * common) for c in coefficients])
     poles: list[arb] = []
-    found: Any = polynomial.complex_roots()
-    for root, multiplicity in found:
+    roots: Any = polynomial.complex_roots()
+    for root, multiplicity in roots:
         if not (root.imag == 0 and root.real < 0):
             raise ParameterError(
                 f"the filter of lambdas {tuple(lambdas)} has a root at {complex(root):.4g}: bounds "

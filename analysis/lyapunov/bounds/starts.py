@@ -119,22 +119,22 @@ class Starts:
             if few
             else rng.integers(0, 2, (count, wide.size)).astype(float)
         )
-        found = [0.5 * low + 0.5 * high]
+        points = [0.5 * low + 0.5 * high]
         for share in (*picks, *rng.uniform(size=(count, wide.size))):
             x = low.copy()
             x[wide] += np.asarray(share) * (high - low)[wide]
-            found.append(np.clip(x, low, high))
-        return found
+            points.append(np.clip(x, low, high))
+        return points
 
     def __str__(self) -> str:
-        told = [text for group in self._groups() if (text := _side(*group))]
+        sides = [text for group in self._groups() if (text := _side(*group))]
         zeros = [name for name, _, low, high in self._groups() if low == high == 0]
-        rest = ["all other states 0" if told else "all states 0"] if zeros else []
+        rest = ["all other states 0" if sides else "all states 0"] if zeros else []
         if self.level is not None:  # what V bounds is not named, and not 0
-            told.insert(0, f"V(0) <= {self.level:.6g}")
+            sides.insert(0, f"V(0) <= {self.level:.6g}")
             rest = [f"{name}(0) = 0" for name in zeros]
         kept = [f"any consistent memory of {', '.join(self.kept)}"] if self.kept else []
-        return ", ".join([*told, *rest, *kept, "at t = 0"])
+        return ", ".join([*sides, *rest, *kept, "at t = 0"])
 
     def _groups(self) -> Iterator[tuple[str, int, float, float]]:
         """Yield names with their ends; elements of a vector with equal ends together."""
@@ -173,8 +173,8 @@ def read_starts(
     if level is not None:
         ends |= dict.fromkeys(free, (-np.inf, np.inf))
     for name, value in named.items():
-        found, side = _members(name, names), _ends(name, value)
-        ends |= dict.fromkeys(found, side)
+        members, side = _members(name, names), _ends(name, value)
+        ends |= dict.fromkeys(members, side)
     low, high = (tuple(ends[name][i] for name in names) for i in (0, 1))
     unnamed = tuple(k for k in kept if not any(k in _members(name, names) for name in named))
     return Starts(names=names, low=low, high=high, level=level, kept=unnamed)
@@ -195,8 +195,8 @@ def _level(value: Any, free: tuple[str, ...]) -> float:
 def _members(name: Any, names: tuple[str, ...]) -> list[str]:
     """Return the state of that name, or all of a vector."""
     bases = dict.fromkeys(_INDEX.sub("", state) for state in names)
-    known = dict.fromkeys(names) | bases
-    full = find_name("state", str(name), known)
+    choices = dict.fromkeys(names) | bases
+    full = find_name("state", str(name), choices)
     return [full] if full in names else [s for s in names if _INDEX.sub("", s) == full]
 
 

@@ -164,7 +164,7 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
 
     Examples
     --------
-    A larger sigma_1 makes weights dear: they become smaller than those that approximate best.
+    A larger sigma_1 makes weights costly: they become smaller than those that approximate best.
 
     >>> import dataclasses
     >>> import numpy as np
@@ -270,11 +270,11 @@ def approximation_error(
     if not W.size:
         return enclose(lambda x: f(x, 0.0), box, tol=tol, max_boxes=max_boxes)
     p, weights = equation_arguments(basis), AdaptiveWeights(nodes=W.size)
-    own, inputs = equation_arguments(weights), len(basis.inputs)
+    gains, inputs = equation_arguments(weights), len(basis.inputs)
 
     def eps(x: tuple[Any, ...]) -> Any:
         psi = basis.output(0.0, (), np.array(x[:inputs], dtype=object), p)
-        W_psi, _ = weights.output(0.0, W, np.append(np.array([0.0], dtype=object), psi), own)
+        W_psi, _ = weights.output(0.0, W, np.append(np.array([0.0], dtype=object), psi), gains)
         return f(x, 0.0) - W_psi
 
     return enclose(eps, box, tol=tol, max_boxes=max_boxes)

@@ -57,7 +57,7 @@ def certify(
     loop : control.InterconnectedSystem
         A plant of class (1), an actuator with a split (2), a reference, and one of these
         controllers; of the blocks that `nlctl.paper.example_1` connects, with `nlctl.KnownSignLaw`
-        in the place of the Nussbaum law and a `nlctl.SumOfSines` reference.
+        instead of the Nussbaum law and a `nlctl.SumOfSines` reference.
     params : mapping, optional
         Overrides by qualified name, as in a run.
     inputs : mapping, optional
@@ -163,6 +163,6 @@ def _refuse_others(loop: Any) -> None:
         if "u" in declared(place, "outputs") and spec is not None:
             laws = ", ".join(kind.about for kind in PROOFS if kind.fits is not None)
             raise DiagramError(
-                f"certify has proofs for {laws}, got {type(spec).__name__} in the place of "
+                f"certify has proofs for {laws}, got {type(spec).__name__} as "
                 f"'{place.path}' and no ReferenceModel"
             )

@@ -30,7 +30,7 @@ _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 
 @dataclass(frozen=True, kw_only=True)
 class GainCandidate:
-    """One set of gains that the search looked at.
+    """One set of gains that the search tried.
 
     Attributes
     ----------
@@ -61,8 +61,8 @@ class GainDesign:
         max |u| along the simulation; sampled, not proved.
     u_limit, horizon : float
         The limit that was asked for, and the length of the simulation (s).
-    trials : tuple of Trial
-        All gains that the search looked at, in order.
+    trials : tuple of GainCandidate
+        All gains that the search tried, in order.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def design(
     horizon : float, optional
         Length of the simulation (s).
     evaluations : int, optional
-        Number of gains that are looked at.
+        Number of gains that are tried.
     max_steps : int, optional
         Steps of the simulation beyond which gains are refused as too stiff.  Without a limit
         the bound could be made as small as one likes: tau and b to 0, gamma to infinity.

@@ -59,20 +59,11 @@ _LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 @dataclass(frozen=True, kw_only=True)
 class KnownSignLoop(FilteredLoop):
-    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts.
+    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts."""
 
-    Attributes
-    ----------
-    parts : Parts
-        Records of the blocks, and the gains.
-    delta_hat_0 : arb
-    W_hat_0 : tuple of arb
-        Initial estimates, of all starts.
-    """
-
-    parts: Parts
+    parts: Parts  # records of the blocks, and the gains
     delta_hat_0: arb
-    W_hat_0: tuple[arb, ...]
+    W_hat_0: tuple[arb, ...]  # initial estimates, of all starts
 
     @property
     def law(self) -> KnownSignLaw:
@@ -190,37 +181,37 @@ def bound_of_r(loop: KnownSignLoop, delta_star: float) -> _BoundOfR:
 
 
 def _bound(subject: Subject, need: Demand) -> _BoundOfR:
-    found = bound_of_r(subject.loop, need.delta_star)
+    bound = bound_of_r(subject.loop, need.delta_star)
     least, N_0 = subject.split.k_1 * need.G_min, subject.loop.law.N_0
-    if not upper(found.level) < _LIMIT or arb(N_0) * subject.split.k_1 * need.G_min >= 1:
-        return found
+    if not upper(bound.level) < _LIMIT or arb(N_0) * subject.split.k_1 * need.G_min >= 1:
+        return bound
     doubt = f"k G may be {least:.4g} on {need.box}: Assumption 3 fails there"
     if least > 0:
         doubt = f"N_0 = {N_0:g} is below 1/(k_1 G_min) = {1 / least:.6g}"
-    return dataclasses.replace(found, doubt=doubt)
+    return dataclasses.replace(bound, doubt=doubt)
 
 
 def _endless(need: Demand, iterations: Sequence[float]) -> str:
     return "" if iterations[-1] < _LIMIT else without_end("C_0(C)", iterations)
 
 
-def _largest_input(subject: Subject, need: Demand, found: _BoundOfR) -> float:
+def _largest_input(subject: Subject, need: Demand, bound: _BoundOfR) -> float:
     """Bound |u| <= N_0 (beta |r| + |W_hat^T psi| + |delta_hat| + |Y_d|) from V <= C_0^2 / 2."""
-    loop, C_0, gains = subject.loop, found.level, subject.loop.parts.gains
+    loop, C_0, gains = subject.loop, bound.level, subject.loop.parts.gains
     s = feedforward(loop, need) + arb(need.delta_star) + C_0 * arb(gains.gamma).sqrt()
     s = s + C_0 * (arb(gains.Gamma) * loop.nodes).sqrt()
     return upper(loop.law.N_0 * (loop.law.beta * C_0 + s))
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
-    found = closed.bound
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
+    bound = closed.bound
     return {
-        "C_0": closed.proved(upper(found.level)),
-        "ultimate": closed.proved(upper((2 * found.drive / found.rate * _OUTWARD).sqrt())),
+        "C_0": closed.proved(upper(bound.level)),
+        "ultimate": closed.proved(upper((2 * bound.drive / bound.rate * _OUTWARD).sqrt())),
         "u_max": closed.proved(closed.u),
-        "alpha_0": upper(found.drive),
-        "alpha_1": found.rate,
-        "V_0": upper(found.V_0),
+        "alpha_0": upper(bound.drive),
+        "alpha_1": bound.rate,
+        "V_0": upper(bound.V_0),
         "loop": subject.loop,
     }
 
@@ -236,5 +227,5 @@ KNOWN_SIGN = ProofKind(
     bound=_bound,
     endless=_endless,
     largest_input=_largest_input,
-    found=_found,
+    fields=_fields,
 )

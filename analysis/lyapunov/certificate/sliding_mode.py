@@ -116,10 +116,12 @@ class _Layer:
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
     read = read_checked(loop, _PIECES, _PROVED_FOR, options.params, options.inputs, options.starts)
-    own = FilteredLoop(**as_filtered(read))
-    actuator, K, tol = read.roles.spec("actuator"), own.law.K, options.tol
+    filtered = FilteredLoop(**as_filtered(read))
+    actuator, K, tol = read.roles.spec("actuator"), filtered.law.K, options.tol
     split = disturbed(decompose(actuator, k=options.k, u_max=K, tol=tol), read.disturbance)
-    return Subject(loop=own, start=abs(own.r_0), actuator=actuator, split=split, u_max=K, tol=tol)
+    return Subject(
+        loop=filtered, start=abs(filtered.r_0), actuator=actuator, split=split, u_max=K, tol=tol
+    )
 
 
 def _region(subject: Subject, level: arb) -> Demand:
@@ -142,7 +144,7 @@ def _layer(subject: Subject, need: Demand) -> _Layer:
     return _Layer(level=start.max(rho), rho=rho, M=M, doubt="")
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
     loop, C_0 = subject.loop, closed.bound.level
     rest = (arb(0),) * len(loop.e0)
     end = _in_the_end(subject, closed.bound.rho) if closed.holds else C_0
@@ -179,6 +181,6 @@ SLIDING_MODE = ProofKind(
     begin=_begin,
     region=_region,
     bound=_layer,
-    largest_input=lambda subject, need, found: subject.u_max,
-    found=_found,
+    largest_input=lambda subject, need, bound: subject.u_max,
+    fields=_fields,
 )

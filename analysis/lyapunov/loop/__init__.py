@@ -1,1 +1,1 @@
-"""The loop that a proof speaks of: read from its wiring, checked, instrumented, simulated."""
+"""The loop that a proof is about: read from its wiring, checked, instrumented, simulated."""

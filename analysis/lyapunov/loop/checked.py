@@ -24,29 +24,15 @@ __all__ = ["CheckedLoop", "read_checked"]
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedLoop:
-    """What a loop is made of, after every check that does not depend on the proof.
+    """What a loop is made of, after every check that does not depend on the proof."""
 
-    Attributes
-    ----------
-    roles : Roles
-        Places of the blocks, with the parameters of the run.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
-    starts : Starts
-        Initial states that the proof shall be about.
-    content : LoopContent
-        What the loop consists of.
-    given : control.InterconnectedSystem
-        A copy of the loop, with the parameters of the run.
-    understood : control.InterconnectedSystem
-        The loop, connected again by name, with all its signals as outputs.
-    """
-
-    roles: Roles
-    disturbance: float
-    starts: Starts
-    content: LoopContent = field(repr=False)
+    roles: Roles  # places of the blocks, with the parameters of the run
+    disturbance: float  # bound of what external inputs add to the plant's v
+    starts: Starts  # initial states that the proof shall be about
+    content: LoopContent = field(repr=False)  # what the loop consists of
+    # a copy of the loop, with the parameters of the run
     given: ct.InterconnectedSystem = field(repr=False)
+    # the loop, connected again by name, with all its signals as outputs
     understood: ct.InterconnectedSystem = field(repr=False)
 
     def start(self, part: str) -> Sides:
@@ -71,9 +57,9 @@ def read_checked(
         loop = overridden(loop, params)
     roles = read_roles(loop, pieces, content.key)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
-    for part, wanted in kinds.items():
+    for part, records in kinds.items():
         if part in roles.places:  # a network may be left out
-            check_kind(roles.places[part], wanted)
+            check_kind(roles.places[part], records)
     check_chain(roles.places["plant"])
     begins = read_starts(
         loop,
@@ -98,5 +84,5 @@ def _states(loop: Any, roles: Roles, part: str) -> tuple[str, ...]:
 
 def _compared_at(loop: Any, starts: Starts) -> list[tuple[float, np.ndarray]]:
     """Return times and states: around the loop's own start, and the corners of all starts."""
-    found = points_around(initial_state(loop))
-    return found if starts.is_point else found + [(0.0, x) for x in starts.points()]
+    points = points_around(initial_state(loop))
+    return points if starts.is_point else points + [(0.0, x) for x in starts.points()]

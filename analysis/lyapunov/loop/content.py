@@ -26,18 +26,12 @@ _RECORDS = ("spec", "current_spec")
 
 @dataclass(frozen=True, kw_only=True)
 class LoopContent:
-    """What a loop consists of.
+    """What a loop consists of."""
 
-    Attributes
-    ----------
-    facts : mapping
-        As of `nlctl.analysis.loop_record.loop_facts`.
-    key : str
-        Of all that python-control computes of it with the parameters of the run; empty where no
-        key sees everything.
-    """
-
+    # as of `nlctl.analysis.loop_record.loop_facts`
     facts: Mapping[str, dict[str, str]] = field(repr=False)
+    # of all that python-control computes of it with the parameters of the run; empty where no
+    # key sees everything
     key: str
 
 
@@ -70,9 +64,9 @@ def loop_content(
 
 def _is_plain(system: Any) -> bool:
     """Whether a system computes what its class, its maps and its record say, and nothing else."""
-    own = {name: value for name, value in vars(system).items() if name not in _RECORDS}
-    update, output = own.pop("updfcn", None), own.pop("outfcn", None)
-    if any(callable(value) for value in own.values()):  # in the place of a method
+    fields = {name: value for name, value in vars(system).items() if name not in _RECORDS}
+    update, output = fields.pop("updfcn", None), fields.pop("outfcn", None)
+    if any(callable(value) for value in fields.values()):  # instead of a method
         return False
     if type(system) is Block:
         spec = system.spec

@@ -30,7 +30,7 @@ def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
 def update_is_declared(plant: Place) -> bool:
     """Whether the update function and the chain of f and d are the same expressions.
 
-    False where they differ, and where that cannot be told: expressions that are equal but written
+    False where they differ, and where that is unknown: expressions that are equal but written
     in another way count as different.
     """
     system, graph = plant.system, Graph()

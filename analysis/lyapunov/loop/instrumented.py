@@ -1,4 +1,4 @@
-"""A loop whose blocks also output what the proof speaks of: rates of the states, g, G and d.
+"""A loop whose blocks also output what the proof needs: rates of the states, g, G and d.
 
 The rates are the blocks' own update equations on the loop's own signals, so that V' is the
 gradient of V times the right-hand side of the diagram, and no difference of samples.

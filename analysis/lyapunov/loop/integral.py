@@ -28,7 +28,7 @@ def sharpest(split: Decomposition) -> Decomposition:
     """Return the split with the same bounds of k and the smallest abs(eps_u) at every (u, v).
 
     Bounds of eps_u that hold for any split with these k_1, k_2 hold for this one, which is the
-    one that is looked at along trajectories.  Machine code can call its ``part``.
+    one that is evaluated along trajectories.  Machine code can call its ``part``.
 
     Parameters
     ----------

@@ -90,18 +90,19 @@ def acceleration(plant: Place) -> Acceleration:
 def check_chain(plant: Place) -> None:
     """Prove x_i' = x_{i+1} for i < n, and that the outputs are y = x_1 and x_1, ..., x_n.
 
-    For all x and v and all t >= 0: on every way through the function each is the coordinate itself,
-    or, where there is one way only, it has the coordinate's gradient everywhere and its value at 0.
+    For all x and v and all t >= 0: on every path through the function each is the coordinate
+    itself, or, where there is one path only, it has the coordinate's gradient everywhere and its
+    value at 0.
     """
     system, n = plant.system, plant.system.nstates
     states, outputs = coordinate_names(n), list(system.current_spec.outputs)
     update = [(i, f"{states[i]}'", i + 1) for i in range(n - 1)]
     output = [(outputs.index(s), s, states.index(s)) for s in states if s in outputs]
     output += [(outputs.index("y"), "y", 0)]
-    for what, function, wanted in (
+    for what, function, coordinates in (
         ("update", system.updfcn, update), ("output", system.outfcn, output)
     ):  # fmt: skip
-        for i, name, k in wanted:
+        for i, name, k in coordinates:
             if not _is_coordinate(plant, function, i, k):
                 raise DiagramError(
                     f"the proof is about plants (1), with {name} = {states[k]}; the {what} "

@@ -39,19 +39,19 @@ def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Marg
     if order < 1 or block.ninputs:
         return None
     rows = [names.index(name) for name in derivative_names(order)]
-    own = states[place.state_offset :][: block.nstates or 0]
+    block_states = states[place.state_offset :][: block.nstates or 0]
     picked = np.unique(np.linspace(0, time.size - 2, SAMPLES).astype(int))
-    times, told, found = [], [], []
+    times, outputs, rates = [], [], []
     for i in picked:
         shift = 0.0 if block.nstates else SHIFT * (time[i + 1] - time[i])
-        t, x = float(time[i] + shift), own[:, i]
+        t, x = float(time[i] + shift), block_states[:, i]
         here, slopes = outputs_now(block, t, x, np.zeros(0))[rows], _slopes(block, t, x, rows)
         far = np.abs(slopes - here[1:])
         best = np.argmin(np.where(np.isnan(far), np.inf, far), axis=0)
         times.append(t)
-        told.append(here[1:])
-        found.append(slopes[best, np.arange(order)])
-    return _worst(np.array(times), np.array(told), np.array(found))
+        outputs.append(here[1:])
+        rates.append(slopes[best, np.arange(order)])
+    return _worst(np.array(times), np.array(outputs), np.array(rates))
 
 
 def _slopes(block: Any, t: float, x: np.ndarray, rows: list[int]) -> np.ndarray:
@@ -69,12 +69,12 @@ def _slopes(block: Any, t: float, x: np.ndarray, rows: list[int]) -> np.ndarray:
         ])  # fmt: skip
 
 
-def _worst(t: np.ndarray, told: np.ndarray, found: np.ndarray) -> Margin:
+def _worst(t: np.ndarray, outputs: np.ndarray, rates: np.ndarray) -> Margin:
     """Return the equality for the derivative that is farthest off, relative to its size."""
-    size = np.max(np.maximum(np.abs(told), np.abs(found)), axis=0)
+    size = np.max(np.maximum(np.abs(outputs), np.abs(rates)), axis=0)
     size = np.where(size > 0, size, 1.0)
-    k = int(np.argmax(np.max(np.nan_to_num(np.abs(told - found), nan=np.inf) / size, axis=0)))
+    k = int(np.argmax(np.max(np.nan_to_num(np.abs(outputs - rates), nan=np.inf) / size, axis=0)))
     return equality(
-        "(yd)", "yd1, ..., ydn are the derivatives of yd", t, told[:, k], found[:, k],
+        "(yd)", "yd1, ..., ydn are the derivatives of yd", t, outputs[:, k], rates[:, k],
         float(size[k]), _TOLERANCE,
     )  # fmt: skip

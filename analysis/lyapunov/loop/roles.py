@@ -57,18 +57,12 @@ PIECES: Pieces = {
 
 @dataclass(frozen=True, kw_only=True)
 class Roles:
-    """The blocks of a closed loop by the part that they play, with the wiring checked.
+    """The blocks of a closed loop by the part that they play, with the wiring checked."""
 
-    Attributes
-    ----------
-    places : mapping
-        Place of every block, by part: "reference", "plant", "actuator", "filtered_error",
-        "basis" (where there is one), "weights", "robust", "law".
-    disturbances : mapping
-        Gain of every external input that is added to the plant's input v, by name.
-    """
-
+    # place of every block, by part: "reference", "plant", "actuator", "filtered_error",
+    # "basis" (where there is one), "weights", "robust", "law"
     places: Mapping[str, Place] = field(repr=False)
+    # gain of every external input that is added to the plant's input v, by name
     disturbances: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -110,7 +104,7 @@ def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
     if content not in _PURE:
         _check_functions(wiring)
         _PURE.add(content)
-    places = _found(wiring, pieces)
+    places = _places(wiring, pieces)
     named = {
         name: Signal(i, k)
         for i, place in enumerate(wiring.blocks)
@@ -154,8 +148,10 @@ def _check_functions_are_own(place: Place) -> None:
         return
     pairs = [("output", system.outfcn)] + ([("update", system.updfcn)] if system.nstates else [])
     for name, used in pairs:
-        own = getattr(system.spec, name)
-        if getattr(used, "__code__", used) is not getattr(own, "__code__", own):
+        declared_function = getattr(system.spec, name)
+        if getattr(used, "__code__", used) is not getattr(
+            declared_function, "__code__", declared_function
+        ):
             raise DiagramError(
                 f"block '{place.path}' has another {name} function than its record "
                 f"{type(system.spec).__name__}, which the proof reads: make the block of a record "
@@ -168,17 +164,17 @@ def _check_functions_of_kind(place: Place) -> None:
     """What is known of a kind of record is known of the functions that its class has."""
     spec = place.system.spec
     for name in ("update", "output", "band"):
-        known = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
-        if isinstance(known, staticmethod) and getattr(spec, name) is not known.__func__:
+        of_class = inspect.getattr_static(type(spec), name, None)  # inherited ones, too
+        if isinstance(of_class, staticmethod) and getattr(spec, name) is not of_class.__func__:
             raise DiagramError(
                 f"block '{place.path}' has another {name} function than {type(spec).__name__}: "
                 "the proof is about the latter, make a record of a class of its own"
             )
 
 
-def _found(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
+def _places(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
     """Return the block of every part."""
-    found: dict[str, Place] = {}
+    places: dict[str, Place] = {}
     for place in wiring.blocks:
         outputs = declared(place, "outputs")
         part = next((p for p, (signal, _) in pieces.items() if signal in outputs), None)
@@ -187,22 +183,22 @@ def _found(wiring: Wiring, pieces: Pieces) -> dict[str, Place]:
                 f"the proof does not know what block '{place.path}' ({', '.join(outputs)}) is for: "
                 f"it knows {', '.join(pieces)} only"
             )
-        if part in found:
+        if part in places:
             raise DiagramError(
-                f"two blocks output '{pieces[part][0]}', '{found[part].path}' and '{place.path}': "
+                f"two blocks output '{pieces[part][0]}', '{places[part].path}' and '{place.path}': "
                 f"the proof is about one {part}"
             )
-        found[part] = place
+        places[part] = place
     for part, (signal, needed) in pieces.items():
-        if part in found:
-            _check_record(found[part], part, needed)
-        elif part != "basis" or isinstance(_weights(found), AdaptiveWeights):
+        if part in places:
+            _check_record(places[part], part, needed)
+        elif part != "basis" or isinstance(_weights(places), AdaptiveWeights):
             raise DiagramError(f"the proof needs a block that outputs '{signal}' ({part})")
-    return found
+    return places
 
 
-def _weights(found: Mapping[str, Place]) -> Any:
-    return record_of(found["weights"]) if "weights" in found else None
+def _weights(places: Mapping[str, Place]) -> Any:
+    return record_of(places["weights"]) if "weights" in places else None
 
 
 def _check_record(place: Place, part: str, needed: tuple[str, ...]) -> None:
@@ -240,14 +236,14 @@ def _check_inputs(
     for place in wiring.blocks:
         for name, terms in zip(declared(place, "inputs"), wiring.inputs(place), strict=True):
             given = {signal: gain for signal, gain in terms.items() if gain != 0}
-            wanted = {named[name]: 1.0} if name in named else {}
+            expected = {named[name]: 1.0} if name in named else {}
             if place is places["plant"] and name == "v":
                 outside = {s: gain for s, gain in given.items() if s.block is None}
                 labels = wiring.top.system.input_labels
                 disturbances |= {labels[s.index]: gain for s, gain in outside.items()}
                 given = {s: gain for s, gain in given.items() if s not in outside}
-            if given != wanted or not wanted:
-                raise DiagramError(_wrong_wire(wiring, place, name, given, wanted))
+            if given != expected or not expected:
+                raise DiagramError(_wrong_wire(wiring, place, name, given, expected))
     return disturbances
 
 
@@ -259,15 +255,15 @@ def _check_outputs(wiring: Wiring, named: Mapping[str, Signal]) -> None:
             if terms != {named[label]: 1.0}:
                 raise DiagramError(
                     f"output '{label}' of '{wiring.top.system.name}' is {_combined(wiring, terms)},"
-                    f" the proof speaks of {_signal(wiring, named[label])}: give it another name"
+                    f" the proof takes {_signal(wiring, named[label])}: give it another name"
                 )
 
 
 def _wrong_wire(
-    wiring: Wiring, place: Place, name: str, given: Combination, wanted: Combination
+    wiring: Wiring, place: Place, name: str, given: Combination, expected: Combination
 ) -> str:
     got = f"input '{name}' of block '{place.path}' is {_combined(wiring, given)}"
-    if not wanted:
+    if not expected:
         return f"{got}, and no block of the proof outputs '{name}': the proof is about another loop"
     if any(signal.block is None for signal in given):
         return (
@@ -275,7 +271,7 @@ def _wrong_wire(
             "with a declared bound; take the input away"
         )
     return (
-        f"{got}, the proof is about {_combined(wiring, wanted)}: correct the connection, or make "
+        f"{got}, the proof is about {_combined(wiring, expected)}: correct the connection, or make "
         "gain and sign part of the block"
     )
 
@@ -307,9 +303,9 @@ def joined_again(
             here = f"{path}{system.name}"
             if isinstance(system, ct.InterconnectedSystem):
                 inner = list(copied(system, f"{here}."))
-                made = {label for block in inner for label in block.output_labels}
+                inside = {label for block in inner for label in block.output_labels}
                 taken = [label for block in inner for label in block.input_labels]
-                outside = [label for label in dict.fromkeys(taken) if label not in made]
+                outside = [label for label in dict.fromkeys(taken) if label not in inside]
                 yield interconnect(inner, inputs=outside, name=system.name)
             elif type(system) is Block:
                 yield remade(parts[here], system.current_spec, system.name)
@@ -323,9 +319,9 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
     """Check that a block is of a kind that the proof knows."""
     spec = record_of(place)
     if type(spec) not in kinds:
-        wanted = " or ".join(kind.__name__ for kind in kinds)
+        choices = " or ".join(kind.__name__ for kind in kinds)
         raise DiagramError(
-            f"the certificate is about a {wanted} in the place of '{place.path}', "
+            f"the certificate is about a {choices} as '{place.path}', "
             f"got {type(spec).__name__}: put one there"
         )
 
@@ -342,7 +338,7 @@ class Parts:
     plant, actuator, filtered_error, robust, law : record
         With the parameters of the run.
     basis, weights : record or None
-        None where `nlctl.Zero` stands in the place of the network.
+        None where `nlctl.Zero` replaces the network.
     roles : Roles
         Places of the blocks in the diagram.
     gains : Gains
@@ -428,7 +424,7 @@ def loop_parts(
     """Return the parts of a loop that was read, with the parameters that its blocks have now."""
     specs = {part: roles.spec(part) for part in roles.places}
     x0 = initial_state(loop, start)
-    own = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
+    states = {p: x0[f.state_offset :][: f.system.nstates or 0] for p, f in roles.places.items()}
     _, outputs = values_now(loop, (0.0, x0, np.zeros(loop.ninputs or 0)))
     weights = specs["weights"] if isinstance(specs["weights"], AdaptiveWeights) else None
     gains = Gains(
@@ -439,8 +435,8 @@ def loop_parts(
         sigma_2=specs["robust"].sigma_2,
         tau=specs["robust"].tau,
         r_0=float(outputs[loop.output_labels.index("r")]),
-        delta_hat_0=float(own["robust"][0]),
-        W_hat_0=tuple(map(float, own["weights"])) if weights else (),
+        delta_hat_0=float(states["robust"][0]),
+        W_hat_0=tuple(map(float, states["weights"])) if weights else (),
         b=specs["law"].b if isinstance(specs["law"], DAMPED) else 0.0,
     )
     return Parts(

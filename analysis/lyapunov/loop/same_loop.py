@@ -49,7 +49,7 @@ def check_same(
     understood: ct.InterconnectedSystem,
     points: Iterable[_Point],
     params: Mapping[str, Any] | None = None,
-    own: Mapping[str, Any] | None = None,
+    read_params: Mapping[str, Any] | None = None,
     content: str = "",
 ) -> None:
     """Compare a loop with the proof's reading of it, at points; `content` is a key of the loop."""
@@ -65,9 +65,9 @@ def check_same(
         for s in (given, understood)
     )
     what = [*(f"d/dt {name}" for name in names), *(f"output '{label}'" for label in shared)]
-    one, other = _named(given, params), _named(understood, own)
+    one, other = _named(given, params), _named(understood, read_params)
 
-    def told(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
+    def as_given(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
         rates, outputs = one(t, x, u)
         return (np.concatenate([rates, outputs[rows]]),)
 
@@ -77,7 +77,7 @@ def check_same(
 
     with np.errstate(all="ignore"):
         for t, x in points:
-            _compare(given, (told, read), (t, x, u), what)
+            _compare(given, (as_given, read), (t, x, u), what)
     _AGREED.add(comparison)
 
 

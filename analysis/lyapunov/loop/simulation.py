@@ -61,28 +61,14 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True)
 class MemberRun:
-    """A member, and what became of it.
-
-    Attributes
-    ----------
-    member : Member
-    parts : Parts
-        With the member's parameters and gains.
-    signals : Signals
-        Up to the time that the run reached.
-    lost : float or None
-        Time (s) at which the run ended early, diverged or too stiff.
-    message : str
-        Why it ended early.
-    reference : Margin or None
-        Of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`.
-    """
+    """A member, and its run."""
 
     member: Member
-    parts: Parts
-    signals: Signals
-    lost: float | None
-    message: str = ""
+    parts: Parts  # with the member's parameters and gains
+    signals: Signals  # up to the time that the run reached
+    lost: float | None  # time (s) at which the run ended early, diverged or too stiff
+    message: str = ""  # why it ended early
+    # of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`
     reference: Margin | None = None
 
     @property
@@ -139,9 +125,9 @@ def _of_response(loop: ct.InterconnectedSystem, response: Any) -> Member:
             f"got {states.shape[0]}"
         )
     start = dict(zip(all_states(loop), map(float, states[:, 0]), strict=True))
-    own = own_parameters(loop, response)
+    params = own_parameters(loop, response)
     return Member(
-        start=start, params=own, times=np.asarray(response.time, dtype=float), expected=response
+        start=start, params=params, times=np.asarray(response.time, dtype=float), expected=response
     )
 
 
@@ -222,8 +208,8 @@ def observed_loop(loop: ct.InterconnectedSystem, split: Decomposition) -> native
 def _check_reproduced(member: Member, signals: Signals) -> None:
     if member.expected is None:
         return
-    told = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
-    r, again = np.asarray(told["r"]), signals["r"]
+    outputs = dict(zip(member.expected.output_labels, member.expected.outputs, strict=True))
+    r, again = np.asarray(outputs["r"]), signals["r"]
     far = np.abs(r[: again.size] - again)
     if not np.all(far <= _AGREE * np.max(np.abs(r))):
         at = float(signals.t[int(np.argmax(far))])

@@ -38,13 +38,13 @@ def check_decrease(loop: Any, match: Matching, params: Mapping[str, Any] | None 
         with np.errstate(all="ignore"):
             (rates, _), (_, seen) = rates_of(t, x, u), outputs_of(t, x, u[:0])
         signals = dict(zip(labels, seen, strict=True))
-        told, true, scale = _both(match, t, x, rates, signals)
+        proved, true, scale = _both(match, t, x, rates, signals)
         projected = isinstance(match.loop.spec("weights"), ProjectedWeights)
-        excess = true - told if projected else abs(true - told)
+        excess = true - proved if projected else abs(true - proved)
         if np.isfinite(scale) and not excess <= _EQUAL * scale:
             raise DiagramError(
                 f"'{loop.name}' is not the loop that the proof is about: at t = {t:.6g} s V' is "
-                f"{true:.9g}, and {told:.9g} by the proof"
+                f"{true:.9g}, and {proved:.9g} by the proof"
             )
 
 

@@ -33,7 +33,7 @@ from .region import Region, region
 __all__ = ["MODEL_REFERENCE"]
 
 _LIMIT = 1e12  # a bound of V beyond which the iteration counts as without end
-_TIGHTER = 1e-3  # relative: the ultimate bound is looked at again as long as it falls by more
+_TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it falls by more
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
@@ -78,11 +78,11 @@ def _region(subject: Subject, level: arb) -> Region:
 
 
 def _bound(subject: Subject, need: Region) -> Decrease:
-    found = decrease(subject.matching, arb(need.D), subject.start)
-    if found.doubt or np.isfinite(need.u):
-        return found
+    bound = decrease(subject.matching, arb(need.D), subject.start)
+    if bound.doubt or np.isfinite(need.u):
+        return bound
     doubt = f"no bound of |psi|, and so of |u|, is found on {need.box}: use another regressor"
-    return dataclasses.replace(found, doubt=doubt)
+    return dataclasses.replace(bound, doubt=doubt)
 
 
 def _endless(need: Region, iterations: Sequence[float]) -> str:
@@ -99,24 +99,24 @@ def _endless(need: Region, iterations: Sequence[float]) -> str:
     return f"{without_end('V_max(C)', iterations)}; {largest}"
 
 
-def _in_the_end(subject: Subject, found: Decrease) -> Decrease:
+def _in_the_end(subject: Subject, bound: Decrease) -> Decrease:
     """Return bounds that hold in the end: V falls to a level on whose box delta is smaller."""
-    while found.falls:
-        need = _region(subject, found.error)
+    while bound.falls:
+        need = _region(subject, bound.error)
         again = decrease(subject.matching, arb(need.D), arb(0))
-        if not again.error < found.error * (1 - _TIGHTER):
+        if not again.error < bound.error * (1 - _TIGHTER):
             break
-        found = again
-    return found
+        bound = again
+    return bound
 
 
-def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
-    found, match, form = closed.bound, subject.matching, subject.loop.form
-    end = _in_the_end(subject, found) if closed.holds else found
-    Gamma, errors = ball(match.Gamma), tuple(map(upper, form.errors(found.level)))
+def _fields(subject: Subject, closed: Closed) -> dict[str, Any]:
+    bound, match, form = closed.bound, subject.matching, subject.loop.form
+    end = _in_the_end(subject, bound) if closed.holds else bound
+    Gamma, errors = ball(match.Gamma), tuple(map(upper, form.errors(bound.level)))
     bounds = {
         "e": errors[0],
-        "W_error": upper((found.level * Gamma).sqrt()),
+        "W_error": upper((bound.level * Gamma).sqrt()),
         "ultimate": upper(form.errors(end.error)[0]),
         "ultimate_W_error": upper((end.weights * Gamma).sqrt()),
         "rms": upper(form.first(end.mean)),
@@ -126,11 +126,11 @@ def _found(subject: Subject, closed: Closed) -> dict[str, Any]:
     return {name: closed.proved(value) for name, value in bounds.items()} | {
         "errors": tuple(map(closed.proved, errors)),
         "V_0": upper(subject.start),
-        "alpha_0": found.alpha_0,
-        "alpha_1": found.alpha_1,
+        "alpha_0": bound.alpha_0,
+        "alpha_1": bound.alpha_1,
         "matching": match,
-        "how": found.how,
-        "end": found.end,
+        "how": bound.how,
+        "end": bound.end,
     }
 
 
@@ -145,6 +145,6 @@ MODEL_REFERENCE = ProofKind(
     region=_region,
     bound=_bound,
     endless=_endless,
-    largest_input=lambda subject, need, found: need.u,
-    found=_found,
+    largest_input=lambda subject, need, bound: need.u,
+    fields=_fields,
 )

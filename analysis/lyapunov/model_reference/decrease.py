@@ -32,36 +32,21 @@ _FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
 
 @dataclass(frozen=True, kw_only=True)
 class Decrease:
-    """Bounds of V while |delta| <= D.
+    """Bounds of V while |delta| <= D."""
 
-    Attributes
-    ----------
-    level : arb
-        Bound of V for all time.
-    error, weights : arb
-        Bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma.
-    mean : arb
-        Bound of the limit superior of the mean of E^T Q E over [0, t].
-    falls : bool
-        Whether limsup V <= `error`, too.
-    alpha_0, alpha_1 : float
-        V' <= -alpha_1 V + alpha_0; NaN where there is no such inequality.
-    how, end : str
-        Where the level comes from, and the bounds in the end.
-    doubt : str
-        Why there is no bound; nothing if there is one.
-    """
-
-    level: arb
+    level: arb  # bound of V for all time
+    # bounds of limsup E^T P E and of limsup lambda |W_hat - W|^2 / Gamma
     error: arb
     weights: arb
-    mean: arb
-    falls: bool = False
+    mean: arb  # bound of the limit superior of the mean of E^T Q E over [0, t]
+    falls: bool = False  # whether limsup V <= `error`, too
+    # V' <= -alpha_1 V + alpha_0; NaN where there is no such inequality
     alpha_0: float = np.nan
     alpha_1: float = np.nan
+    # where the level comes from, and the bounds in the end
     how: str
     end: str
-    doubt: str = ""
+    doubt: str = ""  # why there is no bound; nothing if there is one
 
 
 def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:
@@ -112,15 +97,15 @@ def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrea
 
     fastest = min(form.mu, 2 * float(Gamma * sigma))
     a = _best_rate(lambda a: float(alpha_0(arb(a))) / a, fastest)
-    found = alpha_0(arb(a))
-    ultimate = found / a
+    drive_at_a = alpha_0(arb(a))
+    ultimate = drive_at_a / a
     return Decrease(
         level=V_0.max(ultimate),
         error=ultimate,
         weights=ultimate,
         mean=(drive.sqrt() + (drive + leak / 2).sqrt()) ** 2,
         falls=True,
-        alpha_0=upper(found),
+        alpha_0=upper(drive_at_a),
         alpha_1=a,
         how="max{V(0), alpha_0/alpha_1}",
         end="V -> alpha_0/alpha_1 or less",
@@ -129,10 +114,10 @@ def _sigma_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrea
 
 def _best_rate(cost: Callable[[float], float], fastest: float) -> float:
     """Return a rate between 0 and the fastest; any is as good for the proof."""
-    found: Any = minimize_scalar(
+    minimum: Any = minimize_scalar(
         lambda share: cost(share * fastest), bounds=(1e-3, 1 - 1e-3), method="bounded"
     )
-    return float(found.x * fastest)
+    return float(minimum.x * fastest)
 
 
 def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
@@ -154,13 +139,13 @@ def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
 
     rough = float((q / mu * h_0**2 + (widest + W / 2) ** 2 / Gamma).upper())
     if rough == 0:
-        found = arb(0)
+        V_e = arb(0)
     else:
-        found = arb(enclose(largest, Box.of(share=(0.0, 1.0)), tol=_FINE * rough).high)
-    level = V_0.max(found)
+        V_e = arb(enclose(largest, Box.of(share=(0.0, 1.0)), tol=_FINE * rough).high)
+    level = V_0.max(V_e)
     return Decrease(
         level=level,
-        error=found,
+        error=V_e,
         weights=level,
         mean=q * h_0**2,
         how="max{V(0), V_e}, V_e the largest V at which V' > 0 is possible",

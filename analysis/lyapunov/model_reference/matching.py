@@ -37,30 +37,16 @@ __all__ = ["Matching", "matching"]
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:
-    """How a plant is matched: x_n' = beta v + c (nu + nu_e) + lambda W^T psi + rest.
-
-    Attributes
-    ----------
-    loop : ModelReferenceLoop
-    k : Fraction
-        Of v = k u + eps_u: the middle of its bounds.
-    beta, lam : Fraction
-        Input gain of the plant, and lambda = beta k / gain.
-    W : tuple of l Fraction
-        Weights that match, or were chosen.
-    chosen : bool
-        Whether they were chosen by the caller.
-    rest : Sum
-        What is left of the plant's equation, in the symbols t, x1, ..., xm1, ..., yd, v.
-    """
+    """How a plant is matched: x_n' = beta v + c (nu + nu_e) + lambda W^T psi + rest."""
 
     loop: ModelReferenceLoop
-    k: Fraction
+    k: Fraction  # of v = k u + eps_u: the middle of its bounds
+    # input gain of the plant, and lambda = beta k / gain
     beta: Fraction
     lam: Fraction
-    W: tuple[Fraction, ...]
-    chosen: bool
-    rest: Sum
+    W: tuple[Fraction, ...]  # weights that match, or were chosen
+    chosen: bool  # whether they were chosen by the caller
+    rest: Sum  # what is left of the plant's equation, in the symbols t, x1, ..., xm1, ..., yd, v
 
     @property
     def W_squared(self) -> Fraction:  # noqa: N802
@@ -81,8 +67,8 @@ class Matching:
         value = loop.form.largest(E)
         ends = zip(loop.W_hat_0, self.W, strict=True)
         error = sum((max((exact(w) - W) ** 2 for w in side) for side, W in ends), Fraction(0))
-        found = Fraction(int(value.p), int(value.q)) + error / self.Gamma
-        return found if level is None else min(found, exact(level))
+        largest = Fraction(int(value.p), int(value.q)) + error / self.Gamma
+        return largest if level is None else min(largest, exact(level))
 
     @property
     def weights_at_start(self) -> arb:
@@ -187,7 +173,7 @@ def matching(
     lam = beta * k / loop.gain
     if not lam > 0:
         raise DiagramError(
-            f"the proof needs an input gain of the sign that '{paths['law']}' supposes: the "
+            f"the proof needs an input gain of the sign that '{paths['law']}' assumes: the "
             f"coefficient of v alone in '{paths['plant']}' is {float(beta):g}, the actuator's gain "
             f"{float(k):g}, the law's {float(loop.gain):g}"
         )
@@ -214,15 +200,15 @@ def _taken_away(
     weights = [Fraction(0)] * len(psi)
     rows: list[tuple[Any, Sum, list[Fraction]]] = []
     for i, one in enumerate(psi):
-        own = [Fraction(int(i == j)) for j in range(len(psi))]
+        combination = [Fraction(int(i == j)) for j in range(len(psi))]
         for product, row, made_of in rows:
             factor = one.coefficient(product)
             one = one - factor * row
-            own = [a - factor * b for a, b in zip(own, made_of, strict=True)]
+            combination = [a - factor * b for a, b in zip(combination, made_of, strict=True)]
         if one.terms:
             pivot = next((p for p in one.terms if p in target.terms), next(iter(one.terms)))
             scale = 1 / one.coefficient(pivot)
-            rows.append((pivot, one * scale, [scale * a for a in own]))
+            rows.append((pivot, one * scale, [scale * a for a in combination]))
     for product, row, made_of in rows:
         factor = target.coefficient(product)
         shorter = target - factor * row

@@ -63,50 +63,31 @@ Regressor = Callable[[Mapping[str, Any]], list[Any]]
 
 @dataclass(frozen=True, kw_only=True)
 class ModelReferenceLoop:
-    """The records of a loop of model reference adaptive control, and where it starts.
+    """The records of a loop of model reference adaptive control, and where it starts."""
 
-    Attributes
-    ----------
-    roles : Roles
-        Places of the blocks: "reference", "plant", "actuator", "model", "error", "basis",
-        "weights", "law".
-    order : int
-        Order n of the plant and of the model.
-    form, model_form : QuadraticForm
-        E^T P E of the error, with the P of the loop's own r = b^T P E, and one of the model.
-    command : float
-        Proved bound of |yd| for all time.
-    starts : Starts
-        Initial states.
-    x_0, xm_0, W_hat_0 : tuple of pairs of floats
-        Ends of the initial states of plant, model and weights; where V(0) bounds those of plant
-        and weights they may be infinite.
-    acceleration : callable
-        x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
-    regressor : callable
-        The basis block's own psi_0, psi_1, ... where t, x1, ..., xm1, ..., yd have these values.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
-    understood : control.InterconnectedSystem
-        The loop, connected again by name, with all its signals as outputs.
-    content : LoopContent
-        What the loop consists of.
-    """
-
+    # places of the blocks: "reference", "plant", "actuator", "model", "error", "basis",
+    # "weights", "law"
     roles: Roles
-    order: int
+    order: int  # order n of the plant and of the model
+    # E^T P E of the error, with the P of the loop's own r = b^T P E, and one of the model
     form: QuadraticForm
     model_form: QuadraticForm
-    command: float
-    starts: Starts
+    command: float  # proved bound of |yd| for all time
+    starts: Starts  # initial states
+    # ends of the initial states of plant, model and weights; where V(0) bounds those of plant
+    # and weights they may be infinite
     x_0: Sides
     xm_0: Sides
     W_hat_0: Sides
+    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
     acceleration: Acceleration
+    # the basis block's own psi_0, psi_1, ... where t, x1, ..., xm1, ..., yd have these
+    # values.
     regressor: Regressor = field(repr=False)
-    disturbance: float
+    disturbance: float  # bound of what external inputs add to the plant's v
+    # the loop, connected again by name, with all its signals as outputs
     understood: ct.InterconnectedSystem = field(repr=False)
-    content: LoopContent = field(repr=False)
+    content: LoopContent = field(repr=False)  # what the loop consists of
 
     def spec(self, part: str) -> Any:
         """Return the record of a part, with the parameters of the run."""
@@ -169,20 +150,20 @@ def _checked_orders(roles: Roles) -> int:
         "error": len(roles.spec("error").K),
     }
     if len(set(orders.values())) > 1:
-        told = ", ".join(f"{roles.paths[part]} {n}" for part, n in orders.items())
-        raise DiagramError(f"the proof needs plant, model and error of one order, got {told}")
+        listed = ", ".join(f"{roles.paths[part]} {n}" for part, n in orders.items())
+        raise DiagramError(f"the proof needs plant, model and error of one order, got {listed}")
     return orders["plant"]
 
 
 def _regressor(basis: Place, order: int) -> Regressor:
     """Return the basis block's own function of the signals that it takes."""
-    known = (*coordinate_names(order), *model_state_names(order), "yd")
+    arguments = (*coordinate_names(order), *model_state_names(order), "yd")
     names, p = declared(basis, "inputs"), current_parameters(basis.system)
-    strange = [name for name in names if name not in known]
+    strange = [name for name in names if name not in arguments]
     if strange or basis.system.nstates:
         what = f"takes {', '.join(strange)}" if strange else "has states"
         raise DiagramError(
-            f"the proof is about a regressor of {', '.join(known)} without memory, and block "
+            f"the proof is about a regressor of {', '.join(arguments)} without memory, and block "
             f"'{basis.path}' {what}: use such a regressor"
         )
     output = on_intervals(basis.path, basis.system.outfcn)
@@ -210,10 +191,10 @@ def _bound_of_command(place: Place, x0: Sides) -> float:
     def yd(point: tuple[Any, ...]) -> Any:
         return output(point[0], (), (), p)[declared(place, "outputs").index("yd")]
 
-    found = enclose(yd, wide, max_boxes=1).magnitude
-    if not np.isfinite(found):
+    bound = enclose(yd, wide, max_boxes=1).magnitude
+    if not np.isfinite(bound):
         raise DiagramError(
             f"no bound of yd of block '{place.path}' for all t >= 0 is found in interval "
             "arithmetic: write it with functions that are bounded for all t, such as np.sin"
         )
-    return found
+    return bound

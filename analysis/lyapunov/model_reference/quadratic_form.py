@@ -41,26 +41,15 @@ def rational(x: Any) -> fmpq:
 
 @dataclass(frozen=True, kw_only=True)
 class QuadraticForm:
-    """E^T P E with the derivative -E^T Q E + 2 b^T P E d.
+    """E^T P E with the derivative -E^T Q E + 2 b^T P E d."""
 
-    Attributes
-    ----------
-    K : tuple of n Fraction
-        Gains of E_n' = -K^T E.
-    P, Q, inverse : fmpq_mat
-        Of shape (n, n); the last is P^-1.
-    mu : float
-        E^T Q E >= mu E^T P E, proved.
-    q : fmpq
-        b^T P Q^-1 P b: (b^T P E)^2 <= q E^T Q E.
-    """
-
-    K: tuple[Fraction, ...]
+    K: tuple[Fraction, ...]  # gains of E_n' = -K^T E
+    # of shape (n, n); the last is P^-1
     P: fmpq_mat
     Q: fmpq_mat
     inverse: fmpq_mat
-    mu: float
-    q: fmpq
+    mu: float  # E^T Q E >= mu E^T P E, proved
+    q: fmpq  # b^T P Q^-1 P b: (b^T P E)^2 <= q E^T Q E
 
     def value(self, E: Sequence[Any]) -> fmpq:
         """Return E^T P E of exact numbers."""

@@ -147,5 +147,5 @@ def _largest_rest(match: Matching, box: Box, tol: float) -> tuple[arb, int]:
         return arb("inf"), 0
     rough = enclose(rest, over, max_boxes=1).magnitude
     fineness = tol * rough if 0 < rough < np.inf else tol
-    found = enclose(rest, over, tol=fineness, max_boxes=_BOXES)
-    return arb(found.magnitude), found.boxes
+    bound = enclose(rest, over, tol=fineness, max_boxes=_BOXES)
+    return arb(bound.magnitude), bound.boxes

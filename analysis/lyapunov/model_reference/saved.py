@@ -86,10 +86,10 @@ def _proof(match: Matching, split: Decomposition, C: float) -> Content:
     for _ in range(_STAGES):
         need = region(match, split, arb(C), tol=_FINE)
         rest = exact(need.rest) * (1 + exact(_WIDER))
-        found = decrease(match, arb(need.D) + arb(need.rest) * _WIDER, arb(0))
-        stages.append({"C": str(exact(need.C)), "rest": str(rest), **_fall(found)})
-        smaller = float(found.error.upper()) * (1 + 1e-6)
-        if not found.falls or not 0 < smaller < C * _LESS:
+        bound = decrease(match, arb(need.D) + arb(need.rest) * _WIDER, arb(0))
+        stages.append({"C": str(exact(need.C)), "rest": str(rest), **_fall(bound)})
+        smaller = float(bound.error.upper()) * (1 + 1e-6)
+        if not bound.falls or not 0 < smaller < C * _LESS:
             break
         C = smaller
     return {
@@ -101,8 +101,8 @@ def _proof(match: Matching, split: Decomposition, C: float) -> Content:
     }
 
 
-def _fall(found: Decrease) -> Content:
+def _fall(bound: Decrease) -> Content:
     """Return the numbers by which V falls, as far as its modification has such."""
-    if np.isfinite(found.alpha_1):
-        return {"alpha_1": str(exact(found.alpha_1))}
-    return {"V_e": str(exact(float(found.error.upper())) * (1 + exact(_WIDER)))}
+    if np.isfinite(bound.alpha_1):
+        return {"alpha_1": str(exact(bound.alpha_1))}
+    return {"V_e": str(exact(float(bound.error.upper())) * (1 + exact(_WIDER)))}

@@ -33,7 +33,7 @@ class BurstForecast:
     A metric of `nlctl.ensemble_response` and of `experiment.Experiment`, for loops with the law
     (23), (24): see `nlctl.analysis.lyapunov.nussbaum.slow_drift`.  Infinite where the drift stops
     or reverses before; the time of the burst itself where it lies within the run.  A forecast, not
-    a bound: it supposes that disturbance and reference go on as they were.
+    a bound: it supposes that disturbance and reference continue as they were.
 
     Attributes
     ----------

@@ -36,10 +36,10 @@ def law_of_response(loop: Any, response: Any) -> GainFunction:
         )
     place = state_names(loop).index(f"{parts.paths['law']}.zeta")
     evaluate = rates_and_outputs(loop, params)
-    for i, own in own_outputs(loop, response, params):
+    for i, signals in own_outputs(loop, response, params):
         t, x = float(response.time[i]), np.asarray(response.states)[:, i]
         rate = float(evaluate(t, x, np.zeros(0))[0][place])
-        a, b = parts.law.N(own["zeta"]) * rate, own["r"] * own["u"]
+        a, b = parts.law.N(signals["zeta"]) * rate, signals["r"] * signals["u"]
         if not agree(a, b, OF_RESPONSES, relative=OF_RESPONSES):
             raise DiagramError(
                 f"N(zeta) zeta' and r u of '{loop.name}' differ at t = {t:g} s: {a:.9g} and {b:.9g}"

@@ -33,7 +33,7 @@ LONG_RUN_SIGNALS = ("zeta", "e", "r", "u")
 
 @dataclass(frozen=True, kw_only=True)
 class LongRun:
-    """What became of a loop over a long time.
+    """How a loop behaved over a long time.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class LongRun:
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """What became of each of the predictions."""
+        """The outcome of each prediction."""
         return tuple(outcome(p, self.time, self.signals["zeta"]) for p in self.predictions)
 
     def __str__(self) -> str:

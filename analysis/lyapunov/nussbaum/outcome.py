@@ -1,4 +1,4 @@
-"""What became of a forecast of the slow drift: held, failed, or open."""
+"""How a forecast of the slow drift ended: held, failed, or open."""
 
 from __future__ import annotations
 

@@ -123,13 +123,13 @@ def antiderivative(N: GainFunction) -> Antiderivative:
         return functions.nussbaum_integral
 
     def integral(s: np.ndarray) -> np.ndarray:
-        wanted = np.asarray(s, dtype=float)
-        if wanted.size <= DENSE:
-            points, place = np.unique(np.append(wanted, 0.0), return_inverse=True)
-            return _cumulated(N, points)[place[:-1]].reshape(wanted.shape)
-        nodes = np.union1d(np.linspace(wanted.min(), wanted.max(), DENSE), 0.0)
+        upper_ends = np.asarray(s, dtype=float)
+        if upper_ends.size <= DENSE:
+            points, place = np.unique(np.append(upper_ends, 0.0), return_inverse=True)
+            return _cumulated(N, points)[place[:-1]].reshape(upper_ends.shape)
+        nodes = np.union1d(np.linspace(upper_ends.min(), upper_ends.max(), DENSE), 0.0)
         slopes = np.array([float(N(z)) for z in nodes])
-        return CubicHermiteSpline(nodes, _cumulated(N, nodes), slopes)(wanted)
+        return CubicHermiteSpline(nodes, _cumulated(N, nodes), slopes)(upper_ends)
 
     return integral
 
@@ -182,18 +182,18 @@ def lobes(
 
 def root(function: GainFunction, low: float, high: float) -> float:
     """Return the zero of a function between two points where its signs differ."""
-    found: Any = brentq(function, low, high, xtol=1e-14)
-    return float(found)
+    zero: Any = brentq(function, low, high, xtol=1e-14)
+    return float(zero)
 
 
 def _lobe(N: GainFunction, low: float, high: float) -> Lobe:
     grid = np.linspace(low, high, 65)
     i = int(np.argmax([abs(N(z)) for z in grid]))
     around = grid[max(i - 1, 0)], grid[min(i + 1, 64)]
-    found: Any = minimize_scalar(
+    minimum: Any = minimize_scalar(
         lambda z: -abs(N(z)), bounds=around, method="bounded", options={"xatol": 1e-10}
     )
-    place = max((float(found.x), float(grid[i])), key=lambda z: abs(N(z)))
+    place = max((float(minimum.x), float(grid[i])), key=lambda z: abs(N(z)))
     below, above = antiderivative(N)(np.array([low, high]))
     return Lobe(
         low=low, high=high, integral=float(above - below), place=place, extremum=float(N(place))
@@ -205,9 +205,9 @@ def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: flo
 
     At a zero of N it is the lobe above.
     """
-    found = lobes(N, zeta - reach, zeta + reach)
-    inside = [lobe for lobe in found if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]
-    if not inside or inside[0] in (found[0], found[-1]):
+    near = lobes(N, zeta - reach, zeta + reach)
+    inside = [lobe for lobe in near if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]
+    if not inside or inside[0] in (near[0], near[-1]):
         raise ParameterError(
             f"the Nussbaum function has no zeros on both sides of zeta = {zeta:g} within {reach:g}"
         )
@@ -250,10 +250,10 @@ def nussbaum_property(
     >>> [(lobe.low, lobe.high) for lobe in found.lobes[:3]]  # cos(pi zeta / 2) changes its sign
     [(0.0, 1.0), (1.0, 3.0), (3.0, 5.0)]
     """
-    end, found, whole = _with_lobes(N) if end is None else _lobes_until(N, end)
+    end, all_lobes, whole = _with_lobes(N) if end is None else _lobes_until(N, end)
     if len(whole) < 4:
         return NussbaumProperty(
-            end=end, lobes=found, means=(), ratios=(), type_a=False, type_b=False
+            end=end, lobes=all_lobes, means=(), ratios=(), type_a=False, type_b=False
         )
     integrals = np.array([lobe.integral for lobe in whole])
     ends = np.array([lobe.high for lobe in whole])
@@ -266,7 +266,7 @@ def nussbaum_property(
     parts = (up / ends)[rising], (down / ends)[falling]
     return NussbaumProperty(
         end=end,
-        lobes=found,
+        lobes=all_lobes,
         means=tuple(map(float, means)),
         ratios=tuple(map(float, np.abs(integrals[1:] / integrals[:-1]))),
         type_a=type_a,
@@ -276,13 +276,13 @@ def nussbaum_property(
 
 def _lobes_until(N: GainFunction, end: float) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
     """Return the end, the lobes on [0, end], and those that it does not cut off."""
-    found, whole = _whole_lobes(N, end)
+    all_lobes, whole = _whole_lobes(N, end)
     if len(whole) < 4:
         raise ParameterError(
             f"property (12) needs four lobes of N at least, [0, {end:g}] holds {len(whole)}: "
             "choose a longer range"
         )
-    return end, found, whole
+    return end, all_lobes, whole
 
 
 def _with_lobes(N: GainFunction) -> tuple[float, tuple[Lobe, ...], tuple[Lobe, ...]]:
@@ -306,9 +306,9 @@ def _finite_until(N: GainFunction, end: float) -> float:
 
 
 def _whole_lobes(N: GainFunction, end: float) -> tuple[tuple[Lobe, ...], tuple[Lobe, ...]]:
-    found = lobes(N, 0.0, end, step=max(0.01, end / 4000))
-    last = abs(N(end)) <= 1e-9 * abs(found[-1].extremum)
-    return found, found if last else found[:-1]
+    all_lobes = lobes(N, 0.0, end, step=max(0.01, end / 4000))
+    last = abs(N(end)) <= 1e-9 * abs(all_lobes[-1].extremum)
+    return all_lobes, all_lobes if last else all_lobes[:-1]
 
 
 def _grows(values: np.ndarray) -> bool:

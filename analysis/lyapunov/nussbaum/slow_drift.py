@@ -86,8 +86,8 @@ class SlowDrift:
         reverses before; and the earliest and the latest time when mean rate and dependence on
         1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
         is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference go on as
-        they were.
+        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue
+        as they were.
     balance : Balance
         The law fitted to all windows.
     rest, rest_range : float or None, tuple of float or None
@@ -213,7 +213,7 @@ def slow_drift(
     skip: int = 1,
     kG: float = 1.0,
 ) -> SlowDrift:
-    """Tell from a response how the slow drift of zeta will go on.
+    """Predict from a response how the slow drift of zeta continues.
 
     The prediction supposes that disturbance and reference stay as they were; a chirp does not.
 
@@ -340,10 +340,10 @@ def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
     """
     if not (balance.p > 0 and balance.q > 0):
         return None
-    wanted = balance.p / balance.q
-    if wanted >= abs(lobe.extremum):
+    gain = balance.p / balance.q
+    if gain >= abs(lobe.extremum):
         return None
-    return root(lambda z: abs(N(z)) - wanted, lobe.low, lobe.place)
+    return root(lambda z: abs(N(z)) - gain, lobe.low, lobe.place)
 
 
 def _rest(
@@ -353,14 +353,14 @@ def _rest(
 
     A fit in which the drift does not stop counts as the lobe's upper end.
     """
-    found = []
+    rests = []
     for part in np.array_split(np.arange(rates.size), BLOCKS):
         rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
-        found.append(lobe.high if rest is None else rest)
+        rests.append(lobe.high if rest is None else rest)
     rest = _rest_of(_fitted(rates, inverse), N, lobe)
-    if rest is None and min(found) == lobe.high:
+    if rest is None and min(rests) == lobe.high:
         return None, None
-    return rest, (min(found), max(found))
+    return rest, (min(rests), max(rests))
 
 
 def _forecast(
@@ -369,7 +369,7 @@ def _forecast(
     """Return how long the budget lasts, and the shortest and the longest time that it may.
 
     The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0.  Windows that saw little of the lobe
-    tell little of p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
+    say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
     """
     mean, centre = float(rates.mean()), float(inverse.mean())
     slope, of_slope, of_mean = _slope(rates, inverse)

@@ -33,31 +33,16 @@ __all__ = ["Demand", "FilteredLoop", "as_filtered", "between", "demand", "feedfo
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredLoop:
-    """A loop whose controller sees the plant through the filtered error r of (14).
-
-    Attributes
-    ----------
-    roles : Roles
-    reference : SumOfSines
-    starts : Starts
-        Initial states.
-    e0 : tuple of n arb
-        Initial errors e_1(0), ..., e_n(0): of all starts.
-    acceleration : callable
-        x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
-    content : LoopContent
-        What the loop consists of.
-    """
+    """A loop whose controller sees the plant through the filtered error r of (14)."""
 
     roles: Roles = field(repr=False)
     reference: SumOfSines
-    starts: Starts
-    e0: tuple[arb, ...]
+    starts: Starts  # initial states
+    e0: tuple[arb, ...]  # initial errors e_1(0), ..., e_n(0): of all starts
+    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
     acceleration: Acceleration
-    content: LoopContent = field(repr=False)
-    disturbance: float = 0.0
+    content: LoopContent = field(repr=False)  # what the loop consists of
+    disturbance: float = 0.0  # bound of what external inputs add to the plant's v
 
     @property
     def law(self) -> Any:
@@ -110,36 +95,18 @@ def between(low: float, high: float) -> arb:
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """What the plant asks of the controller while |r| <= C; of the gains only lambda enters.
+    """What the plant asks of the controller while |r| <= C; of the gains only lambda enters."""
 
-    Attributes
-    ----------
-    C : float
-        Bound of |r|.
-    box : Box
-        What x stays in.
-    errors : tuple of float
-        Bounds of |e_1|, ..., |e_n|.
-    G_min, G_max : float
-        Proved bounds of G = F/v over the box, for all v.
-    matched : float
-        Proved bound of |g(x) + d(x, t)| over the box, for all t.
-    delta_star : float
-        matched + G_max eps_u*.
-    boxes : int
-        Boxes of the proofs.
-    arithmetic : {"balls", "floats"}
-        What proved them; balls where only some are floats'.
-    """
-
-    C: float
-    box: Box
-    errors: tuple[float, ...]
+    C: float  # bound of |r|
+    box: Box  # what x stays in
+    errors: tuple[float, ...]  # bounds of |e_1|, ..., |e_n|
+    # proved bounds of G = F/v over the box, for all v
     G_min: float
     G_max: float
-    matched: float
-    delta_star: float
-    boxes: int
+    matched: float  # proved bound of |g(x) + d(x, t)| over the box, for all t
+    delta_star: float  # matched + G_max eps_u*
+    boxes: int  # boxes of the proofs
+    # what proved them; balls where only some are floats'
     arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
@@ -152,8 +119,8 @@ class Demand:
 def demand(loop: FilteredLoop, split: Decomposition, C: float, *, tol: float = 1e-3) -> Demand:
     """Bound what the plant asks of the controller while |r| <= C."""
     errors = error_bounds(loop.lambdas, loop.e0, arb(C))
-    wanted = reference_bounds(loop.reference)
-    reach = tuple(upper(e + y) for e, y in zip(errors, wanted, strict=False))
+    commands = reference_bounds(loop.reference)
+    reach = tuple(upper(e + y) for e, y in zip(errors, commands, strict=False))
     low, names = tuple(-a for a in reach), coordinate_names(len(reach))
     box = Box(names=names, low=low, high=reach, how=f"|r| <= {C:.6g}")
 
@@ -199,6 +166,6 @@ def _terms(rate: Acceleration) -> tuple[Readable, Readable]:
 def feedforward(loop: FilteredLoop, need: Demand) -> arb:
     """Bound |Y_d| of (18) by the errors and the n-th derivative of the reference."""
     A = [abs(arb(a)) for a in reversed(loop.lambdas)]
-    wanted = reference_bounds(loop.reference)
-    own = (a * e for a, e in zip(A, need.errors[1:], strict=True))
-    return arb(wanted[len(A) + 1]) + sum(own, arb(0))
+    commands = reference_bounds(loop.reference)
+    error_terms = (a * e for a, e in zip(A, need.errors[1:], strict=True))
+    return arb(commands[len(A) + 1]) + sum(error_terms, arb(0))

@@ -28,24 +28,12 @@ _POLE = Fraction(1, 2**40)  # relative: half the width of an irrational pole
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredCertificate(Certificate):
-    """A certificate about |r|, of a loop whose controller sees the plant through r of (14).
+    """A certificate about |r|, of a loop whose controller sees the plant through r of (14)."""
 
-    Attributes
-    ----------
-    C_0 : float
-        Bound of |r| for all time, from all `starts`.
-    ultimate : float
-        Bound of limsup |r|.
-    u_max : float
-        Bound of |u| for all time.
-    loop : FilteredLoop
-        The parameters that it is about.
-    """
-
-    C_0: float
-    ultimate: float
-    u_max: float
-    loop: Any
+    C_0: float  # bound of |r| for all time, from all `starts`
+    ultimate: float  # bound of limsup |r|
+    u_max: float  # bound of |u| for all time
+    loop: Any  # the parameters that it is about
 
     def _of_plant(self) -> Iterator[Row]:
         need, over = self.region, str(self.region.box)
@@ -59,7 +47,7 @@ class FilteredCertificate(Certificate):
         yield "delta*", need.delta_star, unit, self._sure, "sup |g + d| + G_max eps_u*", over
 
     def _numbers(self) -> tuple[Mapping[str, float], Content]:
-        """Return the gains, and the states by part, as they stand in a file."""
+        """Return the gains, and the states by part, as a file has them."""
         raise NotImplementedError
 
     def _attempts(self) -> Iterator[Content]:
@@ -75,8 +63,8 @@ class FilteredCertificate(Certificate):
             **states,
         }
         for raised, wider in _WIDER:
-            found = demand(loop, self.split, need.C * (1 + raised)) if raised else need
-            yield {"premises": premises, "proof": _proof(loop, found, Fraction(wider))}
+            region = demand(loop, self.split, need.C * (1 + raised)) if raised else need
+            yield {"premises": premises, "proof": _proof(loop, region, Fraction(wider))}
 
 
 def _equation(loop: FilteredLoop) -> list[list[Any]]:

@@ -39,36 +39,20 @@ class ProofOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Subject:
-    """What a proof is about, before a box is looked at.
+    """What a proof is about, before a box is examined."""
 
-    Attributes
-    ----------
-    loop : object
-        The loop as the proof reads it, with its `starts` and `disturbance`.
-    start : arb
-        What is bounded, at the starts.
-    actuator : record
-    split : Decomposition
-        Of the actuator, with what external inputs add.
-    u_max : float
-        Half the range of u for which the split is proved.
-    tol : float
-    matching : object
-        What else the kind of proof has found.
-    """
-
-    loop: Any
-    start: arb
+    loop: Any  # the loop as the proof reads it, with its `starts` and `disturbance`
+    start: arb  # what is bounded, at the starts
     actuator: Any
-    split: Decomposition
-    u_max: float
+    split: Decomposition  # of the actuator, with what external inputs add
+    u_max: float  # half the range of u for which the split is proved
     tol: float
-    matching: Any = field(default=None, repr=False)
+    matching: Any = field(default=None, repr=False)  # what else the kind of proof has found
 
 
 @dataclass(frozen=True, kw_only=True)
 class Closed:
-    """The last step of the iteration, and what became of it."""
+    """The last step of the iteration, and its outcome."""
 
     region: Any
     bound: Any
@@ -120,8 +104,8 @@ class ProofKind:
         ``endless(region, iterations)`` says why the iteration is given up; nothing if it is not.
     largest_input : callable, optional
         ``largest_input(subject, region, bound)`` returns a bound of |u|.
-    found : callable, optional
-        ``found(subject, closed)`` returns the fields of `result` that are its own.
+    fields : callable, optional
+        ``fields(subject, closed)`` returns the fields of `result` that are its own.
     """
 
     name: str
@@ -136,7 +120,7 @@ class ProofKind:
     bound: Callable[[Subject, Any], Any] | None = None
     endless: Callable[[Any, Sequence[float]], str] = _not_looked_at
     largest_input: Callable[[Subject, Any, Any], float] | None = None
-    found: Callable[[Subject, Closed], Mapping[str, Any]] | None = None
+    fields: Callable[[Subject, Closed], Mapping[str, Any]] | None = None
 
 
 def certified(kind: Any, loop: Any, options: ProofOptions) -> Certificate:
@@ -158,7 +142,7 @@ def certified(kind: Any, loop: Any, options: ProofOptions) -> Certificate:
         arithmetic=closed.region.arithmetic,
         params=dict(options.params or {}),
         loop_facts=dict(subject.loop.content.facts),
-        **kind.found(subject, closed),
+        **kind.fields(subject, closed),
         seconds=time.perf_counter() - begun,
     )
 

@@ -75,7 +75,7 @@ class ProofResult:
     reason : str
         Why it holds, or what is missing.
     boxes : int
-        Boxes that were looked at.
+        Boxes that were examined.
     arithmetic : str
         What proved it.
     seconds : float
@@ -136,7 +136,7 @@ class Certificate(ProofResult):
         Bounds, each of what the box of the one before implies: the iteration that closed or was
         given up.
     params : mapping
-        Parameters of the proof that are not those of the loop as it stands.
+        Parameters of the proof that differ from those of the loop.
     loop_facts : mapping
         What the loop consists of, see `nlctl.analysis.loop_record`.
 

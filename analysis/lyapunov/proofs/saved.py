@@ -41,13 +41,13 @@ def save_certificate(
     """Write the first of some attempts that the recheck answers with yes."""
     why = "there is nothing to be written"
     try:
-        for made in attempts():
+        for attempt in attempts():
             content = {
                 "format": FORMAT[0],
                 "version": FORMAT[1],
                 "kind": kind,
                 "loop": name,
-                **made,
+                **attempt,
             }
             try:
                 bounds = proved_bounds(content)
@@ -78,7 +78,7 @@ def texts(values: Iterable[Any]) -> list[str]:
 
 
 def split_content(split: Decomposition) -> Content:
-    """Return the split of an actuator as it stands in a file."""
+    """Return the split of an actuator as a file has it."""
     endless = split.largest_u == float("inf")
     return {
         "k_1": str(exact(split.k_1)),

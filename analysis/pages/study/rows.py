@@ -54,7 +54,7 @@ def setup_items(result: Result, published: Published | None = None) -> Iterator[
         caption=text.SPEC,
         columns=("id",) * ids + ("requirement", "formula", "until (s)", "meaning"),
         rows=[
-            (study.spec[key].id,) * ids + (key, row["formula"], row["until"], row["meaning"])
+            (study.spec[str(key)].id,) * ids + (key, row["formula"], row["until"], row["meaning"])
             for key, row in result.requirements.iterrows()
         ],
     )

@@ -58,31 +58,31 @@ def chunk_table(
     start = time.perf_counter()
     table = rows(design, numbers) if points is None else points
     try:
-        found = evaluate(prepared, table, threads=threads, progress=progress)
+        results = evaluate(prepared, table, threads=threads, progress=progress)
     except UsageError as error:
         raise type(error)(f"{error} (in rows {numbers[0]} to {numbers[-1]})") from error
-    if len(found) < len(numbers):
+    if len(results) < len(numbers):
         raise KeyboardInterrupt
     seeds = np.array([seed_number(design, number) for number in numbers], dtype=np.uint64)
     spent = (time.perf_counter() - start) / max(len(numbers), 1)
-    return typed(found.assign(seed=seeds, wall_time=spent), columns_of(prepared))
+    return typed(results.assign(seed=seeds, wall_time=spent), columns_of(prepared))
 
 
 def computed_here(
     prepared: Prepared,
     design: Design,
     chunks: Iterable[range],
-    wanted: Callable[[], bool],
+    wants_more: Callable[[], bool],
     *,
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Generator[Chunk, None, None]:
     """Yield chunk after chunk, until no more are wanted."""
     for numbers in chunks:
-        if not wanted():
+        if not wants_more():
             return
-        found = chunk_table(prepared, design, numbers, threads=threads, progress=progress)
-        yield numbers, found
+        results = chunk_table(prepared, design, numbers, threads=threads, progress=progress)
+        yield numbers, results
 
 
 def computed_elsewhere(
@@ -90,7 +90,7 @@ def computed_elsewhere(
     prepared: Prepared,
     design: Design,
     chunks: Iterable[range],
-    wanted: Callable[[], bool],
+    wants_more: Callable[[], bool],
     *,
     threads: int | None = None,
 ) -> Generator[Chunk, None, None]:
@@ -113,7 +113,7 @@ def computed_elsewhere(
 
     try:
         while True:
-            if wanted() and not failures:
+            if wants_more() and not failures:
                 for numbers in islice(todo, 2 * workers - len(waiting)):
                     begin(numbers)
             else:
@@ -181,7 +181,7 @@ def _failure(future: Future) -> BaseException | None:
 
 
 def _raise(numbers: range, error: BaseException) -> None:
-    """Raise what ended a chunk; a lost worker is told from an error of the experiment."""
+    """Raise what ended a chunk; a lost worker is distinguished from an error of the experiment."""
     # Dask's errors are known by their names: it need not be installed
     if isinstance(error, BrokenExecutor | CancelledError) or "Killed" in type(error).__name__:
         raise LostChunkError(

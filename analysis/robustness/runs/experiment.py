@@ -198,10 +198,10 @@ def prepare(experiment: Experiment) -> Prepared:
     for _, diagram in built:
         input_array(diagram, experiment.inputs, experiment.timepts)
         resolved(full, diagram)  # the full names must be known to every diagram
-        for asked in (*experiment.spec.requirements, *experiment.metrics):
-            for signal in asked.signals:
+        for measure in (*experiment.spec.requirements, *experiment.metrics):
+            for signal in measure.signals:
                 if signal not in diagram.output_labels:
-                    raise unknown("signal", signal, diagram.output_labels, f"for '{asked.key}'")
+                    raise unknown("signal", signal, diagram.output_labels, f"for '{measure.key}'")
     loops = tuple((labels, compiled(diagram)) for labels, diagram in built)
     return Prepared(experiment=replace(experiment, space=full), loops=loops)
 
@@ -316,18 +316,18 @@ def _run(
 ) -> pd.DataFrame:
     requirements = experiment.spec.requirements
     metrics = (*map(_fast, experiment.metrics), *requirements)
-    made = simulate_rows(
+    simulated = simulate_rows(
         experiment, loop, rows, metrics=metrics, threads=threads, progress=progress
     )
-    found = made.table.reindex(columns=experiment.measured)
-    found = found.set_axis(rows.index[found.index.to_numpy()])
-    failed = found["status"] != Status.OK.name
+    results = simulated.table.reindex(columns=experiment.measured)
+    results = results.set_axis(rows.index[results.index.to_numpy()])
+    failed = results["status"] != Status.OK.name
     end = float(experiment.timepts[-1])
-    graded = [unfinished_margin(time, end) for time in found.loc[failed, "time"]]
+    graded = [unfinished_margin(time, end) for time in results.loc[failed, "time"]]
     for requirement in requirements:
-        found.loc[failed, requirement.key] = graded
-    found["spec"] = np.min(found.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
-    return found
+        results.loc[failed, requirement.key] = graded
+    results["spec"] = np.min(results.loc[:, [r.key for r in requirements]].to_numpy(), axis=1)
+    return results
 
 
 def compile_experiment_ahead(prepared: Prepared) -> None:
@@ -369,7 +369,7 @@ def typed(frame: pd.DataFrame, columns: Columns) -> pd.DataFrame:
     """Return those columns that a frame has, in their order and with their types."""
     for name, kind in columns.items():
         if name in frame and not isinstance(kind, str):
-            others = frame[name][~frame[name].isin(list(kind))]
+            others: Any = frame[name][~frame[name].isin(list(kind))]
             if len(others):
                 raise ValueError(
                     f"column '{name}' holds {str(others.iloc[0])[:40]!r}, no label of it"

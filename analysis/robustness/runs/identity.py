@@ -104,9 +104,9 @@ def versions_of_numbers() -> dict[str, str]:
             name = path.relative_to(root).as_posix()
             if not name.startswith(TOLD):
                 source.update(f"{name}\0".encode() + path.read_bytes())
-    own = f"{metadata.version('nlctl')} ({source.hexdigest()[:12]})"
-    found = {name: metadata.version(name) for name in VERSIONS}
-    return {"nlctl": own, **found, "python": platform.python_version()}
+    version = f"{metadata.version('nlctl')} ({source.hexdigest()[:12]})"
+    libraries = {name: metadata.version(name) for name in VERSIONS}
+    return {"nlctl": version, **libraries, "python": platform.python_version()}
 
 
 def _quantity(quantity: Uncertain) -> dict[str, Any]:

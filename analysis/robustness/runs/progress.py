@@ -46,7 +46,7 @@ class Progress:
     >>> now.remaining  # 700 rows at 100 a second
     7.0
     >>> low, high = now.interval(confidence=0.99)
-    >>> low, 0.015 < high < 0.05  # wider than 1 - 0.01^(1/300), which may be looked at once only
+    >>> low, 0.015 < high < 0.05  # wider than 1 - 0.01^(1/300), which may be inspected once only
     (0.0, True)
     """
 
@@ -64,7 +64,7 @@ class Progress:
 
     @as_annotated
     def interval(self, confidence: float = 0.99) -> tuple[float, float] | None:
-        """Return bounds of the probability of a violation that may be looked at any time.
+        """Return bounds of the probability of a violation that may be inspected at any time.
 
         See `sequential.sequence_bounds`.
 
@@ -104,7 +104,7 @@ class Tally:
 
     def count(self, numbers: range, margins: np.ndarray) -> None:
         """Take a chunk's margins ``spec`` in."""
-        insort(self.ranges, numbers, key=lambda known: known.start)
+        insort(self.ranges, numbers, key=lambda done: done.start)
         self.done += len(numbers)
         self._beyond[numbers.start] = len(numbers), int(np.count_nonzero(violates(margins)))
         while self.runs in self._beyond:

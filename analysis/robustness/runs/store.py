@@ -66,20 +66,11 @@ class StoreError(UsageError):
 
 @dataclass(frozen=True, kw_only=True)
 class ChunkStore:
-    """A folder with chunks of one study.
-
-    Attributes
-    ----------
-    folder : Path
-    identity : mapping
-        See `identity.identity_of`.
-    columns : mapping
-        See `experiment.columns_of`.
-    """
+    """A folder with chunks of one study."""
 
     folder: Path
-    identity: Mapping[str, Any]
-    columns: Columns
+    identity: Mapping[str, Any]  # see `identity.identity_of`
+    columns: Columns  # see `experiment.columns_of`
 
     @property
     def chunks(self) -> Path:
@@ -220,7 +211,7 @@ def put(store: ChunkStore, frame: pd.DataFrame) -> None:
 
 
 def _seal(column: Any) -> str:
-    """Return a key of a column's values, which whoever edits the file does not keep."""
+    """Return a key of a column's values, which an edit of the file changes."""
     is_number = isinstance(column.dtype, np.dtype) and column.dtype.kind in "iufb"
     text = b"" if is_number else "\0".join(map(str, column)).encode()
     return hashlib.sha256(column.to_numpy().tobytes() if is_number else text).hexdigest()[:16]
@@ -236,12 +227,12 @@ def _check_seals(path: Path, frame: pd.DataFrame) -> None:
 
 def _ranges(store: ChunkStore) -> list[range]:
     """Return the rows of every chunk file, in order."""
-    found = []
+    ranges = []
     for path in sorted(store.chunks.glob("*.parquet")):
         name = re.fullmatch(r"(\d+)-(\d+)", path.stem)
         if name:
-            found.append(range(int(name[1]), int(name[2]) + 1))
-    return sorted(found, key=lambda numbers: numbers.start)
+            ranges.append(range(int(name[1]), int(name[2]) + 1))
+    return sorted(ranges, key=lambda numbers: numbers.start)
 
 
 def _path(store: ChunkStore, numbers: range) -> Path:
@@ -291,7 +282,7 @@ def table_of(store: ChunkStore, columns: Sequence[str] | None = None) -> pd.Data
             raise ValueError("they hold other rows than their names say")
         return frame
     except (OSError, ValueError, LookupError, TypeError) as error:
-        reason = str(error).partition("\n")[0]  # pyarrow's go on with every column
+        reason = str(error).partition("\n")[0]  # pyarrow's list every column
         raise StoreError(
             f"cannot read the chunks in '{store.chunks}': {reason}. Run damaged ones again with "
             "resume=True (--resume)"

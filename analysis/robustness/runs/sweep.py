@@ -35,10 +35,10 @@ FEWEST = 20  # chunks of a sweep, so that a kill costs little
 _STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
 
 
-def _check_columns(names: Iterable[str], known: list[str]) -> None:
+def _check_columns(names: Iterable[str], columns: list[str]) -> None:
     for name in names:
-        if name not in known:
-            raise unknown("column", name, known, "of the sweep")
+        if name not in columns:
+            raise unknown("column", name, columns, "of the sweep")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -252,12 +252,16 @@ def sweep(
         tally.restart()
         run = _Run(tally=tally, interrupt=interrupt, progress=progress, stop=stop)
         todo = tally.missing(chunk)
-        found = (
-            computed_here(prepared, design, todo, run.wanted, threads=threads, progress=run.tell)
+        chunks = (
+            computed_here(
+                prepared, design, todo, run.wants_more, threads=threads, progress=run.report
+            )
             if executor is None
-            else computed_elsewhere(executor, prepared, design, todo, run.wanted, threads=threads)
+            else computed_elsewhere(
+                executor, prepared, design, todo, run.wants_more, threads=threads
+            )
         )
-        notes += run.through(stack.enter_context(closing(found)), keep)
+        notes += run.through(stack.enter_context(closing(chunks)), keep)
     held = None
     if folder is None:
         frames = frames or [chunk_table(prepared, design, range(0))]
@@ -289,12 +293,12 @@ def _check(
 
 
 def _check_space(prepared: Prepared, design: Design) -> None:
-    known, given = prepared.experiment.space.names, design.space.names
+    names, given = prepared.experiment.space.names, design.space.names
     for name in given:
-        if name not in known:
-            raise unknown("quantity", name, known, "in the design: take prepared.experiment.space")
-    if known != given:
-        raise ParameterError(f"the experiment's space has {known}, the design's has {given}")
+        if name not in names:
+            raise unknown("quantity", name, names, "in the design: take prepared.experiment.space")
+    if names != given:
+        raise ParameterError(f"the experiment's space has {names}, the design's has {given}")
 
 
 def _chunk_size(design: Design) -> int:
@@ -304,17 +308,17 @@ def _chunk_size(design: Design) -> int:
 def _continued(store: ChunkStore, tally: Tally) -> list[str]:
     """Count the chunks that are there; return what is to be said of damaged ones."""
     notes = []
-    for numbers, found in taken_up(store):
-        if isinstance(found, str):
-            notes.append(found)
+    for numbers, statuses in taken_up(store):
+        if isinstance(statuses, str):
+            notes.append(statuses)
         else:
-            tally.count(numbers, found)
+            tally.count(numbers, statuses)
     return notes
 
 
 @dataclass(kw_only=True)
 class _Run:
-    """A sweep on its way: counts, and reasons to end it."""
+    """A running sweep: counts, and reasons to end it."""
 
     tally: Tally
     interrupt: Interrupt
@@ -322,11 +326,11 @@ class _Run:
     stop: Callable[[Progress], Any] | None
     decided: Any = None
 
-    def wanted(self) -> bool:
+    def wants_more(self) -> bool:
         """Whether another chunk should begin."""
         return not (self.interrupt.asked or self.decided)
 
-    def tell(self, unfinished: int = 0) -> None:
+    def report(self, unfinished: int = 0) -> None:
         """Report the progress."""
         if self.progress is not None:
             self.progress(self.tally.progress(unfinished))
@@ -342,13 +346,13 @@ class _Run:
         keep: Callable[[pd.DataFrame], object],
     ) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
-        self.tell()
+        self.report()
         self.consider()
         try:
             for numbers, frame in chunks:
                 keep(frame)
                 self.tally.count(numbers, frame["spec"].to_numpy())
-                self.tell()
+                self.report()
                 self.consider()
         except LostChunkError as lost:
             return [str(lost)]

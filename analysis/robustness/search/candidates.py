@@ -18,7 +18,7 @@ from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
 __all__ = [
-    "Found",
+    "Search",
     "corner_count",
     "evolve",
     "in_batches",
@@ -42,7 +42,7 @@ EXTREME = 1e9
 """CMA-ES, which needs finite numbers, sees margins up to this size."""
 
 
-class Found:
+class Search:
     """The rows that were run so far."""
 
     def __init__(self, evaluate: Evaluate, space: Space, runs: int, target: float | None) -> None:
@@ -84,23 +84,23 @@ class Found:
         return margins
 
 
-def search_worst(found: Found, rng: np.random.Generator) -> None:
+def search_worst(search: Search, rng: np.random.Generator) -> None:
     """Run rows until the budget is spent or the target met; see `worst_case.worst_case`."""
-    space = found.space
+    space = search.space
     is_finite = not space.quantities or space.scale == 0  # the corners are everything
-    share = found.runs if is_finite else max(found.runs // _SHARE, 1)
+    share = search.runs if is_finite else max(search.runs // _SHARE, 1)
     has_all = corner_count(space) <= share
     some = corners(space).table if has_all else some_corners(space, share, rng)
-    in_batches(found, "corners", some)
+    in_batches(search, "corners", some)
     if is_finite:
         return
-    in_batches(found, "uniform", uniform(space, min(share, found.left), rng))
+    in_batches(search, "uniform", uniform(space, min(share, search.left), rng))
     for restart in itertools.count():
         size = int(max(GENERATION, 4 + 3 * np.log(len(space.quantities)))) << restart
-        if size > found.left:
+        if size > search.left:
             break
-        evolve(found, rng, size, is_first=restart == 0)
-    in_batches(found, "uniform", uniform(space, found.left, rng))
+        evolve(search, rng, size, is_first=restart == 0)
+    in_batches(search, "uniform", uniform(space, search.left, rng))
 
 
 def corner_count(space: Space) -> int:
@@ -121,30 +121,30 @@ def uniform(space: Space, count: int, rng: np.random.Generator) -> pd.DataFrame:
     return from_unit_cube(space, rng.random((count, len(space.names))))
 
 
-def in_batches(found: Found, searcher: str, table: pd.DataFrame) -> None:
+def in_batches(search: Search, searcher: str, table: pd.DataFrame) -> None:
     """Run rows of a table until the target is met."""
     for first in range(0, len(table), BATCH):
-        if found.left:
-            found.run(searcher, table.iloc[first : first + min(BATCH, found.left)])
+        if search.left:
+            search.run(searcher, table.iloc[first : first + min(BATCH, search.left)])
 
 
 def evolve(
-    found: Found, rng: np.random.Generator, size: int, *, is_first: bool, most: int | None = None
+    search: Search, rng: np.random.Generator, size: int, *, is_first: bool, most: int | None = None
 ) -> None:
     """One search by CMA-ES with `size` rows in a generation, and `most` generations."""
-    space, d = found.space, len(found.space.quantities)
-    start = found.points.iloc[[np.argmin(found.margins)]] if is_first else uniform(space, 1, rng)
+    space, d = search.space, len(search.space.quantities)
+    start = search.points.iloc[[np.argmin(search.margins)]] if is_first else uniform(space, 1, rng)
     labels = start[[choice.name for choice in space.choices]].iloc[0].to_dict()
     strategy = _strategy(unit_places(space, start)[0], size, rng)
     for generation in itertools.count():
-        if strategy.stop() or found.left < size or generation == most:
+        if strategy.stop() or search.left < size or generation == most:
             break
-        asked = strategy.ask()
+        proposed = strategy.ask()
         unit = np.full((size, len(space.names)), 0.5)
-        unit[:, :d] = np.clip(asked, 0.0, 1.0)[:, :d]
-        margins = found.run("CMA-ES", from_unit_cube(space, unit).assign(**labels))
+        unit[:, :d] = np.clip(proposed, 0.0, 1.0)[:, :d]
+        margins = search.run("CMA-ES", from_unit_cube(space, unit).assign(**labels))
         with _quiet():
-            strategy.tell(asked, list(np.clip(margins, -EXTREME, EXTREME)))
+            strategy.tell(proposed, list(np.clip(margins, -EXTREME, EXTREME)))
 
 
 def unit_places(space: Space, table: pd.DataFrame) -> np.ndarray:

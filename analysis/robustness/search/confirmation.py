@@ -133,12 +133,16 @@ def confirm(
     table = as_table(study.space, [row])
     replays = []
     for experiment in (study, *(replace(tighter, method=method) for method in _OTHERS)):
-        found = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
-        replays.append(_replay("native", experiment, found["status"], found["time"], found["spec"]))
+        row_result = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
+        replays.append(
+            _replay(
+                "native", experiment, row_result["status"], row_result["time"], row_result["spec"]
+            )
+        )
     if python_control:
         replays.append(_in_python_control(prepared, tighter, table))
-    made = pd.DataFrame(replays)
-    return Confirmation(row=dict(row), replays=made, reason=_reason(made))
+    table_of_replays = pd.DataFrame(replays)
+    return Confirmation(row=dict(row), replays=table_of_replays, reason=_reason(table_of_replays))
 
 
 def _replay(
@@ -166,7 +170,7 @@ def _in_python_control(
     ((loop, _),) = by_diagram(prepared, table)
     given = arguments(experiment.space, table)
     end = float(experiment.timepts[-1])
-    told = partial(_replay, "python-control", experiment, method=_REFERENCE)
+    replay = partial(_replay, "python-control", experiment, method=_REFERENCE)
     try:
         response = input_output_response(
             loop.system,
@@ -181,11 +185,11 @@ def _in_python_control(
         )
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)
-        return told(Status.DIVERGED.name, error.time, margin)
+        return replay(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
     breaks = breaks_of(response)
     margin = margins(experiment.spec, experiment.timepts, signals, breaks=breaks)["spec"]
-    return told(Status.OK.name, end, margin)
+    return replay(Status.OK.name, end, margin)
 
 
 def _reason(replays: pd.DataFrame) -> str:

@@ -138,12 +138,12 @@ def degradation_curve(
     runs = integer("a degradation curve", "runs", runs, at_least=1)
     of_type("a degradation curve", "space", space, Space)
     entropy = checked_entropy(entropy)
-    each = 1 - (1 - confidence) / len(sizes) if simultaneous else confidence
+    singly = 1 - (1 - confidence) / len(sizes) if simultaneous else confidence
     statements, margins = [], []
     for factor in sizes:
         design = independent(scaled(space, factor), runs, entropy)
         margins.append(evaluated(evaluate, design.table)["spec"].to_numpy(dtype=float))
-        statements.append(violation_probability(design, margins[-1], each, "both"))
+        statements.append(violation_probability(design, margins[-1], singly, "both"))
     return Degradation(
         factors=tuple(sizes),
         statements=tuple(statements),

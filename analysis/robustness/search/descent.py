@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..uncertainty.space import Space, from_unit_cube
-from .candidates import GENERATION, Found, evolve, in_batches, some_corners, uniform, unit_places
+from .candidates import GENERATION, Search, evolve, in_batches, some_corners, uniform, unit_places
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 __all__ = ["search_with_derivatives", "test_signals"]
@@ -34,21 +34,21 @@ _PIECE = re.compile(r"(.*)\[(\d+)\]")
 
 
 def search_with_derivatives(
-    found: Found, rng: np.random.Generator, derivatives: FirstOrderOf
+    search: Search, rng: np.random.Generator, derivatives: FirstOrderOf
 ) -> list[str]:
     """Run rows until the budget is spent or the target met; return why derivatives ended."""
     reasons: dict[str, None] = {}
-    tests = from_unit_cube(found.space, test_signals(found.space))
+    tests = from_unit_cube(search.space, test_signals(search.space))
     for k in range(len(tests)):  # few are needed, often
-        in_batches(found, "test signals", tests.iloc[[k]])
-    _descend(found, derivatives, reasons, 0)
-    while found.left:
-        first = found.margins.size
+        in_batches(search, "test signals", tests.iloc[[k]])
+    _descend(search, derivatives, reasons, 0)
+    while search.left:
+        first = search.margins.size
         for searcher, draw in (("corners", some_corners), ("uniform", uniform)):
-            in_batches(found, searcher, draw(found.space, min(_DRAWS, found.left), rng))
-        _descend(found, derivatives, reasons, first)
-        if found.left >= GENERATION:
-            evolve(found, rng, GENERATION, is_first=True, most=_GENERATIONS)
+            in_batches(search, searcher, draw(search.space, min(_DRAWS, search.left), rng))
+        _descend(search, derivatives, reasons, first)
+        if search.left >= GENERATION:
+            evolve(search, rng, GENERATION, is_first=True, most=_GENERATIONS)
     return list(reasons)
 
 
@@ -65,20 +65,20 @@ def test_signals(space: Space) -> np.ndarray:
     for place, name in enumerate(quantities):
         if (piece := _PIECE.fullmatch(name)) is not None:
             signals.setdefault(piece[1], []).append(place)
-    pieces = [each for each in signals.values() if len(each) > 1]
-    singles = [k for k in range(len(quantities)) if not any(k in each for each in pieces)]
+    pieces = [group for group in signals.values() if len(group) > 1]
+    singles = [k for k in range(len(quantities)) if not any(k in group for group in pieces)]
     groups = pieces or [[k] for k in singles]
-    made = []
+    signals_found = []
 
     def add(values: Any) -> None:
         row = np.full(len(space.names), 0.5)
         for group, value in zip(groups, values, strict=True):
             row[group] = value
-        made.append(row)
+        signals_found.append(row)
 
-    halves = [np.arange(len(each)) >= len(each) // 2 for each in groups]
+    halves = [np.arange(len(group)) >= len(group) // 2 for group in groups]
     if pieces:
-        add([1.0 - np.arange(len(each)) % 2 for each in groups])
+        add([1.0 - np.arange(len(group)) % 2 for group in groups])
         add([1.0 * half for half in halves])
     for number in itertools.islice(range(1 << min(len(groups), 30)), _MOST_CONSTANT):
         gray = number ^ (number >> 1)
@@ -86,43 +86,45 @@ def test_signals(space: Space) -> np.ndarray:
     add([0.5] * len(groups))
     if pieces:
         add([1.0 - half for half in halves])
-    return np.array(made)
+    return np.array(signals_found)
 
 
-def _descend(found: Found, derivatives: FirstOrderOf, reasons: dict[str, None], first: int) -> None:
+def _descend(
+    search: Search, derivatives: FirstOrderOf, reasons: dict[str, None], first: int
+) -> None:
     """Go down from the worst row since the first one, by linear programs in shrinking boxes."""
-    if not found.left or not np.isfinite(found.margins[first:]).any():
+    if not search.left or not np.isfinite(search.margins[first:]).any():
         return
-    number, radius = first + int(np.argmin(found.margins[first:])), 1.0
+    number, radius = first + int(np.argmin(search.margins[first:])), 1.0
     for _ in range(_STEPS):
-        if found.left < 2:
+        if search.left < 2:
             return
-        row = found.run_again("derivatives", number)
-        made = derivatives(row)
-        if made.reason:
-            reasons[made.reason] = None
-        better = _step(found, made, row, found.margins[number], radius)
+        row = search.run_again("derivatives", number)
+        model = derivatives(row)
+        if model.reason:
+            reasons[model.reason] = None
+        better = _step(search, model, row, search.margins[number], radius)
         if better is None:
             return
         number, radius = better
 
 
 def _step(
-    found: Found, made: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
+    search: Search, model: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
 ) -> tuple[int, float] | None:
     """Run rows that the first order calls lower until one is; return it and the next radius."""
-    space = found.space
+    space = search.space
     place = unit_places(space, pd.DataFrame([row]))[0]
-    while radius >= _SMALLEST and found.left:
-        lower, said = lowest_nearby(made, place, radius)
-        if not said < margin:
+    while radius >= _SMALLEST and search.left:
+        lower, predicted = lowest_nearby(model, place, radius)
+        if not predicted < margin:
             return None
         unit = np.full(len(space.names), 0.5)
         unit[: lower.size] = np.clip(lower, 0.0, 1.0)
         labels = {choice.name: row[choice.name] for choice in space.choices}
-        (new,) = found.run("gradient", from_unit_cube(space, unit[None, :]).assign(**labels))
+        (new,) = search.run("gradient", from_unit_cube(space, unit[None, :]).assign(**labels))
         if new < margin:
-            trusted = margin - new >= _TRUSTED * (margin - said)
-            return found.margins.size - 1, min(1.0, 2 * radius) if trusted else radius
+            trusted = margin - new >= _TRUSTED * (margin - predicted)
+            return search.margins.size - 1, min(1.0, 2 * radius) if trusted else radius
         radius /= _SHORTER
     return None

@@ -28,7 +28,7 @@ CLOSE = 0.5
 _FINEST = 30
 """Divisions beyond which the finest cells are no wider than rounding."""
 _WORK = 40
-"""What a point of the first grid takes beside its row, in numbers."""
+"""What a point of the first grid takes next to its row, in numbers."""
 NEW = 5
 """Points that the refinement of a cell adds at most."""
 
@@ -220,8 +220,8 @@ class _Plane:
         chosen = []
         for cell in cells:
             points = (*_corners(cell), *_edges(cell))
-            known = [self.margins[point] for point in points if point in self.margins]
-            margins = np.clip(known, -1.0, 1.0)
+            computed = [self.margins[point] for point in points if point in self.margins]
+            margins = np.clip(computed, -1.0, 1.0)
             low, high = float(np.min(margins)), float(np.max(margins))
             least = float(np.min(np.abs(margins)))
             if cell[2] > 1 and (low <= 0 < high or least < CLOSE * (high - low)):

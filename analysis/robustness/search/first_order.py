@@ -25,7 +25,7 @@ __all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
 _NESTED = 60  # arguments of a largest value of windows that are followed
-_TIMES = 400  # samples that are looked at
+_TIMES = 400  # samples that are examined
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,9 +81,9 @@ def lowest_nearby(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.
     """
     best, least = place, np.inf
     for requirement in of.requirements:
-        found = _lowered(of, requirement, place, radius)
-        if found is not None and found[1] < least:
-            best, least = found
+        lowered = _lowered(of, requirement, place, radius)
+        if lowered is not None and lowered[1] < least:
+            best, least = lowered
     return best, least
 
 
@@ -138,13 +138,13 @@ def _program(
         return change, float(atoms.value.max())
     matrix = np.column_stack([rows / scale, -np.ones(len(rows))])
     goal = np.append(np.zeros(change.size), 1.0)
-    made = linprog(
+    solution = linprog(
         goal, A_ub=matrix, b_ub=-offsets / scale, bounds=[*bounds, (None, None)], method="highs"
     )
-    if made.x is None:
+    if solution.x is None:
         return change, np.inf
-    found = np.clip(made.x[:-1], *np.transpose(bounds))
-    return found, float(np.max(offsets + rows @ found))
+    minimizer = np.clip(solution.x[:-1], *np.transpose(bounds))
+    return minimizer, float(np.max(offsets + rows @ minimizer))
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def refusal_of(space: Space, systems: Iterable[ct.InputOutputSystem]) -> str:
 def _tries(
     space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
 ) -> Iterator[Callable[[float], str]]:
-    """Yield for each corner what tells from a factor why its block refuses it, or nothing."""
+    """Yield for each corner what says for a factor why its block refuses it, or nothing."""
     for part in _parts(space, systems, names):
         for corner in _corners(space, list(part.fields)):
             yield partial(part.refusal, space, corner)

@@ -51,7 +51,7 @@ class Radius:
         How likely a violation is at the size `searched`, from independent draws of the laws of
         that size, which took no part in the search.
     largest : float
-        Largest size that may be looked at.
+        Largest size that may be tried.
     notes : tuple of str
         Why it is the largest, and why there is no statement.
     steps : pandas.DataFrame
@@ -239,13 +239,13 @@ class _Search:
     def at(self, size: float) -> None:
         """Search the box of a size; a violation becomes the upper bound."""
         box = scaled(self.space, size)
-        found = worst_case(self.evaluate, box, self.runs, entropy=self.entropy, target=0.0)
-        if not found.is_finished:
+        worst = worst_case(self.evaluate, box, self.runs, entropy=self.entropy, target=0.0)
+        if not worst.is_finished:
             raise KeyboardInterrupt
-        self.steps.append(("search", size, found.margin, found.design.size))
+        self.steps.append(("search", size, worst.margin, worst.design.size))
         before = self.upper
-        if found.is_violated:
-            self.along_ray(found.witness, found.margin)
+        if worst.is_violated:
+            self.along_ray(worst.witness, worst.margin)
         else:
             self.searched = size
         if self.upper == before:  # nothing, or an integer that was rounded out of the box

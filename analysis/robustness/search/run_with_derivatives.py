@@ -67,7 +67,7 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
     given = arguments(study.space, table)
     names = [quantity.name for quantity in study.space.quantities]
     try:
-        made = sensitivity_response(
+        run = sensitivity_response(
             loop, study.timepts, study.inputs,
             {name: float(values[0]) for name, values in given["initial_state"].items()} or None,
             with_respect_to=names, params={k: v[0] for k, v in given["params"].items()},
@@ -79,14 +79,14 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
         return _none(prepared, str(error))
     low, high = ends(study.space).to_numpy()
     return FirstOrder(
-        t=made.time,
-        signals=dict(zip(made.signals, made.values, strict=True)),
+        t=run.time,
+        signals=dict(zip(run.signals, run.values, strict=True)),
         derivatives={
-            signal: (made.derivatives[i] * (high - low)[:, None]).T
-            for i, signal in enumerate(made.signals)
+            signal: (run.derivatives[i] * (high - low)[:, None]).T
+            for i, signal in enumerate(run.signals)
         },
         requirements=study.spec.requirements,
-        reason=made.message or "",
+        reason=run.message or "",
     )
 
 

@@ -14,7 +14,7 @@ from nlctl.wording import counted
 
 from ..uncertainty.design import Design, checked_entropy, listed
 from ..uncertainty.space import Space
-from .candidates import Found, corner_count, search_worst
+from .candidates import Search, corner_count, search_worst
 from .descent import search_with_derivatives
 from .evaluation import Evaluate, margins_of, row_text
 from .first_order import FirstOrderOf
@@ -103,12 +103,12 @@ class WorstCase:
         some = "" if self.all_corners else "random "
         names = {"corners": f"{some}corners", "uniform": "uniform draws"}
         rows = ", ".join(f"{count} {names.get(name, name)}" for name, count in self.runs.items())
-        found = (
+        lowest = (
             f"the lowest margin is {self.margin:.4g} (row {self.number}, {self.found_by}): "
             f"{row_text(self.witness)}"
         )
         verdict = "A violation" if self.is_violated else "No violation, which proves nothing"
-        said = f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {found}."
+        said = f"{verdict}: of {counted(self.design.size, 'run')} ({rows}) {lowest}."
         if self.without_derivative:
             said += f" Not everywhere was there a derivative: {self.without_derivative[0]}."
         return said
@@ -187,21 +187,21 @@ def worst_case(
     if target is not None and not (isinstance(target, float) and np.isinf(target)):
         number("a worst case", "target", target)
     entropy = checked_entropy(entropy)
-    found = Found(evaluate, space, runs, target)
+    search = Search(evaluate, space, runs, target)
     is_finished, reasons = True, []
     try:
         if derivatives is None:
-            search_worst(found, np.random.default_rng(entropy))
+            search_worst(search, np.random.default_rng(entropy))
         else:
-            reasons = search_with_derivatives(found, np.random.default_rng(entropy), derivatives)
+            reasons = search_with_derivatives(search, np.random.default_rng(entropy), derivatives)
     except KeyboardInterrupt:
-        if not found.tables:
+        if not search.tables:
             raise
         is_finished = False
-    searchers = np.array(found.searchers)
+    searchers = np.array(search.searchers)
     return WorstCase(
-        design=listed(space, "adaptive", found.points, entropy),
-        results=pd.concat(found.results),
+        design=listed(space, "adaptive", search.points, entropy),
+        results=pd.concat(search.results),
         searchers=searchers,
         is_finished=is_finished,
         all_corners=int(np.sum(searchers == "corners")) == corner_count(space),

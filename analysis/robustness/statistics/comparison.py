@@ -203,44 +203,44 @@ def _paired(
     design: Design, choice: Choice, table: pd.DataFrame, columns: tuple[str, ...]
 ) -> dict[str, _Columns]:
     """Return each column by option, in the order of the samples."""
-    wanted = crossed(design, choice)
-    for name in (*wanted.columns, *columns):
+    crossed_rows = crossed(design, choice)
+    for name in (*crossed_rows.columns, *columns):
         if name not in table.columns:
             raise unknown("column", name, table.columns, "of the table of results")
-    _check_rows(wanted, table, choice.name)
-    ordered, k = table.loc[wanted.index], len(choice.options)
+    _check_rows(crossed_rows, table, choice.name)
+    ordered, k = table.loc[crossed_rows.index], len(choice.options)
     return {
         name: {label: ordered[name].to_numpy()[i::k] for i, label in enumerate(choice.options)}
         for name in columns
     }
 
 
-def _check_rows(wanted: pd.DataFrame, table: pd.DataFrame, choice: str) -> None:
+def _check_rows(expected: pd.DataFrame, table: pd.DataFrame, choice: str) -> None:
     """Every sample with every option, once, with the numbers of the design."""
     if not table.index.is_unique:
         twice = table.index[table.index.duplicated()][0]
         raise ParameterError(f"a comparison needs each row once, row {twice} comes twice")
-    missing = wanted.index.difference(table.index)
-    beyond = table.index.difference(wanted.index)
+    missing = expected.index.difference(table.index)
+    beyond = table.index.difference(expected.index)
     if len(missing):
-        label = wanted.loc[missing[0], choice]
+        label = expected.loc[missing[0], choice]
         raise ParameterError(
             f"a comparison needs every sample with every {choice}: "
-            f"{some_of(len(missing), len(wanted), 'row', 'is', 'are')} missing, the first is row "
+            f"{some_of(len(missing), len(expected), 'row', 'is', 'are')} missing, the first is row "
             f"{missing[0]} ('{label}')"
         )
     if len(beyond):
         raise ParameterError(
-            f"a comparison needs the rows of its design alone, 0 to {len(wanted) - 1}, got row "
+            f"a comparison needs the rows of its design alone, 0 to {len(expected) - 1}, got row "
             f"{beyond[0]}"
         )
-    for name in wanted.columns:
-        differ = wanted.index[wanted[name] != table.loc[wanted.index, name]]
+    for name in expected.columns:
+        differ = expected.index[expected[name] != table.loc[expected.index, name]]
         if len(differ):
             row = differ[0]
             raise ParameterError(
                 f"row {row} has {name} = {table.loc[row, name]}, the design has "
-                f"{wanted.loc[row, name]}: the table belongs to another design"
+                f"{expected.loc[row, name]}: the table belongs to another design"
             )
 
 
@@ -258,11 +258,11 @@ def _ranking(
             "rate_high": high,
             "failed": int(np.sum(paired["status"][label] != "OK")),
         }
-    found = pd.DataFrame.from_dict(rows, orient="index").rename_axis("option")
+    ranking = pd.DataFrame.from_dict(rows, orient="index").rename_axis("option")
     for metric, better in metrics.items():
         values = np.column_stack(list(paired[metric].values()))
         signed = values if better == "smaller" else -values
         ranks = stats.rankdata(np.where(np.isnan(signed), np.inf, signed), axis=1)
-        found[f"median {metric}"] = pd.DataFrame(values).median().to_numpy()
-        found[f"rank {metric}"] = ranks.mean(axis=0)
-    return found.sort_values(["violations", f"rank {next(iter(metrics))}"], kind="stable")
+        ranking[f"median {metric}"] = pd.DataFrame(values).median().to_numpy()
+        ranking[f"rank {metric}"] = ranks.mean(axis=0)
+    return ranking.sort_values(["violations", f"rank {next(iter(metrics))}"], kind="stable")

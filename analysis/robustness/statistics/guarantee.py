@@ -101,20 +101,20 @@ class Violation:
         """What is known of the probability, in words, without method and assumptions.
 
         Runs that violate are evidence of a lower bound, the others of an upper one; what there is
-        evidence of is told, also where only the other side was asked for.
+        evidence of is stated, also where only the other side was asked for.
         """
         low, high = rounded_down(self.singly[0]), rounded_up(self.singly[1])
         confidence = f"confidence {100 * self.confidence:.10g} %"
-        told = f"With {confidence} the probability of a violation is"
+        text = f"With {confidence} the probability of a violation is"
         if self.lower > 0 and self.upper < 1:
-            return f"{told} between {low} and {high}"
+            return f"{text} between {low} and {high}"
         sides = {f"at most {high}": self.singly[1] < 1, f"at least {low}": self.singly[0] > 0}
         first, *rest = [text for text, is_there in sides.items() if is_there] or ["at most 1"]
         if self.lower > 0 and rest:  # the side that was asked for comes first
             first, rest = rest[0], [first]
         both = f"(both together: {max(0.0, 200 * self.confidence - 100):.10g} %)"
-        told = f"{told} {first}"
-        return told + "".join(f"; with the same confidence, {other} {both}" for other in rest)
+        text = f"{text} {first}"
+        return text + "".join(f"; with the same confidence, {other} {both}" for other in rest)
 
 
 def rounded_up(value: float) -> str:
@@ -242,7 +242,7 @@ def runs_needed(probability: float, confidence: float = 0.99, violations: int = 
     if enough is None:
         raise ParameterError(
             f"a plan for the probability {probability:g} needs more than {MOST_RUNS:.0e} runs, "
-            "which nobody counts: take a larger probability"
+            "which cannot be counted: take a larger probability"
         )
     return enough
 
@@ -312,7 +312,7 @@ def violation_probability(
         raise NoGuaranteeError(
             f"the bound holds for a number of runs that was fixed in advance, {design.size}, and "
             f"{n} are done: finish them, or use sequential.confidence_sequence, which may be "
-            "looked at any time"
+            "inspected at any time"
         )
     lower, upper = clopper_pearson(k, n, confidence, side)
     single = (

@@ -8,7 +8,7 @@ from scipy import special, stats
 __all__ = ["independence_test"]
 
 MOST_TABLES = 200_000
-"""So many tables are gone through, one by one; of more, so many are drawn."""
+"""Up to so many tables are enumerated; of more, so many are drawn."""
 PERMUTATIONS = 99_999
 LARGE = 20.0
 """From this expected number on in every field the chi-square law is as good as exact."""
@@ -28,15 +28,15 @@ def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
     rows, failing = counts.sum(axis=1), int(counts[:, 0].sum())
     if len(rows) == 1:
         return 0.0, 1.0
-    found = float(_chi_square(counts[None, :, 0], rows, failing)[0])
-    strength = float(np.sqrt(found / rows.sum()))
-    at_least = found * (1 - _ROUNDING) - _ROUNDING
+    chi_square = float(_chi_square(counts[None, :, 0], rows, failing)[0])
+    strength = float(np.sqrt(chi_square / rows.sum()))
+    at_least = chi_square * (1 - _ROUNDING) - _ROUNDING
     if _count(rows, failing) <= MOST_TABLES:
         tables, probabilities = _every_table(rows, failing)
         far = _chi_square(tables, rows, failing) >= at_least
         return strength, min(1.0, float(probabilities[far].sum()))
     if rows.min() * min(failing, rows.sum() - failing) / rows.sum() >= LARGE:
-        return strength, float(stats.chi2.sf(found, len(rows) - 1))
+        return strength, float(stats.chi2.sf(chi_square, len(rows) - 1))
     rng = np.random.default_rng(entropy)
     drawn = rng.multivariate_hypergeometric(rows, failing, size=PERMUTATIONS, method="marginals")
     beyond = int(np.sum(_chi_square(drawn, rows, failing) >= at_least))

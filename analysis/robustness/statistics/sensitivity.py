@@ -31,7 +31,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     """Return margins with one number for all failed runs, for effects and shares of a variance.
 
     The margin of a run that did not reach its end is graded for searches, a million times the
-    others (`spec.unfinished_margin`): it would be the whole variance.  What such a run tells is
+    others (`spec.unfinished_margin`): it would be the whole variance.  What such a run shows is
     that its margin is no better than those of the runs that did, so it counts as the least of
     these, and at most as -1, beyond the bound by the bound itself.  The others stay as they are.
 
@@ -67,7 +67,7 @@ def censored(margins: Margins) -> tuple[np.ndarray, int, float]:
     ended = values > -FAILED  # not of NaN
     if not ended.any():
         raise ParameterError(
-            f"of {counted(values.size, 'row')} none reached its end, so that their margins tell "
+            f"of {counted(values.size, 'row')} none reached its end, so that their margins say "
             "nothing apart"
         )
     least = min(float(values[ended].min()), -1.0)
@@ -285,8 +285,8 @@ def sobol_indices(
 
     def indices(rows: np.ndarray) -> np.ndarray:
         parts = {"f_A": f_a[rows][None], "f_B": f_b[rows][None], "f_AB": f_ab[..., rows]}
-        made = stats.sobol_indices(func=parts, n=n)
-        return np.stack([made.first_order, made.total_order])
+        sobol = stats.sobol_indices(func=parts, n=n)
+        return np.stack([sobol.first_order, sobol.total_order])
 
     s1, st = indices(np.arange(n))
     interval = stats.bootstrap(

@@ -55,7 +55,7 @@ def log_evidence(violations: Any, runs: Any, p: float) -> Any:
 
 @as_annotated
 def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tuple[float, float]:
-    """Return bounds of the probability of a violation that may be looked at after every run.
+    """Return bounds of the probability of a violation that may be inspected after every run.
 
     With this confidence they hold at all numbers of runs at once, so a study may stop whenever it
     likes, for any reason.  They are the p with ``log_evidence < -log(1 - confidence)``, an interval

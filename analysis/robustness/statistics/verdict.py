@@ -1,4 +1,4 @@
-"""Three answers to a claim: it is shown, it is refuted, or what was run tells neither."""
+"""Three answers to a claim: it is shown, it is refuted, or the runs show neither."""
 
 from __future__ import annotations
 

@@ -318,23 +318,12 @@ def horizon(formula: Formula) -> float:
 
 @dataclass(frozen=True)
 class SampledSignals:
-    """Samples by name, all finite.
+    """Samples by name, all finite."""
 
-    Attributes
-    ----------
-    t : ndarray of shape (m,)
-        Increasing times (s).
-    samples : mapping
-        Arrays of shape (m,).
-    until : float
-        Time (s) at which windows without an end stop, at most ``t[-1]``.
-    breaks : ndarray of shape (k,)
-        Increasing times (s) at which signals may jump or bend.
-    """
-
-    t: np.ndarray
-    samples: Mapping[str, np.ndarray]
-    until: float
+    t: np.ndarray  # (m,): increasing times (s)
+    samples: Mapping[str, np.ndarray]  # arrays of shape (m,)
+    until: float  # time (s) at which windows without an end stop, at most ``t[-1]``
+    # (k,): increasing times (s) at which signals may jump or bend
     breaks: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property

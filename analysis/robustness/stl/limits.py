@@ -14,7 +14,7 @@ from .formula import Always, And, Band, Formula
 
 def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
     """Return what requirements always ask of each signal; what they ask else is not a line."""
-    found: dict[str, list[Limit]] = {}
+    limits: dict[str, list[Limit]] = {}
 
     def walk(formula: Formula, start: float, end: float, until: float) -> None:
         if isinstance(formula, And):
@@ -25,9 +25,9 @@ def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]
         elif isinstance(formula, Band) and end > start:
             for value in (formula.lower, formula.upper):
                 line = (value, start, min(end, until))
-                if np.isfinite(value) and line not in found.setdefault(formula.signal, []):
-                    found[formula.signal].append(line)
+                if np.isfinite(value) and line not in limits.setdefault(formula.signal, []):
+                    limits[formula.signal].append(line)
 
     for requirement in requirements:
         walk(requirement.formula, 0.0, 0.0, requirement.until)
-    return found
+    return limits

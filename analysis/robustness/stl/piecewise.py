@@ -19,20 +19,11 @@ __all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_
 
 @dataclass(frozen=True)
 class Trace:
-    """A continuous function, linear between its points.
+    """A continuous function, linear between its points."""
 
-    Attributes
-    ----------
-    t : ndarray of shape (m,)
-        Increasing times (s); one is enough.
-    y : ndarray of shape (m,)
-    jump : float
-        An interval (s) that is not longer is a jump: only its ends are values.
-    """
-
-    t: np.ndarray
-    y: np.ndarray
-    jump: float = 0.0
+    t: np.ndarray  # (m,): increasing times (s); one is enough
+    y: np.ndarray  # (m,)
+    jump: float = 0.0  # an interval (s) that is not longer is a jump: only its ends are values
 
     def __neg__(self) -> Trace:
         return Trace(self.t, -self.y, self.jump)

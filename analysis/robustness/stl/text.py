@@ -77,9 +77,9 @@ class _Reader:
 
     def took(self, word: str) -> bool:
         """Step over `word` if it stands here."""
-        found = self.here == word
-        self.next += found
-        return found
+        matches = self.here == word
+        self.next += matches
+        return matches
 
     def take(self, words: Sequence[str]) -> None:
         for word in words:
@@ -107,14 +107,14 @@ class _Reader:
                 return word == ")" and number == self.next - 1
         return False
 
-    def error(self, wanted: str) -> ParameterError:
+    def error(self, expected: str) -> ParameterError:
         if self.next < len(self.words):
             _, word, column = self.words[self.next]
-            found = f"'{word}' at character {column + 1}"
+            here = f"'{word}' at character {column + 1}"
         else:
-            found = "the end"
+            here = "the end"
         return ParameterError(
-            f"formula '{self.text}' needs {wanted}, found {found}; write it like '{EXAMPLE}'"
+            f"formula '{self.text}' needs {expected}, found {here}; write it like '{EXAMPLE}'"
         )
 
 
@@ -157,10 +157,10 @@ def _part(reader: _Reader, depth: int) -> Formula:
         raise ParameterError(f"a formula needs at most {DEPTH} levels, got more: '{reader.text}'")
     if reader.took("not"):
         return ~_part(reader, depth + 1)
-    for word, made in (("always", always), ("eventually", eventually)):
+    for word, operator in (("always", always), ("eventually", eventually)):
         if reader.took(word):
             start, end = _window(reader)
-            return made(_part(reader, depth + 1), start, end)
+            return operator(_part(reader, depth + 1), start, end)
     if reader.took("("):
         inner = _formula(reader, depth + 1)
         reader.take([")"])

@@ -16,12 +16,7 @@ __all__ = ["ViolationTime", "violation_time"]
 
 @dataclass(frozen=True, kw_only=True)
 class ViolationTime:
-    """The time to the violation of a requirement, as a metric of a run that reached its end.
-
-    Attributes
-    ----------
-    requirement : Requirement
-    """
+    """The time to the violation of a requirement, as a metric of a run that reached its end."""
 
     requirement: Requirement
 
@@ -74,13 +69,13 @@ def violation_time(
     if count < 2:
         return 0.0
     t, *samples = rows[:, :count]
-    found = dict(zip(requirement.signals, samples, strict=True))
+    sampled = dict(zip(requirement.signals, samples, strict=True))
     until = min(requirement.until, float(t[-1]))
     is_short = until < requirement.until * (1 - 1e-12)
-    first = _first(requirement.formula, SampledSignals(t, found, until, checked_breaks(breaks)))
+    first = _first(requirement.formula, SampledSignals(t, sampled, until, checked_breaks(breaks)))
     if is_short:
         return min(first, until)
-    if margin(requirement, t, found, breaks=breaks) > 0:
+    if margin(requirement, t, sampled, breaks=breaks) > 0:
         return np.inf
     return min(first, until)
 

@@ -81,13 +81,13 @@ def _state(quantity: Uncertain, system: Any) -> Uncertain:
 
 
 def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
-    known = system.params
+    params = system.params
     rows = {row.name: row for row in all_parameter_rows(system)}
-    clashes = known.clashes if isinstance(known, Parameters) else ()
+    clashes = params.clashes if isinstance(params, Parameters) else ()
     base = base_name(quantity.name)
-    full = find_name("parameter", base, dict(known) | rows, clashes)
+    full = find_name("parameter", base, dict(params) | rows, clashes)
     suffix = quantity.name[len(base) :]
-    value, unit = (rows[full].value, rows[full].unit) if full in rows else (known[full], "")
+    value, unit = (rows[full].value, rows[full].unit) if full in rows else (params[full], "")
     owner = owner_of(system, full + suffix)
     if owner is not None:
         block, key = owner
@@ -110,12 +110,12 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Block, str] | Non
     for leaf in leaves(system):
         if isinstance(within(leaf.system), Block) and leaf.parameter_path == path:
             return within(leaf.system), name.removeprefix(f"{path}.")
-    made = dict(samplings(system)).get(path)
-    return None if made is None else (made, name.removeprefix(f"{path}."))
+    block = dict(samplings(system)).get(path)
+    return None if block is None else (block, name.removeprefix(f"{path}."))
 
 
-def _check_integer(quantity: Uncertain, wanted: bool) -> None:
-    if wanted and not quantity.is_integer:
+def _check_integer(quantity: Uncertain, is_integer: bool) -> None:
+    if is_integer and not quantity.is_integer:
         raise SpaceError(
             f"'{quantity.name}' is an integer and needs a law of integers, such as "
             f"scipy.stats.randint(0, 10), got {quantity.law_text}"
@@ -132,18 +132,18 @@ def _filled(quantity: Uncertain, name: str, value: float, unit: str) -> Uncertai
 
 def check_keyword(function: Callable[..., Any], name: str) -> None:
     """Refuse a keyword that a function does not take."""
-    known = inspect.signature(function).parameters
-    if name not in known and not any(p.kind is p.VAR_KEYWORD for p in known.values()):
+    parameters = inspect.signature(function).parameters
+    if name not in parameters and not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
         plain = function.func if isinstance(function, partial) else function
         where = getattr(plain, "__qualname__", "")
-        raise unknown("keyword", name, known, where and f"of {where}")
+        raise unknown("keyword", name, parameters, where and f"of {where}")
 
 
 @as_annotated
 def diagrams(
     space: Space, build: Callable[..., ct.InputOutputSystem]
 ) -> list[tuple[Mapping[str, str], ct.InputOutputSystem]]:
-    """Build the diagram of every combination of the choices, and hold the space against each.
+    """Build the diagram of every combination of the choices, and check the space against each.
 
     Parameters
     ----------

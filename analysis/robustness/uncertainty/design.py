@@ -324,8 +324,8 @@ def from_table(
         for label in columns[choice.name]:
             if label not in choice.options:
                 raise unknown("option", label, choice.options, f"of '{choice.name}'")
-    made = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
-    return replace(made, is_iid=independently)
+    design = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
+    return replace(design, is_iid=independently)
 
 
 def listed(

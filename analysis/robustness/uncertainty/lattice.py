@@ -151,17 +151,17 @@ def one_at_a_time(space: Space, levels: int = 2, entropy: int | None = None) -> 
     levels = integer("one at a time", "levels", levels, at_least=2)
     affordable("a design", levels * len(space.names), len(space.names))
     middle = nominal(space)
-    made, varied = [middle], [""]
+    rows, varied = [middle], [""]
     unit = np.tile(np.linspace(0, 1, levels)[:, None], len(space.names))
     values = from_unit_cube(space, unit)
     for quantity in space.quantities:
-        made += [{**middle, quantity.name: value} for value in values[quantity.name]]
+        rows += [{**middle, quantity.name: value} for value in values[quantity.name]]
         varied += [quantity.name] * levels
     for choice in space.choices:
         others = [label for label in choice.options if label != choice.nominal]
-        made += [{**middle, choice.name: label} for label in others]
+        rows += [{**middle, choice.name: label} for label in others]
         varied += [choice.name] * len(others)
-    table = pd.DataFrame(made, columns=space.names)
+    table = pd.DataFrame(rows, columns=space.names)
     return listed(
         space, "one at a time", table, checked_entropy(entropy), {"varied": tuple(varied)}
     )

@@ -40,13 +40,13 @@ def load_file(path: Path, admits: Admits | None = None) -> ModuleType:
 
 def loaded_with(path: Path) -> dict[Path, bytes]:
     """Return what was run of a file that was loaded, and of all neighbours that it has imported."""
-    todo, found = [_name_of(path.resolve())], dict[str, tuple[Path, bytes]]()
+    todo, files = [_name_of(path.resolve())], dict[str, tuple[Path, bytes]]()
     while todo:
         name = todo.pop()
-        if name not in found and name in _FILES:
-            found[name] = _FILES[name]
+        if name not in files and name in _FILES:
+            files[name] = _FILES[name]
             todo += _BESIDE.get(name, ())
-    return dict(found.values())
+    return dict(files.values())
 
 
 def _name_of(path: Path) -> str:
@@ -139,12 +139,12 @@ def _neighbour(name: str, folder: Path) -> Path | None:
 
     A folder without ``__init__.py`` is not a module.
     """
-    found = [
+    files = [
         path.resolve()
         for path in (folder / name / "__init__.py", folder / f"{name}.py")
         if path.is_file()
     ]
-    if not found or name in sys.builtin_module_names or name in sys.stdlib_module_names:
+    if not files or name in sys.builtin_module_names or name in sys.stdlib_module_names:
         return None
     try:
         spec = importlib.util.find_spec(name)
@@ -152,5 +152,5 @@ def _neighbour(name: str, folder: Path) -> Path | None:
         spec = None
     if name == FORMER and is_former(spec):  # it hides no file of a user's
         spec = None
-    same = spec is not None and spec.origin is not None and Path(spec.origin).resolve() in found
-    return found[0] if spec is None or same else None
+    same = spec is not None and spec.origin is not None and Path(spec.origin).resolve() in files
+    return files[0] if spec is None or same else None

@@ -32,7 +32,7 @@ def record_file() -> Path:
 
 
 def study_digest(data: Mapping[str, Any]) -> str:
-    """Return a key of what stands in a study file."""
+    """Return a key of the content of a study file."""
     text = json.dumps(as_json(data), sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -61,8 +61,8 @@ def _is_others(path: Path) -> bool:
     """Whether somebody else owns a path, or may write there."""
     if not hasattr(os, "getuid"):
         return False
-    found = path.stat()
-    return found.st_uid not in (os.getuid(), 0) or found.st_mode & 0o022 != 0
+    status = path.stat()
+    return status.st_uid not in (os.getuid(), 0) or status.st_mode & 0o022 != 0
 
 
 def remember(statements: Iterable[str]) -> bool:
@@ -70,11 +70,11 @@ def remember(statements: Iterable[str]) -> bool:
 
     Where it cannot be written nothing is lost but the question that is asked again.
     """
-    known, path = remembered(), record_file()
-    new = frozenset(statements) - known
+    before_it, path = remembered(), record_file()
+    new = frozenset(statements) - before_it
     if not new:
         return True
-    content = json.dumps({"format": _FORMAT, "statements": sorted(known | new)}, indent=1)
+    content = json.dumps({"format": _FORMAT, "statements": sorted(before_it | new)}, indent=1)
     before = os.umask(0o077)  # nobody else writes what this user trusts
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

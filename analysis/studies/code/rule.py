@@ -9,7 +9,7 @@ may run without being asked is what makes loops of nlctl's blocks:
   makes systems, `SYSTEMS`.
 
 Anything else needs the trust of this user, see `record`; so does all but the first of these in a
-folder of results, which is data that somebody may have sent.  It is looked at twice: what is named,
+folder of results, which is data that somebody may have sent.  It is checked twice: what is named,
 before anything is imported, and where it was defined, before anything is called.  Whatever is
 trusted, a loop's function is called only if it can be one that returns a diagram.
 """
@@ -57,7 +57,7 @@ __all__ = [
 Reach = Literal["nlctl", "study", "all"]
 """What may run unasked: nlctl's own code, the study's folder and packages as well, or anything."""
 
-MAKERS = ("control", "nlctl")  # whoever makes a diagram calls one of these
+MAKERS = ("control", "nlctl")  # a function that makes a diagram calls one of these
 _ABOUT_LOOPS = "nlctl.analysis"  # and not of this one
 MADE_OF = tuple(
     f"nlctl.{room}"
@@ -91,20 +91,11 @@ DIAGRAMS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Grant:
-    """What code of one study may run.
-
-    Attributes
-    ----------
-    reach : Reach
-    folder : Path
-        What paths in the study are relative to.
-    study : str
-        A key of the study, see `record.study_digest`.
-    """
+    """What code of one study may run."""
 
     reach: Reach
-    folder: Path
-    study: str
+    folder: Path  # what paths in the study are relative to
+    study: str  # a key of the study, see `record.study_digest`
 
     def admits(self, path: Path) -> str:
         """Return why a file may not be run; nothing if it may."""
@@ -128,7 +119,7 @@ class Grant:
         name = present_name(name)
         if name.partition(".")[0] == "nlctl":
             fits = name in ("nlctl", _ABOUT_LOOPS) or _is_in(name, MADE_OF)
-            return "" if fits or self.reach == "all" else f"'{name}' makes nothing of a loop"
+            return "" if fits or self.reach == "all" else f"'{name}' does nothing with a loop"
         try:
             places = _module_places(name)
         except (ParameterError, OSError):  # said when it is looked for
@@ -145,7 +136,7 @@ class Grant:
         if all(_is_own(p.resolve(), home) for p in places):
             return ""
         if top == "control" and name != top and not _is_in(name, SYSTEMS):
-            return f"'{name}' makes nothing of a loop"
+            return f"'{name}' does nothing with a loop"
         if top in _built_on():
             return ""
         return f"'{top}' is not built on nlctl or python-control"
@@ -252,7 +243,7 @@ def _statements(names: Iterable[str], key: str, folder: Path) -> Iterator[str]:
             continue
         else:
             contents = {f"module {source}": _source(_module_places(source)[0]).read_bytes()}
-        yield from (statement(key, told, content) for told, content in contents.items())
+        yield from (statement(key, place, content) for place, content in contents.items())
 
 
 def check_place(name: str) -> None:
@@ -274,7 +265,7 @@ def check_place(name: str) -> None:
         raise ParameterError(f"a module has names separated by dots, got '{source}'")
     if _is_standard(source) or source == "__main__":
         raise ParameterError(
-            f"'{source}' is a module of Python's standard library, which makes nothing of a loop"
+            f"'{source}' is a module of Python's standard library, which does nothing with a loop"
         )
 
 
@@ -286,13 +277,13 @@ def _module_places(name: str) -> list[Path]:
     """Return the file or the folders of a top-level module, without importing it."""
     top = name.partition(".")[0]
     try:
-        found = importlib.util.find_spec(top)
+        spec = importlib.util.find_spec(top)
     except (ImportError, ValueError):  # of a module that hides where it is from
-        found = None
-    if found is None:
+        spec = None
+    if spec is None:
         raise ParameterError(f"there is no module '{top}'")
-    folders = list(found.submodule_search_locations or ())
-    return [Path(p) for p in folders] or [Path(found.origin or top)]
+    folders = list(spec.submodule_search_locations or ())
+    return [Path(p) for p in folders] or [Path(spec.origin or top)]
 
 
 def _source(place: Path) -> Path:
@@ -303,13 +294,13 @@ def _source(place: Path) -> Path:
 @functools.cache
 def _built_on() -> frozenset[str]:
     """Return the top-level modules of python-control, and of packages that need it or nlctl."""
-    found = {"control"}
+    modules = {"control"}
     for name, packages in metadata.packages_distributions().items():
         needed = (need for p in packages for need in metadata.distribution(p).requires or ())
         plain = {re.split(r"[^\w.-]", need)[0].lower() for need in needed if "extra ==" not in need}
         if plain & set(MAKERS):
-            found.add(name)
-    return frozenset(found)
+            modules.add(name)
+    return frozenset(modules)
 
 
 @functools.cache
@@ -351,10 +342,12 @@ def check_loop_function(function: Any, name: str) -> None:
     waits = inspect.iscoroutinefunction(plain) or inspect.isgeneratorfunction(plain)
     if not isinstance(plain, FunctionType) or waits or inspect.isasyncgenfunction(plain):
         raise ParameterError(f"'{name}' needs a function that returns a diagram, got {plain!r}")
-    told = _annotation(plain)
-    if told and all(_outermost(part) in NO_DIAGRAMS for part in told.split("|")):
-        raise ParameterError(f"'{name}' needs a function that returns a diagram, it returns {told}")
-    if not DIAGRAMS & set(re.findall(r"\w+", told)) and not _uses_makers(plain, set()):
+    annotation = _annotation(plain)
+    if annotation and all(_outermost(part) in NO_DIAGRAMS for part in annotation.split("|")):
+        raise ParameterError(
+            f"'{name}' needs a function that returns a diagram, it returns {annotation}"
+        )
+    if not DIAGRAMS & set(re.findall(r"\w+", annotation)) and not _uses_makers(plain, set()):
         raise ParameterError(
             f"nothing shows that '{name}' returns a diagram, so it is not called: neither it nor "
             "what it calls uses control or nlctl. Annotate it: def "
@@ -399,8 +392,8 @@ def _uses_makers(thing: object, seen: set[int]) -> bool:
     if isinstance(thing, type):
         return any(_uses_makers(part, seen) for part in vars(thing).values() if callable(part))
     if not isinstance(thing, FunctionType):
-        own = type(thing).__module__.partition(".")[0]
-        return own not in sys.stdlib_module_names and _uses_makers(type(thing), seen)
+        module = type(thing).__module__.partition(".")[0]
+        return module not in sys.stdlib_module_names and _uses_makers(type(thing), seen)
     names = _names(thing.__code__)
     reached = [thing.__globals__[name] for name in names if name in thing.__globals__]
     reached += [cell.cell_contents for cell in thing.__closure__ or () if _is_filled(cell)]

@@ -127,7 +127,7 @@ def place_text(place: KeyPath) -> str:
 
 def line_numbers(text: str) -> dict[KeyPath, int]:
     """Return the line of every key that a statement of a TOML file begins with."""
-    found: dict[KeyPath, int] = {}
+    lines: dict[KeyPath, int] = {}
     counts: dict[KeyPath, int] = {}
     table: KeyPath = ()
     for line, statement in statements(text):
@@ -139,8 +139,8 @@ def line_numbers(text: str) -> dict[KeyPath, int]:
         else:
             path = (*table, *path)
         for depth in range(1, len(path) + 1):
-            found.setdefault(path[:depth], line + 1)
-    return found
+            lines.setdefault(path[:depth], line + 1)
+    return lines
 
 
 def _indexed(path: KeyPath, counts: Mapping[KeyPath, int]) -> KeyPath:
@@ -174,7 +174,7 @@ def _path(statement: Any) -> KeyPath:
 
 def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -> list[Problem]:
     """Return what pydantic found, with places as in the file and the nearest name of each key."""
-    found = []
+    problems = []
     for one in error.errors(include_url=False):
         context = one.get("ctx", {})
         absent = one["type"] in ("missing", "extra_forbidden")
@@ -195,12 +195,12 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
             )
         elif "input" in one and not isinstance(one["input"], dict | list):
             message = f"{message}, got {_text(one['input'])}"
-        found.append(Problem(place=place, message=message))
-    return found
+        problems.append(Problem(place=place, message=message))
+    return problems
 
 
 def _text(value: object) -> str:
-    """Return a value as it stands in the file; not an integer of thousands of digits."""
+    """Return a value as the file has it; not an integer of thousands of digits."""
     if isinstance(value, int) and abs(value) > _LARGEST:
         return f"an integer of {value.bit_length()} bits"
     return repr(value)
@@ -252,9 +252,9 @@ def located(
 ) -> Problem:
     """Return a mistake with its line, or with the settings of the command line that made it."""
     place = problem.place
-    own = tuple(text for at, text in settings.items() if place[: len(at)] == at)
-    if own:
-        return replace(problem, settings=own)
+    responsible = tuple(text for at, text in settings.items() if place[: len(at)] == at)
+    if responsible:
+        return replace(problem, settings=responsible)
     inside = tuple(text for at, text in settings.items() if at[: len(place)] == place)
     return replace(problem, line=nearest_line(lines, place), settings=inside if place else ())
 

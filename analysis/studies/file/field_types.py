@@ -1,4 +1,4 @@
-"""Types of what stands in a study file."""
+"""Types of the fields of a study file."""
 
 from __future__ import annotations
 

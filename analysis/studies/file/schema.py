@@ -1,4 +1,4 @@
-"""What stands in a study file: shapes and types only.  `check` holds it against the loop."""
+"""The content of a study file: shapes and types only.  `check` compares it with the loop."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def shipped(name: str) -> Path:
     Traceback (most recent call last):
     nlctl.errors.UnknownNameError: unknown study 'example-1-quik'; nearest: 'example-1-quick', ...
     """
-    found = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
-    if name not in found:
-        raise unknown("study", name, found)
-    return found[name]
+    studies = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
+    if name not in studies:
+        raise unknown("study", name, studies)
+    return studies[name]

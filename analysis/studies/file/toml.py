@@ -1,4 +1,4 @@
-"""TOML within limits: whatever stands in a file, it is read or refused at once."""
+"""TOML within limits: whatever a file holds is read or refused at once."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def study_text(content: bytes) -> str:
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Return what stands in a text."""
+    """Return the data of a text."""
     if len(text) > _LARGEST:
         raise ValueError(f"has {len(text):,} characters, a study at most {_LARGEST:,}")
     lines = text.split("\n")
@@ -66,10 +66,10 @@ def _check_printable(value: object, place: str) -> None:
     elif isinstance(value, list):
         for part in value:
             _check_printable(part, place)
-    elif isinstance(value, str) and (found := _CONTROL.search(value)):
+    elif isinstance(value, str) and (character := _CONTROL.search(value)):
         raise ValueError(
-            f"has a control character, U+{ord(found[0]):04X}, in {place!a}: texts have lines, tabs "
-            "and characters that can be printed"
+            f"has a control character, U+{ord(character[0]):04X}, in {place!a}: texts have lines, "
+            "tabs and characters that can be printed"
         )
 
 

@@ -130,10 +130,10 @@ def _options(asked: Compare, setup: Setup) -> Choice:
         choices = Choices.model_validate({"options": asked.options})
         every = choice(asked.keyword, choices, build, folder)
     labels = asked.only or tuple(every.options)
-    for named, known in ((labels, every.options), (asked.better or (), labels)):
+    for named, labels_of in ((labels, every.options), (asked.better or (), labels)):
         for label in named:
-            if label not in known:
-                raise unknown("option", label, known)
+            if label not in labels_of:
+                raise unknown("option", label, labels_of)
     return Choice(name=asked.keyword, options={label: every.options[label] for label in labels})
 
 
@@ -156,7 +156,7 @@ def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
         lacking = [signal for signal in requirement.signals if signal not in signals]
         if lacking:
             raise ParameterError(
-                f"requirement '{requirement.key}' looks at '{lacking[0]}', which not every option "
+                f"requirement '{requirement.key}' reads '{lacking[0]}', which not every option "
                 "has: name those that count with requirements = [...]"
             )
     metrics = metrics_of(study, setup.folder, signals)
@@ -195,19 +195,23 @@ def _run(asked: Compare, ground: Ground) -> Finding | None:
     if not done.complete:
         return None
     table = done.table.astype({c.name: str for c in space.choices})
-    found = compare(design, options, table, asked.metrics, confidence=asked.confidence)
+    comparison = compare(design, options, table, asked.metrics, confidence=asked.confidence)
     return made(
         asked,
-        _sentence(asked, found),
-        **_answer(asked, found),
+        _sentence(asked, comparison),
+        **_answer(asked, comparison),
         runs=len(table),
-        numbers={"keyword": asked.keyword, "samples": found.size, "confidence": found.confidence}
+        numbers={
+            "keyword": asked.keyword,
+            "samples": comparison.size,
+            "confidence": comparison.confidence,
+        }
         | {"requirements": [r.key for r in experiment.spec.requirements]},
         tables={
-            "ranking": found.ranking,
-            "violations": found.violations,
-            "differences": found.differences,
-            "wins": found.wins,
+            "ranking": comparison.ranking,
+            "violations": comparison.violations,
+            "differences": comparison.differences,
+            "wins": comparison.wins,
         },
     )
 
@@ -217,28 +221,28 @@ def _middle(metric: str, row: Mapping[str, Any]) -> str:
     return f"median {metric} {middle:.4g}" if middle == middle else f"no run with {metric}"
 
 
-def _sentence(asked: Compare, found: Comparison) -> str:
+def _sentence(asked: Compare, comparison: Comparison) -> str:
     metric = next(iter(asked.metrics))
-    told = "; ".join(
+    outcomes = "; ".join(
         f"{label}: {counted(int(row['violations']), 'violation')}, {_middle(metric, row)}"
-        for label, row in found.ranking.to_dict("index").items()
+        for label, row in comparison.ranking.to_dict("index").items()
     )
     spec = f" (requirements {', '.join(asked.requirements)})" if asked.requirements else ""
     return (
-        f"{asked.keyword.capitalize()} on the same {counted(found.size, 'sample')}{spec}, best "
-        f"first: {told}."
+        f"{asked.keyword.capitalize()} on the same {counted(comparison.size, 'sample')}{spec}, "
+        f"best first: {outcomes}."
     )
 
 
-def _answer(asked: Compare, found: Comparison) -> dict[str, str]:
+def _answer(asked: Compare, comparison: Comparison) -> dict[str, str]:
     """Return the answer to the claim that one option is better than another."""
     if asked.better is None:
         return {}
     metric, (a, b), level = next(iter(asked.metrics)), asked.better, 1 - asked.confidence
-    pairs = found.differences.loc[metric]
+    pairs = comparison.differences.loc[metric]
     row = pairs.loc[(a, b) if (a, b) in pairs.index else (b, a)]
     p, adjusted = float(row["p"]), float(row["p_holm"])
-    won, lost = (int(found.wins.loc[(metric, x), y]) for x, y in ((a, b), (b, a)))  # type: ignore[arg-type]
+    won, lost = (int(comparison.wins.loc[(metric, x), y]) for x, y in ((a, b), (b, a)))  # type: ignore[arg-type]
     return vars(better_verdict(won, lost, adjusted, level, adjusted / p))
 
 
@@ -306,18 +310,19 @@ def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> I
     """Yield the differences between the first option and each other one, by metric."""
     for number, (metric, pairs) in enumerate(differences.groupby(level="metric", sort=False), 1):
         first = pairs.index.get_level_values("a")[0]
-        own = pairs.loc[pairs.index.get_level_values("a") == first]
-        others = own.index.get_level_values("b")
+        with_first = pairs.loc[pairs.index.get_level_values("a") == first]
+        others = with_first.index.get_level_values("b")
         caption = MEDIANS.format(first=first, metric=metric)
-        caption += INFINITE * bool(np.any(np.isinf(own["median"])))
+        caption += INFINITE * bool(np.any(np.isinf(with_first["median"])))
         words = "; ".join(
-            f"{other}: {middle:.4g}" for other, middle in zip(others, own["median"], strict=True)
+            f"{other}: {middle:.4g}"
+            for other, middle in zip(others, with_first["median"], strict=True)
         )
         yield Figure(
             key=f"{key}-medians-{number}",
             caption=caption,
             description=f"{caption} {words}.",
-            figure=figures.paired_differences(own, list(others), _axis(metric, units)),
+            figure=figures.paired_differences(with_first, list(others), _axis(metric, units)),
         )
 
 

@@ -60,7 +60,7 @@ class AskedDegradation(Varied):
 def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     """Bound the probability of a violation at every size."""
     space = ground.space(asked.quantities)
-    found = degradation_curve(
+    curve = degradation_curve(
         ground.simulate,
         space,
         asked.factors,
@@ -69,8 +69,8 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
         confidence=asked.confidence,
         simultaneous=asked.simultaneous,
     )
-    bounds = dict(zip(found.factors, found.statements, strict=True))
-    told = "; ".join(
+    bounds = dict(zip(curve.factors, curve.statements, strict=True))
+    counts = "; ".join(
         f"at {factor:g} {one.violations} of {one.runs} ({rounded_down(one.lower)} to "
         f"{rounded_up(one.upper)})"
         for factor, one in bounds.items()
@@ -81,13 +81,13 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
     return made(
         asked,
-        f"Violations with all deviations scaled: {told}. The bounds hold with confidence "
+        f"Violations with all deviations scaled: {counts}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
         f"at each size {assumed}.",
         **verdict,
-        runs=sum(one.runs for one in found.statements),
+        runs=sum(one.runs for one in curve.statements),
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
-        tables={"curve": found.table},
+        tables={"curve": curve.table},
     )
 
 

@@ -58,7 +58,7 @@ def _run(asked: Map, ground: Ground) -> Finding:
         x if asked.x_bounds is None else replace(x, bounds=asked.x_bounds),
         y if asked.y_bounds is None else replace(y, bounds=asked.y_bounds),
     )
-    found = failure_map(
+    margin_map = failure_map(
         ground.simulate,
         Space(quantities=plane),
         x.name,
@@ -67,27 +67,27 @@ def _run(asked: Map, ground: Ground) -> Finding:
         levels=asked.levels,
         most=asked.runs,
     )
-    edge = boundary(found)
-    bad = int(np.count_nonzero(violates(found.table["spec"])))
-    if bad in (0, len(found.table)):
+    edge = boundary(margin_map)
+    bad = int(np.count_nonzero(violates(margin_map.table["spec"])))
+    if bad in (0, len(margin_map.table)):
         which = "every one" if bad else "none"
-        told = f"{which} of {counted(len(found.table), 'point')} violates the spec."
+        outcome = f"{which} of {counted(len(margin_map.table), 'point')} violates the spec."
     else:
-        sides = " and ".join(f"{side:.3g}" for side in found.cell)
-        fine = "" if found.is_finished else "; refinement ended with the number of runs"
-        told = (
-            f"{some_of(bad, len(found.table), 'point', 'violates', 'violate')} the spec; cells at "
-            f"the boundary have sides {sides}{fine}. Points were chosen near the boundary, so "
-            "their share is not a probability."
+        sides = " and ".join(f"{side:.3g}" for side in margin_map.cell)
+        fine = "" if margin_map.is_finished else "; refinement ended with the number of runs"
+        outcome = (
+            f"{some_of(bad, len(margin_map.table), 'point', 'violates', 'violate')} the spec; "
+            f"cells at the boundary have sides {sides}{fine}. Points were chosen near the "
+            "boundary, so their share is not a probability."
         )
     return made(
         asked,
-        f"In the plane of {found.x} and {found.y}, the others nominal, {told}",
-        runs=len(found.table),
-        numbers={"x": found.x, "y": found.y, "cell": list(found.cell)},
+        f"In the plane of {margin_map.x} and {margin_map.y}, the others nominal, {outcome}",
+        runs=len(margin_map.table),
+        numbers={"x": margin_map.x, "y": margin_map.y, "cell": list(margin_map.cell)},
         tables={
-            "points": found.table,
-            "triangles": pd.DataFrame(found.triangles, columns=["a", "b", "c"]),
+            "points": margin_map.table,
+            "triangles": pd.DataFrame(margin_map.triangles, columns=["a", "b", "c"]),
             "boundary": edge,
         },
     )

@@ -66,8 +66,8 @@ class Faults(Asked):
     )
     detects: dict[str, str] = Field(
         {},
-        description="What tells of a fault: formulas by name, such as bounds of the ledger. "
-        "When each is violated is told; none is part of the spec.",
+        description="What detects a fault: formulas by name, such as bounds of the ledger. "
+        "When each is violated is reported; none is part of the spec.",
     )
 
     @property
@@ -77,14 +77,14 @@ class Faults(Asked):
 
     @property
     def claim(self) -> str:
-        told = ", ".join(self.tolerates)
-        return f"the spec holds under each of: {told}" if told else ""
+        names = ", ".join(self.tolerates)
+        return f"the spec holds under each of: {names}" if names else ""
 
 
 def _faults(setup: Setup) -> dict[str, Fault]:
     """Return the faults of a study by name."""
     every = (faults_of(signal, faulty) for signal, faulty in setup.study.faults.items())
-    return {name: fault for found in every for name, fault in found.items()}
+    return {name: fault for faults in every for name, fault in faults.items()}
 
 
 def _faulty(
@@ -96,25 +96,25 @@ def _faulty(
 
 def _experiment(asked: Faults, setup: Setup) -> Experiment:
     """Return what the rows are run with: the loop of nominal options, its faults' onsets varied."""
-    own, faults = setup.experiment, _faults(setup)
-    options = {c.name: c.options[c.nominal] for c in own.space.choices}
+    base, faults = setup.experiment, _faults(setup)
+    options = {c.name: c.options[c.nominal] for c in base.space.choices}
     onsets = tuple(
         Uncertain(name=_onset(fault), bounds=(0.0, NEVER), nominal=NEVER, unit="s")
         for fault in faults.values()
     )
-    space = replace(own.space, quantities=(*own.space.quantities, *onsets), choices=())
-    watched = (*own.spec.requirements, *_detectors(asked, own))
+    space = replace(base.space, quantities=(*base.space.quantities, *onsets), choices=())
+    watched = (*base.spec.requirements, *_detectors(asked, base))
     times = tuple(ViolationTime(requirement=r) for r in watched)
     return replace(
-        own,
+        base,
         space=space,
-        build=partial(_faulty, own.build, options, tuple(faults.values())),
-        metrics=(*own.metrics, *times),  # type: ignore[arg-type]
+        build=partial(_faulty, base.build, options, tuple(faults.values())),
+        metrics=(*base.metrics, *times),  # type: ignore[arg-type]
     )
 
 
 def _detectors(asked: Faults, experiment: Experiment) -> tuple[Requirement, ...]:
-    """Return what tells of a fault, as requirements that the spec does not have."""
+    """Return the detectors of faults, as requirements that the spec does not have."""
     end = float(experiment.timepts[-1])
     return tuple(
         Requirement(key=name, formula=parse_formula(formula), until=end)
@@ -190,7 +190,7 @@ def _run(asked: Faults, ground: Ground) -> Finding | None:
     )
     watched = (*setup.experiment.spec.requirements, *_detectors(asked, setup.experiment))
     effects = effects.join(_times(prepared, table, watched)).rename_axis("row")
-    return _found(asked, effects)
+    return _finding(asked, effects)
 
 
 def _times(
@@ -228,7 +228,7 @@ def _violating(effects: pd.DataFrame) -> pd.DataFrame:
     return effects.loc[violates(effects["margin"])]
 
 
-def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
+def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
     """Return what the effects say, in a sentence, and the answer to the claim."""
     single, pairs = _single(effects), _pairs(effects)
     bad, bad_pairs = _violating(single), _violating(pairs)
@@ -274,17 +274,17 @@ def _found(asked: Faults, effects: pd.DataFrame) -> Finding:
 def _detection(asked: Faults, effects: pd.DataFrame) -> str:
     """Return how many single faults are detected, and whether before they violate the spec."""
     others = [k for k in effects if k.endswith(" violated at") and k[:-12] not in asked.detects]
-    found = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
+    detected = effects[[f"{name} violated at" for name in asked.detects]].to_numpy().min(axis=1)
     violated = effects[others].to_numpy().min(axis=1)
     alone = ((effects["first"] != "") & (effects["second"] == "")).to_numpy()
     bad = alone & violates(effects["margin"])
-    count, early = int(np.isfinite(found[alone]).sum()), int((found < violated)[bad].sum())
+    count, early = int(np.isfinite(detected[alone]).sum()), int((detected < violated)[bad].sum())
     words = (
         f"{some_of(count, int(alone.sum()), 'single fault', 'is', 'are')} detected; of those that "
         f"violate the spec {early} of {int(bad.sum())} before they do."
     )
-    if np.isfinite(found[0]):
-        words += f" Without a fault there is a false alarm at {found[0]:g} s."
+    if np.isfinite(detected[0]):
+        words += f" Without a fault there is a false alarm at {detected[0]:g} s."
     return words
 
 
@@ -403,7 +403,7 @@ def _effects(
 
 
 def _after(time: float, onset: float, step: float) -> str:
-    """Return the time from the onset to a violation, which samples tell to within a `step`.
+    """Return the time from the onset to a violation, which samples give to within a `step`.
 
     One before the onset has nothing to do with the fault.
     """

@@ -28,7 +28,7 @@ __all__ = ["MORRIS"]
 
 MORRIS_CAPTION = (
     "Elementary effects on '{of}': μ* is the mean magnitude, with its bootstrap interval; a σ far "
-    "from 0 tells that a quantity does not act linearly, or not on its own."
+    "from 0 shows that a quantity does not act linearly, or not on its own."
 )
 MORRIS_1991 = (
     "M. Morris: Factorial sampling plans for preliminary computational experiments. Technometrics "

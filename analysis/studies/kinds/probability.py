@@ -52,14 +52,14 @@ class Probability(Asked):
 
 def _run(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
-    found = violation_probability(design, margins, asked.confidence, asked.side)
-    verdict = {} if asked.limit is None else vars(bound_verdict(found, asked.limit))
+    violation = violation_probability(design, margins, asked.confidence, asked.side)
+    verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
     return made(
         asked,
-        str(found),
+        str(violation),
         **verdict,
-        runs=found.runs,
-        numbers=statement_numbers(found),
+        runs=violation.runs,
+        numbers=statement_numbers(violation),
     )
 
 
@@ -69,10 +69,10 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     bound = f"at most {rounded_up(high)}" if high < 1 else ""
     if low > 0:
         bound = f"{bound}{', ' * bool(bound)}at least {rounded_down(low)}"
-    each = " each" if low > 0 and n["side"] != "both" and high < 1 else ""
+    singly = " each" if low > 0 and n["side"] != "both" and high < 1 else ""
     return {
         "measured": f"{n['violations']} of {counted(n['runs'], 'run')}; {bound or 'nothing'} with "
-        f"confidence {100 * n['confidence']:g} %{each}",
+        f"confidence {100 * n['confidence']:g} %{singly}",
         "limit": f"≤ {asked.limit:g}",
         "margin": f"{asked.limit - high:.3g}",
     }

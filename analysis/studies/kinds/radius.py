@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RADIUS"]
 
-SIZES = 12  # that the search looks at, roughly
-_CAPTION = "Sizes that were looked at, as factors of the box, with the lowest margin found there."
+SIZES = 12  # that the search tries, roughly
+_CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
 _SMALLEST = " Dashed: the smallest size with a violation."
 
 
@@ -51,7 +51,7 @@ def _run(asked: AskedRadius, ground: Ground) -> Finding:
     """Search for the smallest size with a violation."""
     space = ground.space(asked.quantities)
     largest, why = largest_scale(ground.prepared, asked.largest, space.names)
-    found = robustness_radius(
+    radius = robustness_radius(
         ground.simulate,
         space,
         largest,
@@ -62,17 +62,17 @@ def _run(asked: AskedRadius, ground: Ground) -> Finding:
         confidence=asked.confidence,
         entropy=ground.seed,
     )
-    numbers: dict[str, Any] = {"upper": found.upper, "searched": found.searched}
-    numbers |= {"largest": found.largest, "margin": found.margin, "witness": found.witness}
-    if found.statement is not None:
-        numbers["statement"] = statement_numbers(found.statement)
+    numbers: dict[str, Any] = {"upper": radius.upper, "searched": radius.searched}
+    numbers |= {"largest": radius.largest, "margin": radius.margin, "witness": radius.witness}
+    if radius.statement is not None:
+        numbers["statement"] = statement_numbers(radius.statement)
     return made(
         asked,
-        str(found),
-        **_no_small_violation(asked.limit, found.upper, found.largest),
-        runs=found.runs + (0 if found.statement is None else found.statement.runs),
+        str(radius),
+        **_no_small_violation(asked.limit, radius.upper, radius.largest),
+        runs=radius.runs + (0 if radius.statement is None else radius.statement.runs),
         numbers=numbers,
-        tables={"steps": found.steps},
+        tables={"steps": radius.steps},
     )
 
 
@@ -98,25 +98,25 @@ def _largest(asked: AskedRadius, quantities: int) -> int:
 
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
-    found = f"violation at size {n['upper']:.4g}"
+    measured = f"violation at size {n['upper']:.4g}"
     if n["upper"] == 0:
-        found = f"the nominal values violate, margin {margin_text(n['margin'])}"
+        measured = f"the nominal values violate, margin {margin_text(n['margin'])}"
     elif n["witness"] is None:
-        found = f"no violation found up to size {n['largest']:.4g}"
+        measured = f"no violation found up to size {n['largest']:.4g}"
     return {
-        "measured": found,
+        "measured": measured,
         "limit": f"≥ {asked.limit:g}",
         "margin": f"{min(n['upper'], n['largest']) - asked.limit:.3g}",
     }
 
 
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
-    """Yield which sizes were looked at, and the row at the edge of the smallest violation."""
+    """Yield which sizes were tried, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
-    if n["upper"] == 0:  # the nominal values violate: no other size was looked at
+    if n["upper"] == 0:  # the nominal values violate: no other size was tried
         yield from found_rows({"violating row": n["witness"]}, result.quantities, key)
         return
-    told = ", ".join(
+    listed = ", ".join(
         f"{step['size']:.4g}: {margin_text(float(step['margin']))}"
         for step in steps.to_dict("records")
     )
@@ -124,7 +124,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Figure(
         key=f"{key}-sizes",
         caption=caption,
-        description=f"{caption} Lowest margin by size: {told}.",
+        description=f"{caption} Lowest margin by size: {listed}.",
         figure=figures.radius_steps(steps, float(n["upper"])),
     )
     if n["witness"] is not None:

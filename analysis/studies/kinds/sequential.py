@@ -1,4 +1,4 @@
-"""Whether a probability is below a limit, looked at while the rows come in."""
+"""Whether a probability is below a limit, decided while the rows come in."""
 
 from __future__ import annotations
 

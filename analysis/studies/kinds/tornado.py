@@ -66,8 +66,8 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
     """Differentiate the nominal run, then run every quantity at either end of its box."""
     prepared = ground.prepared
     space = prepared.experiment.space
-    own, middle = _numbers(space), nominal(space)
-    rows = [middle, *(middle | {q.name: end} for q in own for end in q.box)]
+    varied, middle = _numbers(space), nominal(space)
+    rows = [middle, *(middle | {q.name: end} for q in varied for end in q.box)]
     design = from_table(space, pd.DataFrame(rows, columns=space.names), entropy=ground.seed)
     done = ground.run_design(design)
     if not done.complete:
@@ -75,61 +75,61 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
     loop = next(
         loop for labels, loop in prepared.loops if all(middle[k] == v for k, v in labels.items())
     )
-    found, without = _gradient(asked, prepared.experiment, loop, own)
+    gradient, without = _gradient(asked, prepared.experiment, loop, varied)
     at_ends = column(done, asked.of)
-    table = _table(own, found, at_ends[1:].reshape(-1, 2) - at_ends[0])
+    table = _table(varied, gradient, at_ends[1:].reshape(-1, 2) - at_ends[0])
     reach = table[["low", "high"]].abs().max(axis=1)
     largest = ", ".join(f"{name} ({reach[name]:.3g})" for name in reach.nlargest(3).index)
-    told = (
-        f"'{asked.of}' is {found.value:.4g} at the nominal values"
-        + (f", by '{found.key}'" if found.key != asked.of else "")
+    sentence = (
+        f"'{asked.of}' is {gradient.value:.4g} at the nominal values"
+        + (f", by '{gradient.key}'" if gradient.key != asked.of else "")
         + f"; what changes it most within its box, by its derivative: {largest} (one run with "
-        f"{counted(len(own), 'derivative')}, {counted(len(rows), 'run')} without).{without}"
+        f"{counted(len(varied), 'derivative')}, {counted(len(rows), 'run')} without).{without}"
     )
     return made(
         asked,
-        told,
+        sentence,
         runs=1 + len(rows),
-        numbers={"of": asked.of, "value": found.value, "by": found.key},
+        numbers={"of": asked.of, "value": gradient.value, "by": gradient.key},
         tables={"effects": table},
     )
 
 
-def _table(own: list[Uncertain], found: MetricGradient, runs: np.ndarray) -> pd.DataFrame:
+def _table(varied: list[Uncertain], gradient: MetricGradient, runs: np.ndarray) -> pd.DataFrame:
     """Return what derivatives say of both ends of each box, and what runs there do."""
     rows = []
-    for j, quantity in enumerate(own):
+    for j, quantity in enumerate(varied):
         low, high = (end - float(quantity.nominal or 0.0) for end in quantity.box)
-        above, below = float(found.above[j]), float(found.below[j])
+        above, below = float(gradient.above[j]), float(gradient.below[j])
         rows.append((0.5 * (above + below), below * low, above * high, *map(float, runs[j])))
-    names = pd.Index([quantity.name for quantity in own], name="quantity")
+    names = pd.Index([quantity.name for quantity in varied], name="quantity")
     columns = ["derivative", "low", "high", "run_low", "run_high"]
     return pd.DataFrame(rows, index=names, columns=columns)
 
 
 def _gradient(
-    asked: Tornado, experiment: Experiment, loop: Compiled, own: list[Uncertain]
+    asked: Tornado, experiment: Experiment, loop: Compiled, varied: list[Uncertain]
 ) -> tuple[MetricGradient, str]:
     """Return the derivatives of the nominal run, and by what there are none."""
-    metrics = _asked_of(asked, experiment)
+    metrics = _metrics_of(asked, experiment)
     given = arguments(experiment.space, pd.DataFrame([nominal(experiment.space)]))
-    one = {part: {name: v[0] for name, v in each.items()} for part, each in given.items()}
+    one = {part: {name: v[0] for name, v in lack.items()} for part, lack in given.items()}
     signals = list(dict.fromkeys(s for m in metrics for s in m.signals))
-    names = [quantity.name for quantity in own]
+    names = [quantity.name for quantity in varied]
 
     def run(by: list[str]) -> MetricGradient:
         response = sensitivity_response(
             loop, experiment.timepts, experiment.inputs, one["initial_state"], of=signals,
             with_respect_to=by, params=one["params"], rtol=experiment.rtol, atol=experiment.atol,
         )  # fmt: skip
-        lacks.extend(str(each) for each in response.missing)
-        found = [metric_gradient(metric, response) for metric in metrics]
-        return min(found, key=lambda each: each.value)
+        lacks.extend(str(lack) for lack in response.missing)
+        gradient = [metric_gradient(metric, response) for metric in metrics]
+        return min(gradient, key=lambda gradient: gradient.value)
 
     lacks: list[str] = []
     refused = {}
     try:
-        found = run(names)
+        gradient = run(names)
     except CompileError:
         for name in names:
             try:
@@ -139,25 +139,25 @@ def _gradient(
         lacks.clear()
         if len(refused) == len(names):
             raise
-        found = _with_gaps(run([n for n in names if n not in refused]), names)
-    told = "".join(f" {why[0].upper()}{why[1:]}." for why in [*lacks, *refused.values()])
-    return found, told
+        gradient = _with_gaps(run([n for n in names if n not in refused]), names)
+    doubts = "".join(f" {why[0].upper()}{why[1:]}." for why in [*lacks, *refused.values()])
+    return gradient, doubts
 
 
-def _with_gaps(found: MetricGradient, names: list[str]) -> MetricGradient:
+def _with_gaps(gradient: MetricGradient, names: list[str]) -> MetricGradient:
     """Return derivatives by all names, NaN where there are none."""
 
     def spread(values: np.ndarray) -> np.ndarray:
-        own = dict(zip(found.with_respect_to, values, strict=True))
-        return np.array([own.get(name, np.nan) for name in names])
+        by_name = dict(zip(gradient.with_respect_to, values, strict=True))
+        return np.array([by_name.get(name, np.nan) for name in names])
 
     return MetricGradient(
-        key=found.key, value=found.value, with_respect_to=tuple(names),
-        scale=spread(found.scale), above=spread(found.above), below=spread(found.below),
+        key=gradient.key, value=gradient.value, with_respect_to=tuple(names),
+        scale=spread(gradient.scale), above=spread(gradient.above), below=spread(gradient.below),
     )  # fmt: skip
 
 
-def _asked_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
+def _metrics_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
     """Return the requirement or metric of a column; of the spec all requirements."""
     requirements = experiment.spec.requirements
     if asked.of == "spec":

@@ -92,12 +92,12 @@ class Tuning(Asked):
 
 def _experiment(asked: Tuning, setup: Setup) -> Experiment:
     """Return what the rows are run with: the study's, with the gains as quantities."""
-    own = setup.experiment
+    base = setup.experiment
     for name in asked.gains:
-        if name in own.space.names:
+        if name in base.space.names:
             raise ParameterError(f"'{name}' is tuned: leave it out of [space]")
     gains = tuple(Uncertain(name=name, bounds=bounds) for name, bounds in asked.gains.items())
-    return replace(own, space=replace(own.space, quantities=(*own.space.quantities, *gains)))
+    return replace(base, space=replace(base.space, quantities=(*base.space.quantities, *gains)))
 
 
 def _check(asked: Tuning, setup: Setup) -> None:
@@ -115,10 +115,10 @@ def _check(asked: Tuning, setup: Setup) -> None:
 
 def _metric(asked: Tuning, experiment: Experiment) -> Any:
     """Return the metric to be lowered."""
-    known = {metric.key: metric for metric in experiment.metrics}
-    if asked.lower not in known:
-        raise unknown("metric", asked.lower, known, "of 'lower'")
-    return known[asked.lower]
+    metrics = {metric.key: metric for metric in experiment.metrics}
+    if asked.lower not in metrics:
+        raise unknown("metric", asked.lower, metrics, "of 'lower'")
+    return metrics[asked.lower]
 
 
 def _runs(asked: Tuning, setup: Setup) -> int:
@@ -133,14 +133,14 @@ def _largest(asked: Tuning, quantities: int) -> int:
 def _run(asked: Tuning, ground: Ground) -> Finding | None:
     """Find gains, then run fresh rows with those of before and after."""
     prepared = prepare(_experiment(asked, ground.setup))
-    found = _tuned(asked, ground, prepared)
+    tuned = _tuned(asked, ground, prepared)
     space = prepared.experiment.space
     design = independent(ground.prepared.experiment.space, asked.runs, ground.seed)
     drawn = design.table.rename(
-        columns=dict(zip(design.space.names, _own(space, asked), strict=True))
+        columns=dict(zip(design.space.names, _varied_names(space, asked), strict=True))
     )
-    both = [drawn.assign(**dict(zip(found.names, values, strict=True)))
-            for values in (found.start, found.values)]  # fmt: skip
+    both = [drawn.assign(**dict(zip(tuned.names, values, strict=True)))
+            for values in (tuned.start, tuned.values)]  # fmt: skip
     rows = pd.concat(both, ignore_index=True).filter(space.names)
     done = ground.run_design(from_table(space, rows, entropy=ground.seed), prepared)
     if not done.complete:
@@ -152,21 +152,21 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
     verdict = {} if asked.limit is None else vars(bound_verdict(after, asked.limit))
     return made(
         asked,
-        _sentence(asked, found, before, after),
+        _sentence(asked, tuned, before, after),
         **verdict,
-        runs=found.plain_runs + found.differentiated_runs + len(rows),
-        numbers=_numbers(found, before, after),
+        runs=tuned.plain_runs + tuned.differentiated_runs + len(rows),
+        numbers=_numbers(tuned, before, after),
         tables={
-            "gains": found.to_pandas(),
-            "requirements": _requirements(found),
-            "tried": found.history,
+            "gains": tuned.to_pandas(),
+            "requirements": _requirements(tuned),
+            "tried": tuned.history,
             "fresh": pd.DataFrame(np.split(margins, 2), index=["before", "after"]).T,
-            "signals": _signals(prepared, found),
+            "signals": _signals(prepared, tuned),
         },
     )
 
 
-def _own(space: Space, asked: Tuning) -> list[str]:
+def _varied_names(space: Space, asked: Tuning) -> list[str]:
     """Return the names of what the study varies itself, as in the space with the gains."""
     quantities = [q.name for q in space.quantities]
     return [*quantities[: -len(asked.gains)], *(c.name for c in space.choices)]
@@ -181,84 +181,84 @@ def _nominal_loop(prepared: Prepared) -> Compiled:
 def _tuned(asked: Tuning, ground: Ground, prepared: Prepared) -> Tuned:
     """Find gains on a few samples; integers are nominal in these."""
     experiment, size = prepared.experiment, len(asked.gains)
-    own, gains = experiment.space.quantities[:-size], experiment.space.quantities[-size:]
-    samples = {q.name: [q.nominal] for q in own}
-    if asked.samples and own:
+    varied, gains = experiment.space.quantities[:-size], experiment.space.quantities[-size:]
+    samples = {q.name: [q.nominal] for q in varied}
+    if asked.samples and varied:
         other = int(np.random.SeedSequence(ground.seed, spawn_key=(1,)).generate_state(1)[0])
-        table = independent(Space(quantities=own), asked.samples, other).table
+        table = independent(Space(quantities=varied), asked.samples, other).table
         samples = {q.name: [q.nominal] * asked.samples if q.is_integer else table[q.name]
-                   for q in own}  # fmt: skip
-    found = tune(
+                   for q in varied}  # fmt: skip
+    tuned = tune(
         _nominal_loop(prepared), {q.name: (q.nominal, *q.box) for q in gains}, experiment.spec,
         asked.budget, experiment.timepts, experiment.inputs, samples=samples,
         cost=_metric(asked, experiment) if asked.lower else None, starts=asked.starts,
         seed=ground.seed, rtol=experiment.rtol, atol=experiment.atol,
         max_steps=experiment.max_steps,
     )  # fmt: skip
-    if found.message == "interrupted":
+    if tuned.message == "interrupted":
         raise KeyboardInterrupt
-    return found
+    return tuned
 
 
-def _sentence(asked: Tuning, found: Tuned, before: Violation, after: Violation) -> str:
+def _sentence(asked: Tuning, tuned: Tuned, before: Violation, after: Violation) -> str:
     """Say what was found, with what, and how it does on fresh rows."""
     where = counted(asked.samples, "sample") if asked.samples else "the nominal values"
     gains = ", ".join(
         f"{name} = {new:.4g} (was {old:.4g})"
-        for name, new, old in zip(found.names, found.values, found.start, strict=True)
+        for name, new, old in zip(tuned.names, tuned.values, tuned.start, strict=True)
     )
     numbers = "; ".join(
-        f"the {_what(found, key)} is {margin_text(found.before[key])} before and "
-        f"{margin_text(found.after[key])} after"
-        for key in found.after
+        f"the {_what(tuned, key)} is {margin_text(tuned.before[key])} before and "
+        f"{margin_text(tuned.after[key])} after"
+        for key in tuned.after
     )
     runs = (
-        f"{counted(found.differentiated_runs, 'run')} with derivatives and {found.plain_runs} "
-        f"without, counted as {found.counted_runs:.0f}"
+        f"{counted(tuned.differentiated_runs, 'run')} with derivatives and {tuned.plain_runs} "
+        f"without, counted as {tuned.counted_runs:.0f}"
     )
-    notes = "".join(f" {note[0].upper()}{note[1:]}." for note in found.notes)
+    notes = "".join(f" {note[0].upper()}{note[1:]}." for note in tuned.notes)
     return (
-        f"Found on {where}: {gains}. There {numbers} ({runs}; {found.message}).{notes} On fresh "
+        f"Found on {where}: {gains}. There {numbers} ({runs}; {tuned.message}).{notes} On fresh "
         f"rows {before.violations} of {before.runs} violate the spec with the gains as they were; "
         f"with those that were found {after}"
     )
 
 
-def _what(found: Tuned, key: str) -> str:
-    return f"mean {key}" if key == found.cost else f"least margin of '{key}'"
+def _what(tuned: Tuned, key: str) -> str:
+    return f"mean {key}" if key == tuned.cost else f"least margin of '{key}'"
 
 
-def _numbers(found: Tuned, before: Violation, after: Violation) -> dict[str, Any]:
-    goal = found.cost or "margin"
-    ends = (found.margin_before, found.margin)
-    if found.cost:
-        ends = (found.before[found.cost], found.after[found.cost])
+def _numbers(tuned: Tuned, before: Violation, after: Violation) -> dict[str, Any]:
+    goal = tuned.cost or "margin"
+    ends = (tuned.margin_before, tuned.margin)
+    if tuned.cost:
+        ends = (tuned.before[tuned.cost], tuned.after[tuned.cost])
     return {
-        "gains": dict(zip(found.names, map(float, found.values), strict=True)),
+        "gains": dict(zip(tuned.names, map(float, tuned.values), strict=True)),
         "goal": goal,
         "before": float(ends[0]),
         "after": float(ends[1]),
-        "counted_runs": found.counted_runs,
-        "plain_runs": found.plain_runs,
-        "differentiated_runs": found.differentiated_runs,
-        "message": found.message,
-        "notes": list(found.notes),
+        "counted_runs": tuned.counted_runs,
+        "plain_runs": tuned.plain_runs,
+        "differentiated_runs": tuned.differentiated_runs,
+        "message": tuned.message,
+        "notes": list(tuned.notes),
         "fresh_before": statement_numbers(before),
         "fresh_after": statement_numbers(after),
     }
 
 
-def _requirements(found: Tuned) -> pd.DataFrame:
+def _requirements(tuned: Tuned) -> pd.DataFrame:
     """Return margins and cost on the samples, before and after."""
-    columns = {"before": found.before, "after": found.after}
+    columns = {"before": tuned.before, "after": tuned.after}
     return pd.DataFrame(columns).rename_axis("number")
 
 
-def _signals(prepared: Prepared, found: Tuned) -> pd.DataFrame:
-    """Return what the spec looks at over time, at nominal values, before and after."""
+def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
+    """Return what the spec reads over time, at nominal values, before and after."""
     experiment, space = prepared.experiment, prepared.experiment.space
-    ends = np.stack([found.start, found.values], axis=1)
-    gains = dict(zip(found.names, ends, strict=True))
+    ends = np.stack([tuned.start, tuned.values], axis=1)
+    gains = dict(zip(tuned.names, ends, strict=True))
     rows = pd.DataFrame([nominal(space)] * 2).assign(**gains)
     names = list(dict.fromkeys(s for r in experiment.spec.requirements for s in r.signals))
     columns = {"time": experiment.timepts}
@@ -311,7 +311,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         description=f"{_FRESH} Median before {np.median(margins[0]):.4g}, after "
         f"{np.median(margins[1]):.4g}.", figure=figures.margins_of_both(*margins),
     )  # fmt: skip
-    yield _asked_table(tables["requirements"])
+    yield _requirements_table(tables["requirements"])
     yield Figure(
         key=f"{key}-tried", caption=_TRIED + text.clipped(tables["tried"]["margin"]),
         description=f"{_TRIED} Runs as counted: {n['counted_runs']:.0f}.",
@@ -319,7 +319,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     )  # fmt: skip
 
 
-def _asked_table(requirements: pd.DataFrame) -> Table:
+def _requirements_table(requirements: pd.DataFrame) -> Table:
     return Table(
         caption="What was asked, on the samples that gains were found on: least margins, and the "
         "mean of a metric.",
@@ -330,12 +330,12 @@ def _asked_table(requirements: pd.DataFrame) -> Table:
 
 
 def _largest_of(before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]) -> str:
-    told = (
+    extremes = (
         f"Largest magnitude of {name}: {np.abs(before[name]).max():.4g} before, "
         f"{np.abs(after[name]).max():.4g} after."
         for name in before
     )
-    return " ".join(told)
+    return " ".join(extremes)
 
 
 GAIN_TUNING = Kind(

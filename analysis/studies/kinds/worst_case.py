@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["WORST_CASE"]
 
-SEARCH = "Lowest margin after each run of the search; the background tells what chose the run."
+SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
 ZELLER = (
     "A. Zeller, R. Hildebrandt: Simplifying and isolating failure-inducing input. IEEE Trans. "
     "Softw. Eng. 28 (2002) 183–200. doi 10.1109/32.988498."
@@ -57,30 +57,30 @@ class AskedWorstCase(Varied):
 def _run(asked: AskedWorstCase, ground: Ground) -> Finding:
     """Search for the lowest margin; confirm and shrink a violation."""
     space = ground.space(asked.quantities)
-    found = worst_case(ground.simulate, space, asked.runs, entropy=ground.seed)
-    if not found.is_finished:
+    worst = worst_case(ground.simulate, space, asked.runs, entropy=ground.seed)
+    if not worst.is_finished:
         raise KeyboardInterrupt
-    told = [str(found)]
-    numbers: dict[str, Any] = {"margin": found.margin, "witness": found.witness}
-    numbers |= {"found_by": found.found_by, "runs": found.runs, "all_corners": found.all_corners}
-    results = found.results.assign(searcher=found.searchers)
-    tables = {"rows": results, "best": pd.DataFrame({"margin": found.best_so_far})}
-    count = found.design.size
-    if found.is_violated:
-        row = nominal(ground.space()) | found.witness
+    sentences = [str(worst)]
+    numbers: dict[str, Any] = {"margin": worst.margin, "witness": worst.witness}
+    numbers |= {"found_by": worst.found_by, "runs": worst.runs, "all_corners": worst.all_corners}
+    results = worst.results.assign(searcher=worst.searchers)
+    tables = {"rows": results, "best": pd.DataFrame({"margin": worst.best_so_far})}
+    count = worst.design.size
+    if worst.is_violated:
+        row = nominal(ground.space()) | worst.witness
         again = confirm(ground.prepared, row, python_control=asked.python_control)
-        told.append(str(again))
+        sentences.append(str(again))
         numbers |= {"is_confirmed": again.is_confirmed, "spread": again.spread}
         tables["replays"] = again.replays
         if asked.shrink:
-            small = shrink(ground.simulate, space, found.witness)
-            told.append(str(small))
+            small = shrink(ground.simulate, space, worst.witness)
+            sentences.append(str(small))
             numbers["shrunk"] = vars(small)
             count += small.runs
     return made(
         asked,
-        " ".join(told),
-        **_no_low_margin(asked.limit, found.margin, bool(numbers.get("is_confirmed", True))),
+        " ".join(sentences),
+        **_no_low_margin(asked.limit, worst.margin, bool(numbers.get("is_confirmed", True))),
         runs=count,
         numbers=numbers,
         tables=tables,
@@ -151,9 +151,9 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
 
 
 def _replays(replays: pd.DataFrame, is_confirmed: bool) -> Table:
-    told = "Confirmed" if is_confirmed else "Not confirmed"
+    verdict = "Confirmed" if is_confirmed else "Not confirmed"
     return Table(
-        caption=f"{told}: the worst row run again in other ways.",
+        caption=f"{verdict}: the worst row run again in other ways.",
         columns=("engine", "method", "rtol", "atol", "status", "reached (s)", "margin"),
         rows=[
             (

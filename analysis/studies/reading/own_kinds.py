@@ -42,28 +42,28 @@ def study_model(kinds: tuple[tuple[str, Kind], ...]) -> type[Study]:
     )
 
 
-def model_of(own: Mapping[str, Kind]) -> type[Study]:
+def model_of(kinds: Mapping[str, Kind]) -> type[Study]:
     """Return the shape of study files with nlctl's kinds of analysis and some of one's own."""
-    return study_model((*((kind.name, kind) for kind in KINDS), *own.items()))
+    return study_model((*((kind.name, kind) for kind in KINDS), *kinds.items()))
 
 
 def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:
     """Return the kinds that a study file names by their place, and the mistakes among them.
 
-    The files and modules that they stand in are run, see `code.rule`.
+    The files and modules that have them are run, see `code.rule`.
     """
     named = list(_named(data))
     problems = untrusted(named, grant)
     refused = {problem.place for problem in problems}
-    found: dict[str, Kind] = {}
+    kinds: dict[str, Kind] = {}
     for place, name in named:
-        if place in refused or name in found:
+        if place in refused or name in kinds:
             continue
         try:
-            found[name] = named_kind(name, grant)
+            kinds[name] = named_kind(name, grant)
         except UsageError as error:
             problems.append(Problem(place=place, message=str(error)))
-    return found, problems
+    return kinds, problems
 
 
 def _named(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:

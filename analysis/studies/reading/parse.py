@@ -36,7 +36,7 @@ from .validate import checked_experiment
 __all__ = ["StudyFile", "read_study"]
 
 _ROUNDS = 5  # mistakes may stand behind mistakes
-STAND_INS = {  # while the rest of a mistaken file is looked at
+STAND_INS = {  # while the rest of a mistaken file is validated
     "study": {"title": "a study", "seed": 0},
     "time": {"end": 1e5, "step": 0.1},  # formulas look ahead by less
     "spec": {},
@@ -78,7 +78,7 @@ def read_study(
     path : str or Path
         The study file, in TOML.
     settings : sequence of str, optional
-        ``key=value`` that replace what stands there: ``runs.size=100``,
+        ``key=value`` that replace what the file has: ``runs.size=100``,
         ``space."actuator.b_r".uniform=[0.3, 0.6]``, ``analysis.0.confidence=0.9``.
     folder : str or Path, optional
         What paths in the study are relative to; by default the file's folder.
@@ -127,8 +127,8 @@ def read_study(
         raise StudyError(str(path), [Problem(place=(), message=str(error))]) from None
     reach: Reach = "all" if trust else "nlctl" if received else "study"
     grant = Grant(reach=reach, folder=folder, study=study_digest(data))
-    own, mistaken = own_kinds(data, grant)
-    study, problems, entries = _validated(data, model_of(own), mistaken)
+    kinds, mistaken = own_kinds(data, grant)
+    study, problems, entries = _validated(data, model_of(kinds), mistaken)
     experiment = None
     if study is not None:
         more = _refused(study, grant)
@@ -182,22 +182,22 @@ def _validated(
         try:
             return model.model_validate(whole), problems, entries
         except ValidationError as error:
-            found = schema_problems(error, model, whole)
-        found = [replace(p, place=_original(p.place, entries)) for p in found]
-        told = problems  # what takes out a mistaken part lets others come to light
-        problems = told + [p for p in found if not follows(p, told)]
-        for problem in reversed(found):
+            mistakes = schema_problems(error, model, whole)
+        mistakes = [replace(p, place=_original(p.place, entries)) for p in mistakes]
+        reported = problems  # what takes out a mistaken part lets others come to light
+        problems = reported + [p for p in mistakes if not follows(p, reported)]
+        for problem in reversed(mistakes):
             _remove(rest, problem.place)
         for name, table in STAND_INS.items():
-            if any(problem.place[:1] == (name,) for problem in found) and name not in rest:
+            if any(problem.place[:1] == (name,) for problem in mistakes) and name not in rest:
                 rest[name] = table
     return None, problems, entries
 
 
-def follows(problem: Problem, told: Sequence[Problem]) -> bool:
+def follows(problem: Problem, reported: Sequence[Problem]) -> bool:
     """Whether a mistake may follow from parts that were taken out because of others."""
     place = problem.place
-    return any(place and one.place[: len(place)] == place for one in told)
+    return any(place and one.place[: len(place)] == place for one in reported)
 
 
 def _original(place: KeyPath, entries: Sequence[int]) -> KeyPath:
@@ -241,8 +241,8 @@ def _set(data: dict[str, Any], setting: str) -> KeyPath:
         except ValueError:
             parsed = {}
     if not (equals and parsed):
-        told = setting if len(setting) < 200 else f"{setting[:100]} ..."
-        raise ParameterError(f"--set needs KEY=VALUE with a key as in TOML, got '{told}'")
+        shown = setting if len(setting) < 200 else f"{setting[:100]} ..."
+        raise ParameterError(f"--set needs KEY=VALUE with a key as in TOML, got '{shown}'")
     place: list[str | int] = []
     target: Any = data
     depth = len(_keys(name))
@@ -276,9 +276,9 @@ def _entry(entries: list[Any], key: str, place: Sequence[str | int]) -> int:
         return int(key)
     named = [i for i, e in enumerate(entries) if key in (e.get("key"), e.get("kind"))]
     if len(named) != 1:
-        known = ", ".join(str(e.get("key") or e.get("kind")) for e in entries)
+        choices = ", ".join(str(e.get("key") or e.get("kind")) for e in entries)
         raise ParameterError(
             f"--set needs the number (0 to {len(entries) - 1}), or key or kind of one entry of "
-            f"{place_text(tuple(place))} ({known}), got '{key}'"
+            f"{place_text(tuple(place))} ({choices}), got '{key}'"
         )
     return named[0]

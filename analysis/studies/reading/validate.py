@@ -78,12 +78,12 @@ def checked_experiment(
     Errors of another kind than `UsageError` come from the user's own functions and pass.
     """
     notes = _Notes()
-    known = {"spec": study.spec, "space": study.space} | dict(named or {})
-    _check_tables(study, known, notes)
+    tables = {"spec": study.spec, "space": study.space} | dict(named or {})
+    _check_tables(study, tables, notes)
     requirements = [
-        made
+        checked
         for key in study.spec
-        if (made := notes.attempt(("spec", key), requirement, study, key)) is not None
+        if (checked := notes.attempt(("spec", key), requirement, study, key)) is not None
     ]
     quantities = {
         name: notes.attempt(("space", name), uncertain, name, law)
@@ -99,42 +99,42 @@ def checked_experiment(
     large = _too_large(study, notes)
     metrics = notes.attempt(("metrics",), metrics_of, study, folder, signals) if diagrams else None
     inputs = notes.attempt(("inputs",), inputs_of, study, diagrams) if diagrams else None
-    _check_analyses(study, known, metrics, notes)
-    made = None
+    _check_analyses(study, tables, metrics, notes)
+    checked = None
     if diagrams and not notes.problems:
-        made = notes.attempt((), experiment, study, folder, signals, inputs or ())
-    if made is None:
+        checked = notes.attempt((), experiment, study, folder, signals, inputs or ())
+    if checked is None:
         _check_designs(study, _stand_in(study, quantities), large, notes)
         _comparable(study, folder, notes)
     else:
-        space = notes.attempt(("space",), resolved, made.space, diagrams[0])
+        space = notes.attempt(("space",), resolved, checked.space, diagrams[0])
         if space is not None:
             if refusal := notes.attempt(("space",), refusal_of, space, diagrams):
                 notes.add(("space",), f"boxes do not fit together: {refusal}")
             _check_designs(study, space, large, notes)
-        setup = Setup(study=study, folder=folder, experiment=made)
+        setup = Setup(study=study, folder=folder, experiment=checked)
         for i, asked in _comparable(study, folder, notes):
             if (check := asked.definition.check) is not None:
                 notes.attempt(("analysis", i), check, asked, setup)
-    return made, _unique(notes.problems)
+    return checked, _unique(notes.problems)
 
 
-def _check_tables(study: Study, known: Mapping[str, Collection[str]], notes: _Notes) -> None:
-    if not known["spec"]:
+def _check_tables(study: Study, tables: Mapping[str, Collection[str]], notes: _Notes) -> None:
+    if not tables["spec"]:
         notes.add(("spec",), "needs at least one requirement")
-    if not (known["space"] or study.choices):
+    if not (tables["space"] or study.choices):
         notes.add(("space",), "needs at least one quantity, if there are no choices")
     notes.attempt(("time",), times, study)
-    notes.problems += id_problems(study, whole=set(known["spec"]) == set(study.spec))
+    notes.problems += id_problems(study, whole=set(tables["spec"]) == set(study.spec))
 
 
 def _stand_in(study: Study, quantities: Mapping[str, Uncertain | None]) -> Space:
     """Return a space of the study's size, whatever its mistakes, to validate designs."""
 
     def some(name: str, quantity: Uncertain | None) -> Uncertain:
-        known = quantity if quantity is not None else Uncertain(name=name, bounds=(0.0, 1.0))
-        middle = sum(known.box) / 2 if known.nominal is None else known.nominal
-        return replace(known, nominal=middle)
+        stand_in = quantity if quantity is not None else Uncertain(name=name, bounds=(0.0, 1.0))
+        middle = sum(stand_in.box) / 2 if stand_in.nominal is None else stand_in.nominal
+        return replace(stand_in, nominal=middle)
 
     return Space(
         quantities=tuple(some(*one) for one in (quantities or {"any": None}).items()),
@@ -181,21 +181,21 @@ def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputS
     if len(notes.problems) > before:
         return _as_it_comes(function)
     build = loop(study, folder)
-    made = []
+    choices = []
     for name, asked in study.choices.items():
         notes.attempt(("choices", name), check_keyword, build, name)
-        found = notes.attempt(("choices", name), choice, name, asked, build, folder)
-        made += [] if found is None else [found]
+        parsed = notes.attempt(("choices", name), choice, name, asked, build, folder)
+        choices += [] if parsed is None else [parsed]
     if len(notes.problems) > before:
         return _as_it_comes(function)
-    options = {c.name: c.options for c in made}
-    count = math.prod(len(c.options) for c in made)
+    options = {c.name: c.options for c in choices}
+    count = math.prod(len(c.options) for c in choices)
     if count > MOST_DIAGRAMS:
         notes.add(
             ("choices",), f"at most {MOST_DIAGRAMS:,} diagrams can be made, got {_count(count)}"
         )
         return []
-    every = combinations(Space(choices=tuple(made))) if made else [{}]
+    every = combinations(Space(choices=tuple(choices))) if choices else [{}]
     built = []
     for labels in every:
         chosen = {name: options[name][label] for name, label in labels.items()}
@@ -215,10 +215,10 @@ def _as_it_comes(function: Callable[..., Any] | None) -> list[ct.InputOutputSyst
 def _diagram(build: Callable[[], Any], name: str) -> ct.InputOutputSystem:
     """Return the diagram that a loop's function returns."""
     check_complete(build, name, {})
-    made = build()
-    if not is_system(made):
-        raise ParameterError(f"'{name}' returns {type(made).__name__}, and not a diagram")
-    return made
+    diagram = build()
+    if not is_system(diagram):
+        raise ParameterError(f"'{name}' returns {type(diagram).__name__}, and not a diagram")
+    return diagram
 
 
 def _check_names(
@@ -245,36 +245,36 @@ def _check_names(
 
 def _check_faults(diagram: ct.InputOutputSystem, signal: str, faulty: Faulty) -> None:
     """Refuse faults on a signal that the loop lacks, and magnitudes that are none."""
-    made = faults_of(signal, faulty)
-    if not made:
+    faults = faults_of(signal, faulty)
+    if not faults:
         kinds = ", ".join(Faulty.model_fields)
         raise ParameterError(f"faults on '{signal}' need at least one kind of: {kinds}")
-    with_faults(diagram, *made.values())
+    with_faults(diagram, *faults.values())
 
 
 def _check_analyses(
     study: Study,
-    known: Mapping[str, Collection[str]],
+    tables: Mapping[str, Collection[str]],
     metrics: Sequence[Metric] | None,
     notes: _Notes,
 ) -> None:
     """Look at what can be said without the loop; `metrics` are None if they are not known."""
-    columns = ("spec", *known["spec"], *(metric.key for metric in metrics or ()))
+    columns = ("spec", *tables["spec"], *(metric.key for metric in metrics or ()))
     seen = set(RESERVED)
     for i, asked in enumerate(study.analysis):
         if asked.key in seen:
             notes.add(("analysis", i, "key"), f"needs a key of its own, '{asked.key}' is taken")
         seen |= {asked.key} - {""}
-        if asked.definition.needs_rows and study.runs is None and "runs" not in known:
-            notes.add(("analysis", i), f"'{asked.kind}' looks at the main table: add [runs]")
-        certain = known["spec"] and metrics is not None
+        if asked.definition.needs_rows and study.runs is None and "runs" not in tables:
+            notes.add(("analysis", i), f"'{asked.kind}' needs the main table: add [runs]")
+        certain = tables["spec"] and metrics is not None
         named = _named(asked, asked.definition.columns) if certain else []
         for key, name in named:
             if name not in columns:
                 notes.add(("analysis", i, key), str(unknown("column", name, columns)))
         for key, name in _named(asked, asked.definition.quantities):
-            if known["space"] and name not in known["space"]:
-                notes.add(("analysis", i, key), str(unknown("quantity", name, known["space"])))
+            if tables["space"] and name not in tables["space"]:
+                notes.add(("analysis", i, key), str(unknown("quantity", name, tables["space"])))
 
 
 def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:
@@ -301,7 +301,7 @@ def _count(rows: int) -> str:
 
 
 def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Notes) -> None:
-    """Make designs that are known in advance, unless too large; hold the analyses against them."""
+    """Make designs that are known in advance, unless too large; check the analyses against them."""
     if study.runs is not None and ("runs",) not in large:
         mistakes = size_mistakes(study.runs)
         for key, mistake in mistakes.items():
@@ -311,17 +311,19 @@ def _check_designs(study: Study, space: Space, large: set[KeyPath], notes: _Note
     for i, asked in enumerate(study.analysis):
         if asked.definition.is_statement and study.runs is not None:
             kind = study.runs.design
-            made = Design(space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0)
-            notes.attempt(("analysis", i), check_iid, made)
+            design_of_rows = Design(
+                space=space, kind=kind, size=1, is_iid=kind == "i.i.d.", entropy=0
+            )
+            notes.attempt(("analysis", i), check_iid, design_of_rows)
         design = asked.definition.design
         if design is not None and ("analysis", i) not in large:
             notes.attempt(("analysis", i), design, asked, space, study.study.seed)
 
 
 def _named(asked: Asked, keys: Sequence[str]) -> list[tuple[str, str]]:
-    """Return the names that stand under some keys of an analysis, each with its key."""
-    found = []
+    """Return the names that some keys of an analysis, each with its key."""
+    names = []
     for key in keys:
         value = getattr(asked, key)
-        found += [(key, name) for name in ((value,) if isinstance(value, str) else value)]
-    return found
+        names += [(key, name) for name in ((value,) if isinstance(value, str) else value)]
+    return names

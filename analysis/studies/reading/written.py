@@ -50,7 +50,7 @@ def to_toml(study: Study) -> str:
 
 
 def _data(study: Study) -> dict[str, Any]:
-    """Return what stands in a file with this study."""
+    """Return the text of a file with this study."""
     return study.model_dump(mode="json", exclude_unset=True, exclude_none=True)
 
 

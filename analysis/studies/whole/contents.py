@@ -1,6 +1,6 @@
 """Whether a run folder is whole: one sealed record of every file, which every reader checks first.
 
-``contents.json`` is written last, when a run ends, and taken away when it goes on.  It says which
+``contents.json`` is written last, when a run ends, and removed when it continues.  It says which
 files there are, with a key of each, how many rows and which columns each table has, which analyses
 are expected, and which page was made of them: whatever a copy lost, a disk damaged or somebody
 edited is named.
@@ -25,7 +25,7 @@ __all__ = ["CONTENTS", "check_whole", "is_part", "problems_in", "seal", "sealed_
 CONTENTS = "contents.json"
 _LONGEST = 200  # characters of names in a message
 _AT_TOP = ("study.toml", "run.json", "results.json")
-REMEDY = "continue the run with --resume, which makes it anew, or take an intact copy"
+REMEDY = "continue the run with --resume, which makes it again, or take an intact copy"
 
 
 def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> None:
@@ -72,26 +72,26 @@ def is_part(path: Path) -> bool:
 
 def _rows(folder: Path, files: Iterable[Path]) -> dict[str, int]:
     """Return the number of rows that each part of a folder keeps in chunks."""
-    found: dict[str, int] = {}
+    rows: dict[str, int] = {}
     for path in files:
         if path.parent.name == "chunks" and path.suffix == ".parquet":
             part = path.relative_to(folder).parts[0]
-            found[part] = found.get(part, 0) + parquet().read_metadata(path).num_rows
-    return found
+            rows[part] = rows.get(part, 0) + parquet().read_metadata(path).num_rows
+    return rows
 
 
 def _tables(folder: Path, files: Iterable[Path]) -> dict[str, Any]:
     """Return the number of rows and the columns of every table in a folder."""
-    found = {}
+    tables = {}
     for path in files:
         if path.suffix == ".parquet":
             kept = parquet().read_metadata(path)
             columns = kept.schema.to_arrow_schema().names
-            found[path.relative_to(folder).as_posix()] = {
+            tables[path.relative_to(folder).as_posix()] = {
                 "rows": kept.num_rows,
                 "columns": columns,
             }
-    return found
+    return tables
 
 
 def check_whole(folder: Path) -> dict[str, Any]:
@@ -112,7 +112,7 @@ def sealed_record(folder: Path) -> dict[str, Any]:
         )
     if not path.exists():
         raise RunFolderError(f"'{folder}' holds no run of a study: there is no '{CONTENTS}'")
-    return shaped(path, ContentsFile, "continue the run with --resume, which makes it anew")
+    return shaped(path, ContentsFile, "continue the run with --resume, which makes it again")
 
 
 def problems_in(folder: Path, content: dict[str, Any]) -> Iterator[str]:
@@ -156,11 +156,11 @@ def _contradictions(folder: Path, content: dict[str, Any], files: list[Path]) ->
         return
     if rows != content["rows"]:
         yield f"{place} counts other rows ({content['rows']}) than there are ({rows})"
-    told = content["tables"]
-    for name in dict.fromkeys([*told, *tables]):
-        if told.get(name) != tables.get(name):
-            expected, found = (_size(where.get(name)) for where in (told, tables))
-            yield f"{place} says that '{name}' has {expected}, and it has {found}"
+    recorded = content["tables"]
+    for name in dict.fromkeys([*recorded, *tables]):
+        if recorded.get(name) != tables.get(name):
+            expected, actual = (_size(where.get(name)) for where in (recorded, tables))
+            yield f"{place} says that '{name}' has {expected}, and it has {actual}"
     expected, done = content["analyses"], content["done"]
     if expected[: len(done)] != done or (content["complete"] and done != expected):
         yield f"{place} names other analyses as done ({done}) than are expected ({expected})"

@@ -31,10 +31,10 @@ def recorded_page(folder: Path) -> Iterator[None]:
         content = check_whole(folder)
         yield
         files = (*_PAGE, *(name for name in (_SIGNALS,) if (folder / name).exists()))
-        made = {name: file_digest(folder / name) for name in files}
-        is_same = made[_PAGE[0]] == content["page"].get(_PAGE[0])
+        digests = {name: file_digest(folder / name) for name in files}
+        is_same = digests[_PAGE[0]] == content["page"].get(_PAGE[0])
         before = content["page"] if is_same else {}  # a print of another page is none of this one
-        write_json(folder / CONTENTS, content | {"page": before | made})
+        write_json(folder / CONTENTS, content | {"page": before | digests})
 
 
 @contextmanager

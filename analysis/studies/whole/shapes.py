@@ -1,4 +1,4 @@
-"""What stands in the JSON files of a run folder: the shapes that they are validated against.
+"""The shapes that the JSON files of a run folder are validated against.
 
 A file may be whole and carry the right key, and yet be of another version or made by hand.
 """
@@ -104,7 +104,7 @@ class _Metric(_File):
     meaning: _Text
 
 
-class _Found(_File):
+class _FindingHead(_File):
     key: _Key
     kind: _Text
     title: _Text
@@ -117,11 +117,11 @@ class _Found(_File):
     is_answered: _Some
 
 
-class _Listed(_Found):
+class _Listed(_FindingHead):
     tables: list[_Key]
 
 
-class FindingFile(_Found):
+class FindingFile(_FindingHead):
     """``KEY/finding.json``."""
 
     tables: dict[_Key, _Digest]
@@ -173,8 +173,8 @@ def shaped(path: Path, shape: type[_Shape], remedy: str = ANEW) -> dict[str, Any
     try:
         return shape.model_validate(content).model_dump(exclude_unset=True)
     except (ValidationError, RecursionError) as error:
-        told = "it is nested too deeply"
+        mistake = "it is nested too deeply"
         if isinstance(error, ValidationError):
             first = error.errors(include_url=False)[0]
-            told = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"[:200]
-        raise RunFolderError(f"'{path}' holds what no run writes ({told}): {remedy}") from error
+            mistake = f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"[:200]
+        raise RunFolderError(f"'{path}' holds what no run writes ({mistake}): {remedy}") from error

@@ -2,7 +2,7 @@
 
 NumPy's arrays of objects take whatever has operators.  So what NumPy computes by moving elements,
 adding and multiplying, it computes here as well, in its own order: `by_numpy` hands it the
-expressions one by one and collects what comes out.
+expressions individually and collects what comes out.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class _Cell:
         return bool(scalar(self.graph, self.expr))
 
 
-def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     function = getattr(operator, name)
 
     def method(self: _Cell, *other: Any) -> Any:
@@ -44,8 +44,8 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
             other = (other[0][()],)
         mine = scalar(self.graph, self.expr)
         theirs = [scalar(self.graph, v.expr) if isinstance(v, _Cell) else v for v in other]
-        found = function(*theirs, mine) if turned else function(mine, *theirs)
-        return _Cell(self.graph, found.only)
+        result = function(*theirs, mine) if reflected else function(mine, *theirs)
+        return _Cell(self.graph, result.only)
 
     return method
 
@@ -59,7 +59,7 @@ def _function(name: str) -> Callable[[_Cell], _Cell]:
 
 for _name in ("add", "sub", "mul", "truediv", "pow", "mod"):
     setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
-    setattr(_Cell, f"__r{_name}__", _operator(f"__{_name}__", turned=True))
+    setattr(_Cell, f"__r{_name}__", _operator(f"__{_name}__", reflected=True))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne", "neg", "abs", "and", "or", "xor", "invert"):
     setattr(_Cell, f"__{_name}__", _operator(f"__{_name}__"))
 for _name in ("sqrt", "exp", "log", "sin", "cos", "tan", "arctan", "floor", "ceil", "rint"):
@@ -70,7 +70,7 @@ _Cell.__hash__ = None  # type: ignore[assignment]
 def unrolled(value: object) -> Any:
     """Return a value with arrays of objects for arrays of expressions."""
     if isinstance(value, Special):
-        raise Untraceable(f"{type(value).__name__} in the place of an array")
+        raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, Tracer):
         cells = np.frompyfunc(lambda e: _Cell(value.graph, e), 1, 1)(value.elements())
         return cells if value.shape else as_array(cells)[()]
@@ -113,8 +113,8 @@ def _of_one_kind(graph: Graph, cells: np.ndarray) -> np.ndarray:
 def by_numpy(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy for arrays of expressions."""
 
-    def own(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
         named = {name: unrolled(v) for name, v in options.items()}
         return rolled(graph, function(*map(unrolled, arguments), **named))
 
-    return own
+    return written

@@ -79,11 +79,11 @@ class ComplexPair(Special):
     def __pow__(self, exponent: Any) -> ComplexPair:
         if not isinstance(exponent, int) or not 0 <= exponent <= 64:
             raise Untraceable("a power of complex numbers that is not a small integer")
-        found = paired(self.graph, 1.0)
-        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), found)
+        unity = paired(self.graph, 1.0)
+        return functools.reduce(lambda a, _: _mul(self.graph, a, self), range(exponent), unity)
 
     def _text(self, *_: Any) -> Any:
-        raise Untraceable("a complex number in the place of a real one")
+        raise Untraceable("a complex number instead of a real one")
 
     __bool__ = __float__ = __str__ = __repr__ = __format__ = _text
 
@@ -191,9 +191,9 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: ComplexPair, *other: Any) -> Any:
-        operands = (*other, self) if turned else (self, *other)
+        operands = (*other, self) if reflected else (self, *other)
         return self.operation(self.graph, name, operands)
 
     return method
@@ -201,7 +201,7 @@ def _operator(name: str, turned: bool = False) -> Callable[..., Any]:
 
 for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
     setattr(ComplexPair, f"__{_name}__", _operator(_op))
-    setattr(ComplexPair, f"__r{_name}__", _operator(_op, turned=True))
+    setattr(ComplexPair, f"__r{_name}__", _operator(_op, reflected=True))
 for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
     setattr(ComplexPair, f"__{_name}__", _operator(_op))
 
@@ -210,7 +210,7 @@ ComplexPair.__matmul__ = lambda self, other: paired_product(self.graph, self, ot
 ComplexPair.__rmatmul__ = lambda self, other: paired_product(self.graph, other, self)  # type: ignore[attr-defined]
 
 
-def made(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
+def complex_number(graph: Graph, real: Any = 0.0, imag: Any = 0.0) -> Any:
     """Return ``complex(real, imag)``."""
     if isinstance(real, ComplexPair):
         return real
@@ -228,7 +228,7 @@ def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
 def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a discrete Fourier transform, by its matrix."""
 
-    def own(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
+    def written(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
         z = paired(graph, values)
         if z.ndim != 1 or n is not None or norm is not None or axis not in (0, -1):
             raise Untraceable("a Fourier transform with other arguments")
@@ -239,12 +239,12 @@ def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
             return ComplexPair(graph, real(z.real), imag(z.real))
         return ComplexPair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
 
-    return own
+    return written
 
 
 for _function in (np.fft.fft, np.fft.ifft):
     enter([_function], _transform(_function))
-enter([complex], made)
+enter([complex], complex_number)
 enter([cmath.rect], rect)
 enter([cmath.exp], lambda graph, z: _exp(graph, paired(graph, z)))
 enter([cmath.log], lambda graph, z: _log(graph, paired(graph, z)))

@@ -53,8 +53,8 @@ def ones(graph: Graph, shape: Any, dtype: object = float) -> Any:
 def _filled(graph: Graph, shape: Any, value: Any, dtype: Any = None) -> Any:
     """Return an array of equal elements."""
     if not is_traced(value):
-        made = np.full(shape, value, dtype)
-        return traced(graph, made) if made.dtype == float else made
+        constants = np.full(shape, value, dtype)
+        return traced(graph, constants) if constants.dtype == float else constants
     only_floats(dtype)
     return full(graph, shape, value)
 
@@ -64,8 +64,8 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
     """Return zeros in an array's shape."""
     only_floats(dtype)
     if not holds_traced(array):
-        found = np.zeros_like(array, dtype=dtype)
-        return traced(graph, found) if found.dtype == float else found
+        zeros = np.zeros_like(array, dtype=dtype)
+        return traced(graph, zeros) if zeros.dtype == float else zeros
     array = traced(graph, array)
     if dtype is None:
         _ = array.dtype  # which refuses all but floats
@@ -88,19 +88,23 @@ def full_like(graph: Graph, array: Any, value: object, dtype: object = None) -> 
 def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin: int = 0) -> Any:
     """Return numbers, lists and arrays as an array of its own."""
     if not holds_traced(values):
-        made = np.array(values, dtype, ndmin=ndmin)
-        if made.dtype != float:
-            return made  # an array of integers rounds what it is assigned
-        return traced(graph, made)
+        result = np.array(values, dtype, ndmin=ndmin)
+        if result.dtype != float:
+            return result  # an array of integers rounds what it is assigned
+        return traced(graph, result)
     if holds_complex(values):
         return paired(graph, values)
     only_floats(dtype)
-    made = _of_floats(graph, traced(graph, values)).copy()
-    if dtype is None and len({e.kind for e in made.values.flat}) > 1:
+    result = _of_floats(graph, traced(graph, values)).copy()
+    if dtype is None and len({e.kind for e in result.values.flat}) > 1:
         raise Untraceable("an array of integers and truth values")
     if dtype is not None:
-        made = elementwise(graph, "add", made, 0.0)
-    return made.reshape((1,) * (ndmin - made.ndim) + made.shape) if made.ndim < ndmin else made
+        result = elementwise(graph, "add", result, 0.0)
+    return (
+        result.reshape((1,) * (ndmin - result.ndim) + result.shape)
+        if result.ndim < ndmin
+        else result
+    )
 
 
 def _of_floats(graph: Graph, array: Tracer) -> Tracer:
@@ -141,8 +145,8 @@ def copy(graph: Graph, values: Any) -> Any:
 @of(np.eye, makes=True)
 def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> Any:
     """Return a matrix with ones on a diagonal."""
-    found = np.eye(n, m, k, dtype)
-    return traced(graph, found) if found.dtype == float else found
+    matrix = np.eye(n, m, k, dtype)
+    return traced(graph, matrix) if matrix.dtype == float else matrix
 
 
 @of(np.identity, makes=True)
@@ -157,12 +161,12 @@ def linspace(graph: Graph, start: Any, stop: Any, num: int = 50, endpoint: bool 
     parts = num - 1 if endpoint else num
     start, stop = traced(graph, start), traced(graph, stop)
     step = elementwise(graph, "div", elementwise(graph, "sub", stop, start), float(parts))
-    found = elementwise(
+    places = elementwise(
         graph, "add", elementwise(graph, "mul", traced(graph, np.arange(float(num))), step), start
     )
     if endpoint and num > 1:
-        found[-1] = stop
-    return found
+        places[-1] = stop
+    return places
 
 
 def as_type(graph: Graph, values: Tracer, dtype: object, copy: bool = True) -> Tracer:

@@ -75,8 +75,8 @@ def imaginary(np: Facade, x: Any) -> Any:
 @formula(np.angle)
 def angle(np: Facade, x: Any, deg: bool = False) -> Any:
     """The angle of a complex number."""
-    found = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
-    return found * (180.0 / np.pi) if deg else found
+    phase = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
+    return phase * (180.0 / np.pi) if deg else phase
 
 
 @formula(np.isnan, math.isnan)
@@ -143,13 +143,13 @@ def ldexp(np: Facade, x: Any, n: Any) -> Any:
 
 
 def _of_two(name: str) -> Any:
-    def own(graph: Graph, a: Any, b: Any) -> Tracer:
+    def written(graph: Graph, a: Any, b: Any) -> Tracer:
         a, b = traced(graph, a), traced(graph, b)
         both = elementwise(graph, name, a, b)
-        known = elementwise(graph, "select", elementwise(graph, "ne", a, a), b, both)
-        return elementwise(graph, "select", elementwise(graph, "ne", b, b), a, known)
+        without_nan_in_a = elementwise(graph, "select", elementwise(graph, "ne", a, a), b, both)
+        return elementwise(graph, "select", elementwise(graph, "ne", b, b), a, without_nan_in_a)
 
-    return own
+    return written
 
 
 of(np.fmax)(_of_two("maximum"))
@@ -217,23 +217,23 @@ def _clip(
 ) -> Any:  # fmt: skip
     """Return values between bounds."""
     low, high = low if low is not None else min, high if high is not None else max
-    found = traced(graph, values)
+    clipped = traced(graph, values)
     if low is not None:
-        found = elementwise(graph, "maximum", found, low)
+        clipped = elementwise(graph, "maximum", clipped, low)
     if high is not None:
-        found = elementwise(graph, "minimum", found, high)
+        clipped = elementwise(graph, "minimum", clipped, high)
     if out is not None:
-        out[...] = found
-    return found
+        out[...] = clipped
+    return clipped
 
 
 @of(np.select)
 def select(graph: Graph, conditions: Any, choices: Any, default: Any = 0) -> Any:
     """Return the first choice whose condition holds."""
-    found = traced(graph, default)
+    chosen = traced(graph, default)
     for condition, choice in reversed(list(zip(conditions, choices, strict=True))):
-        found = elementwise(graph, "select", condition, choice, found)
-    return _as_floats(graph, found)
+        chosen = elementwise(graph, "select", condition, choice, chosen)
+    return _as_floats(graph, chosen)
 
 
 def _as_floats(graph: Graph, array: Tracer) -> Tracer:
@@ -249,13 +249,13 @@ def piecewise(
     if isinstance(conditions, Tracer):
         conditions = [conditions] if conditions.ndim == x.ndim else list(conditions)
     conditions, functions = list(conditions), list(functions)
-    found = traced(graph, np.zeros(x.shape))
+    result = traced(graph, np.zeros(x.shape))
     values = [f(x, *given, **named) if callable(f) else f for f in functions]
     if len(values) == len(conditions) + 1:
-        found = elementwise(graph, "add", found, values.pop())
+        result = elementwise(graph, "add", result, values.pop())
     for condition, value in zip(conditions, values, strict=True):
-        found = elementwise(graph, "select", condition, value, found)
-    return _as_floats(graph, found)
+        result = elementwise(graph, "select", condition, value, result)
+    return _as_floats(graph, result)
 
 
 @formula(np.nan_to_num)
@@ -266,10 +266,10 @@ def nan_to_num(
     largest = 1.7976931348623157e308
     high = largest if posinf is None else posinf
     low = -largest if neginf is None else neginf
-    found = np.where(x != x, nan, np.where(x == math.inf, high, np.where(x == -math.inf, low, x)))
+    finite = np.where(x != x, nan, np.where(x == math.inf, high, np.where(x == -math.inf, low, x)))
     if not copy:
         raise Untraceable("nan_to_num in place")
-    return found
+    return finite
 
 
 @formula(np.isclose)

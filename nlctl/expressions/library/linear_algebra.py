@@ -51,9 +51,9 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     right = traced(graph, b)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
     rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
-    found, pivots = eliminated(Facade(graph), rows)
+    triangular, pivots = eliminated(Facade(graph), rows)
     _guard(graph, pivots)
-    x = substituted(found)
+    x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
 
 
@@ -86,10 +86,10 @@ def det(graph: Graph, a: Any) -> Any:
 
 
 def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
-    found = np_.equal(pivots[0], 0.0)
+    any_is_zero = np_.equal(pivots[0], 0.0)
     for pivot in pivots[1:]:
-        found = np_.logical_or(found, np_.equal(pivot, 0.0))
-    return found
+        any_is_zero = np_.logical_or(any_is_zero, np_.equal(pivot, 0.0))
+    return any_is_zero
 
 
 @of(np.linalg.lstsq)
@@ -99,15 +99,15 @@ def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
     if not isinstance(matrix, np.ndarray):
         raise Untraceable("least squares with a matrix that depends on the state")
     b = traced(graph, b)
-    found = product(traced(graph, np.linalg.pinv(matrix)), b)
+    solution = product(traced(graph, np.linalg.pinv(matrix)), b)
     singular = np.linalg.svd(matrix, compute_uv=False)
     rank = int(np.linalg.matrix_rank(matrix))
     rest = traced(graph, np.zeros(0))
     if rank == matrix.shape[1] < matrix.shape[0]:
-        apart = elementwise(graph, "sub", b, product(traced(graph, matrix), found))
+        apart = elementwise(graph, "sub", b, product(traced(graph, matrix), solution))
         rest = total(elementwise(graph, "mul", apart, apart), 0)
         rest = rest if rest.shape else rest.reshape(1)
-    return found, rest, rank, traced(graph, singular)
+    return solution, rest, rank, traced(graph, singular)
 
 
 @of(np.linalg.cholesky)

@@ -44,7 +44,7 @@ def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
 
 
 class Namespace(dict[str, Any]):
-    """Builtins of the copies of functions that are traced: it tells these from other code."""
+    """Builtins of the copies of functions that are traced, known by it from other code."""
 
 
 class Builtins:
@@ -55,15 +55,15 @@ class Builtins:
 
     def namespace(self, import_: Callable[..., Any]) -> dict[str, Any]:
         """Return all of them by name."""
-        found = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
-        found.update(__import__=import_, super=self._super)
+        names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
+        names.update(__import__=import_, super=self._super)
         for name in ("round", "isinstance", "getattr", "hasattr", "type"):
-            found[name] = getattr(self, f"_{name}")
+            names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
-        found.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
-        found["min"] = functools.partial(self._extreme, "min")
-        found["max"] = functools.partial(self._extreme, "max")
-        return found
+        names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
+        names["min"] = functools.partial(self._extreme, "min")
+        names["max"] = functools.partial(self._extreme, "max")
+        return names
 
     def _builtin(self, name: str, real: Any) -> Any:
         is_error = isinstance(real, type) and issubclass(real, BaseException)
@@ -114,7 +114,7 @@ class Builtins:
         return written_out(self.graph, np.round, value, digits)
 
     def _isinstance(self, thing: object, kind: Any) -> bool:
-        originals = {made: real for real, made in self.stage.classes.items()}
+        originals = {copy: real for real, copy in self.stage.classes.items()}
         kinds = kind if isinstance(kind, tuple) else (kind,)
         kinds = tuple(
             getattr(unwrapped(k), "__dict__", {}).get("_real", unwrapped(k)) for k in kinds
@@ -141,7 +141,7 @@ class Builtins:
         if not isinstance(thing, Tracer):
             return hasattr(thing, name)
         kinds = (np.empty(thing.shape),) if thing.shape else (0.0, np.float64(0.0), 0)
-        answers = {hasattr(each, name) for each in kinds}
+        answers = {hasattr(number, name) for number in kinds}
         if len(answers) > 1:
             raise Untraceable(f"a question for {name} of a number")
         return answers.pop()
@@ -171,10 +171,10 @@ class Builtins:
             return getattr(builtins, name)(values, **({"key": key} if key else {}), **options)
         if options or any(isinstance(v, Tracer) and v.shape for v in (*values, *keys)):
             raise Untraceable(f"{name} of arrays, or with {', '.join(options)}")
-        found, best = traced(self.graph, values[0]), traced(self.graph, keys[0])
+        extreme, best = traced(self.graph, values[0]), traced(self.graph, keys[0])
         for value, rank in zip(values[1:], keys[1:], strict=True):
-            found, best = self._further(name, (found, best), (value, rank))
-        return found
+            extreme, best = self._further(name, (extreme, best), (value, rank))
+        return extreme
 
     def _further(self, name: str, one: Any, other: Any) -> Any:
         """Return the one of two pairs whose second part is beyond the other's."""
@@ -220,12 +220,12 @@ def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
         zero = traced(graph, np.zeros(shape))
         arrays = [elementwise(graph, "add", a, zero) for a in arrays]
-        found = [
+        results = [
             traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
         ]
-        if any(f.shape or f.only.kind != "f" for f in found):
+        if any(f.shape or f.only.kind != "f" for f in results):
             raise Untraceable("np.vectorize of something else than floats")
-        return traced(graph, found).reshape(shape) if shape else found[0]
+        return traced(graph, results).reshape(shape) if shape else results[0]
 
     return each
 
@@ -237,5 +237,5 @@ def apply_along_axis(graph: Graph, function: Any, axis: int, values: Any) -> Tra
     if array.ndim != 2:
         raise Untraceable("apply_along_axis of something else than a matrix")
     rows = array if axis in (1, -1) else array.T
-    found = traced(graph, [function(row) for row in rows])
-    return found if found.ndim == 1 or axis in (1, -1) else found.T
+    results = traced(graph, [function(row) for row in rows])
+    return results if results.ndim == 1 or axis in (1, -1) else results.T

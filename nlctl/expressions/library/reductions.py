@@ -40,10 +40,10 @@ def folded(
         shape = tuple(1 if i in places else n for i, n in enumerate(cells.shape)) if keepdims else (
             kept
         )  # fmt: skip
-    made = np.empty(len(lined), dtype=object)
+    results = np.empty(len(lined), dtype=object)
     for i, row in enumerate(lined):
-        made[i] = function(list(row))
-    return Tracer(graph, as_array(made.reshape(shape)))
+        results[i] = function(list(row))
+    return Tracer(graph, as_array(results.reshape(shape)))
 
 
 def _numbers(graph: Graph, row: Sequence[Expr]) -> list[Expr]:
@@ -51,7 +51,7 @@ def _numbers(graph: Graph, row: Sequence[Expr]) -> list[Expr]:
 
 
 def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
-    def own(
+    def written(
         graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False, initial: Any = None
     ) -> Any:
         def of_row(row: Sequence[Expr]) -> Expr:
@@ -69,14 +69,14 @@ def _extreme(name: str, ignores_nan: bool = False) -> Callable[..., Any]:
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 def ignoring_nan(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
     """Return the larger or smaller of two, the other one where one is NaN."""
     both = graph.op(name, a, b)
-    known = graph.op("select", graph.op("ne", a, a), b, both)
-    return graph.op("select", graph.op("ne", b, b), a, known)
+    without_nan_in_a = graph.op("select", graph.op("ne", a, a), b, both)
+    return graph.op("select", graph.op("ne", b, b), a, without_nan_in_a)
 
 
 _largest = of(np.max, np.amax)(_extreme("maximum"))
@@ -107,11 +107,11 @@ def sum_along(
     if isinstance(axis, tuple) or keepdims:
         axes = range(array.ndim) if axis is None else axis if isinstance(axis, tuple) else (axis,)
         places = [operator.index(a) % array.ndim for a in axes]
-        found = array
+        sums = array
         for place in sorted(places, reverse=True):
-            found = total(found, place)
+            sums = total(sums, place)
         shape = tuple(1 if i in places else n for i, n in enumerate(array.shape))
-        return found.reshape(shape) if keepdims else found
+        return sums.reshape(shape) if keepdims else sums
     return total(array, axis)
 
 
@@ -119,8 +119,8 @@ def sum_along(
 def nansum(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
     """Return a sum without what is NaN."""
     array = traced(graph, values)
-    known = elementwise(graph, "eq", array, array)
-    return total(elementwise(graph, "select", known, array, 0.0), axis)
+    is_number = elementwise(graph, "eq", array, array)
+    return total(elementwise(graph, "select", is_number, array, 0.0), axis)
 
 
 def _count(array: Tracer, axis: Axis) -> float:
@@ -136,8 +136,8 @@ def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
     if isinstance(values, ComplexPair):
         return values.linear(lambda part: mean(graph, part, axis, keepdims=keepdims))
     array = traced(graph, values)
-    found = sum_along(graph, array, axis, keepdims=keepdims)
-    return elementwise(graph, "div", found, _count(array, axis))
+    sums = sum_along(graph, array, axis, keepdims=keepdims)
+    return elementwise(graph, "div", sums, _count(array, axis))
 
 
 @of(np.var)
@@ -148,8 +148,8 @@ def var(
     array = with_counts(traced(graph, values))
     away = elementwise(graph, "sub", array, mean(graph, array, axis, keepdims=True))
     squares = elementwise(graph, "mul", away, away)
-    found = sum_along(graph, squares, axis, keepdims=keepdims)
-    return elementwise(graph, "div", found, max(_count(array, axis) - ddof, 0.0))
+    sums = sum_along(graph, squares, axis, keepdims=keepdims)
+    return elementwise(graph, "div", sums, max(_count(array, axis) - ddof, 0.0))
 
 
 @of(np.std)
@@ -193,7 +193,7 @@ def _is_true(graph: Graph, e: Expr) -> Expr:
 
 
 def _of_truths(name: str, start: bool) -> Callable[..., Any]:
-    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
+    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
         if isinstance(values, Masked):
             values = values.filled(start)
 
@@ -204,7 +204,7 @@ def _of_truths(name: str, start: bool) -> Callable[..., Any]:
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 any_of = of(np.any)(_of_truths("or", False))
@@ -225,21 +225,21 @@ def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
 def _first(name: str) -> Callable[..., Any]:
     """Return what finds the first of the largest or smallest; NaN is beyond all."""
 
-    def own(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
+    def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Tracer:
         def of_row(row: Sequence[Expr]) -> Expr:
             best, place = _numbers(graph, row)[0], graph.const(0)
             for k, e in enumerate(_numbers(graph, row)[1:], start=1):
                 beyond = graph.op(name, e, best)
                 is_nan = graph.op("and", graph.op("ne", e, e), graph.op("eq", best, best))
-                known = graph.op("eq", best, best)
-                better = graph.op("or", graph.op("and", beyond, known), is_nan)
+                best_is_number = graph.op("eq", best, best)
+                better = graph.op("or", graph.op("and", beyond, best_is_number), is_nan)
                 best = graph.op("select", better, e, best)
                 place = graph.op("select", better, graph.const(k), place)
             return place
 
         return folded(graph, values, axis, keepdims, of_row)
 
-    return own
+    return written
 
 
 argmax = of(np.argmax)(_first("gt"))
@@ -259,11 +259,11 @@ def in_order(graph: Graph, row: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]
         raise Untraceable("too many elements to be sorted")
     for end in range(len(values) - 1, 0, -1):
         for i in range(end):
-            turned = _is_after(graph, values[i], values[i + 1])
+            is_inverted = _is_after(graph, values[i], values[i + 1])
             for kept in (values, places):
                 a, b = kept[i], kept[i + 1]
-                kept[i] = graph.op("select", turned, b, a)
-                kept[i + 1] = graph.op("select", turned, a, b)
+                kept[i] = graph.op("select", is_inverted, b, a)
+                kept[i + 1] = graph.op("select", is_inverted, a, b)
     return values, places
 
 
@@ -271,10 +271,10 @@ def _along(graph: Graph, values: Any, axis: Any, function: Callable[..., list[Ex
     array = traced(graph, values)
     cells = array.elements().reshape(-1) if axis is None else array.elements()
     moved = np.moveaxis(cells, -1 if axis is None else axis, -1)
-    made = np.empty(moved.shape, dtype=object)
+    results = np.empty(moved.shape, dtype=object)
     for index in np.ndindex(moved.shape[:-1]):
-        made[index] = function(list(moved[index]))
-    return Tracer(graph, np.moveaxis(made, -1, -1 if axis is None else axis))
+        results[index] = function(list(moved[index]))
+    return Tracer(graph, np.moveaxis(results, -1, -1 if axis is None else axis))
 
 
 @of(np.sort)
@@ -319,11 +319,11 @@ def _quantile(graph: Graph, row: Sequence[Expr], q: float) -> Expr:
     a, b = ordered[low], ordered[high]
     rise = graph.op("sub", b, a)
     if part >= 0.5:
-        found = graph.op("sub", b, graph.op("mul", rise, graph.const(1.0 - part)))
+        quantile = graph.op("sub", b, graph.op("mul", rise, graph.const(1.0 - part)))
     else:
-        found = graph.op("add", a, graph.op("mul", rise, graph.const(part)))
+        quantile = graph.op("add", a, graph.op("mul", rise, graph.const(part)))
     last = ordered[-1]
-    return graph.op("select", graph.op("ne", last, last), last, found)
+    return graph.op("select", graph.op("ne", last, last), last, quantile)
 
 
 @of(np.quantile)
@@ -332,9 +332,9 @@ def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
     parts = np.asarray(constant_value(traced(graph, q)))
     if parts.dtype != float and parts.dtype.kind != "i":
         raise Untraceable("a quantile whose part depends on the state")
-    found = [folded(graph, values, axis, False, functools.partial(_quantile, graph, q=float(p)))
+    quantiles = [folded(graph, values, axis, False, functools.partial(_quantile, graph, q=float(p)))
              for p in parts.reshape(-1)]  # fmt: skip
-    return found[0] if not parts.shape else traced(graph, found)
+    return quantiles[0] if not parts.shape else traced(graph, quantiles)
 
 
 @of(np.percentile)
@@ -347,8 +347,8 @@ def percentile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
 def nanmean(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
     """Return a mean of what is not NaN."""
     array = traced(graph, values)
-    known = elementwise(graph, "eq", array, array)
-    return elementwise(graph, "div", nansum(graph, array, axis), total(known, axis))
+    is_number = elementwise(graph, "eq", array, array)
+    return elementwise(graph, "div", nansum(graph, array, axis), total(is_number, axis))
 
 
 @of(np.cov)
@@ -358,9 +358,9 @@ def cov(graph: Graph, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = 
     flat = [row for r in rows for row in (r if r.ndim == 2 else [r])]
     away = [elementwise(graph, "sub", r, mean(graph, r)) for r in flat]
     count = float(flat[0].size - (ddof if ddof is not None else 0 if bias else 1))
-    found = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
-              for b in away] for a in away]  # fmt: skip
-    return traced(graph, found if len(away) > 1 else found[0][0])
+    covariances = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
+                    for b in away] for a in away]  # fmt: skip
+    return traced(graph, covariances if len(away) > 1 else covariances[0][0])
 
 
 @of(np.corrcoef)
@@ -368,10 +368,11 @@ def corrcoef(graph: Graph, x: Any, y: Any = None) -> Tracer:
     """Return the correlations of rows."""
     c = cov(graph, x, y)
     sizes = [elementwise(graph, "sqrt", c[i, i]) for i in range(len(c))]
-    found = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]), sizes[j])
-              for j in range(len(c))] for i in range(len(c))]  # fmt: skip
+    correlations = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]),
+                                 sizes[j]) for j in range(len(c))]
+                    for i in range(len(c))]  # fmt: skip
     low, high = -1.0, 1.0
-    whole = elementwise(graph, "maximum", traced(graph, found), low)
+    whole = elementwise(graph, "maximum", traced(graph, correlations), low)
     return elementwise(graph, "minimum", whole, high)
 
 

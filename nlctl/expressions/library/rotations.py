@@ -127,13 +127,13 @@ def _euler_angles(graph: Graph, quat: Sequence[Any], seq: str) -> list[Any]:
     first, third = half_sum - half_diff, half_sum + half_diff
     single = op("select", no_turn, 2.0 * half_sum, 2.0 * half_diff * (-1.0 if extrinsic else 1.0))
     locked = op("or", no_turn, half_turn)
-    found = [first, middle, third] if extrinsic else [third, middle, first]
-    found[0] = op("select", locked, single, found[0])
-    found[2] = op("select", locked, 0.0, found[2])
+    angles = [first, middle, third] if extrinsic else [third, middle, first]
+    angles[0] = op("select", locked, single, angles[0])
+    angles[2] = op("select", locked, 0.0, angles[2])
     if not symmetric:
-        found[2 if extrinsic else 0] = found[2 if extrinsic else 0] * sign
-        found[1] = found[1] - math.pi / 2
-    return [_wrapped(op, v) for v in found]
+        angles[2 if extrinsic else 0] = angles[2 if extrinsic else 0] * sign
+        angles[1] = angles[1] - math.pi / 2
+    return [_wrapped(op, v) for v in angles]
 
 
 def _wrapped(op: Callable[..., Any], angle: Any) -> Any:
@@ -179,17 +179,17 @@ def from_euler(graph: Graph, seq: str, angles: Any, degrees: bool = False) -> Tu
     values = [array] if not array.shape else list(array)
     if len(values) != len(seq) or any(v.shape for v in values):
         raise Untraceable("several rotations at once")
-    found: list[Any] | None = None
+    rotation: list[Any] | None = None
     for axis, angle in zip(seq.lower(), values, strict=True):
         half = angle * ((math.pi / 180.0 if degrees else 1.0) / 2.0)
         quat: list[Any] = [traced(graph, 0.0)] * 3
         quat[_AXES.index(axis)] = elementwise(graph, "sin", half)
         quat.append(elementwise(graph, "cos", half))
-        if found is None:
-            found = quat
+        if rotation is None:
+            rotation = quat
         else:
-            found = _composed(quat, found) if seq.islower() else _composed(found, quat)
-    return Turn(graph, found or [0.0, 0.0, 0.0, 1.0])
+            rotation = _composed(quat, rotation) if seq.islower() else _composed(rotation, quat)
+    return Turn(graph, rotation or [0.0, 0.0, 0.0, 1.0])
 
 
 def _identity(graph: Graph) -> Turn:
@@ -202,8 +202,8 @@ def enter_rotations() -> Any:
     """Enter the ways to make a rotation; return SciPy's class."""
     from scipy.spatial.transform import Rotation
 
-    for own in (from_quat, from_rotvec, from_euler, _identity):
-        WRITTEN[Rotation, own.__name__.strip("_")] = own
+    for maker in (from_quat, from_rotvec, from_euler, _identity):
+        WRITTEN[Rotation, maker.__name__.strip("_")] = maker
     return Rotation
 
 

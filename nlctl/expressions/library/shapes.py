@@ -40,14 +40,14 @@ _COMPUTING = (
 def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of NumPy that moves elements; a view where NumPy's is one."""
 
-    def own(graph: Graph, *arguments: Any, **options: Any) -> Any:
+    def written(graph: Graph, *arguments: Any, **options: Any) -> Any:
         owners: list[Tracer] = []
         given = [_opened(v, owners) for v in arguments]
         named = {k: _opened(v, owners) for k, v in options.items()}
         long = next((a for a in owners if a.axis is not None or a.origin is not None), None)
         return _closed(graph, function(*given, **named), long)
 
-    return own
+    return written
 
 
 def _opened(value: object, owners: list[Tracer]) -> Any:
@@ -204,8 +204,8 @@ def dot(graph: Graph, a: Any, b: Any) -> Any:
 def atleast_1d(graph: Graph, *values: Any) -> Any:
     """Return numbers as arrays."""
     arrays = [traced(graph, v) for v in values]
-    found = [a if a.shape else a.reshape(1) for a in arrays]
-    return found[0] if len(found) == 1 else tuple(found)
+    arrays_of_one = [a if a.shape else a.reshape(1) for a in arrays]
+    return arrays_of_one[0] if len(arrays_of_one) == 1 else tuple(arrays_of_one)
 
 
 @of(np.ravel)

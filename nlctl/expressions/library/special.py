@@ -28,8 +28,8 @@ def enter_scipy() -> None:
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
-    for name, own in _FORMULAS.items():
-        enter([getattr(special, name)], _with_facade(own))
+    for name, formula_of in _FORMULAS.items():
+        enter([getattr(special, name)], _with_facade(formula_of))
     for name in ("erf", "erfc"):
         enter([getattr(special, name)], functools.partial(_elementwise, name))
     for name in ("log1p", "expm1", "exp2", "cbrt"):
@@ -47,25 +47,25 @@ def cumulative_trapezoid(
     width = dx if x is None else elementwise(graph, "sub", *(traced(graph, x)[s] for s in _SHIFTED))
     both = elementwise(graph, "add", *(array[s] for s in _SHIFTED))
     areas = elementwise(graph, "div", elementwise(graph, "mul", width, both), 2.0)
-    found = WRITTEN[np.cumsum](graph, areas)
+    sums = WRITTEN[np.cumsum](graph, areas)
     if initial is None:
-        return found
-    return concatenated(graph, [traced(graph, [initial]), found])
+        return sums
+    return concatenated(graph, [traced(graph, [initial]), sums])
 
 
 _SHIFTED = (slice(1, None), slice(None, -1))
 
 
 def _of_linalg(name: str) -> Any:
-    own = WRITTEN[getattr(np.linalg, name)]
+    written = WRITTEN[getattr(np.linalg, name)]
 
     def function(graph: Graph, *arguments: Any, **options: Any) -> Any:
         if name == "cholesky":
             lower = options.pop("lower", False)
-            found = own(graph, *arguments)
-            return found if lower else found.T
+            upper = written(graph, *arguments)
+            return upper if lower else upper.T
         options = {k: v for k, v in options.items() if k not in _HOW}
-        return own(graph, *arguments, **options)
+        return written(graph, *arguments, **options)
 
     return function
 
@@ -77,8 +77,8 @@ def _elementwise(name: str, graph: Graph, x: Any) -> Tracer:
     return elementwise(graph, name, x)
 
 
-def _with_facade(own: Any) -> Any:
-    return lambda graph, *rest, **named: own(Facade(graph), *rest, **named)
+def _with_facade(written: Any) -> Any:
+    return lambda graph, *rest, **named: written(Facade(graph), *rest, **named)
 
 
 def expit(np: Facade, x: Any) -> Any:
@@ -116,8 +116,8 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     """ln of the sum of e^a."""
     top = np.max(a, axis=axis, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)
-    found = np.log(np.sum(np.exp(a - top), axis=axis))
-    return found + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
+    logarithm = np.log(np.sum(np.exp(a - top), axis=axis))
+    return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
 _FORMULAS = {
@@ -130,12 +130,12 @@ _FORMULAS = {
 
 
 def _whole(name: str) -> Any:
-    def own(graph: Graph, x: Any) -> Any:
+    def written(graph: Graph, x: Any) -> Any:
         value = traced(graph, x)
         _finite(graph, value)
         return whole_numbers(graph, elementwise(graph, name, value))
 
-    return own
+    return written
 
 
 def _finite(graph: Graph, value: Tracer) -> None:
@@ -181,9 +181,9 @@ def ieee_remainder(graph: Graph, x: Any, y: Any) -> Tracer:
     above = op("or", op("gt", rest, half), op("and", op("eq", rest, half), odd))
     below = op("or", op("lt", rest, op("neg", half)), op("and", op("eq", rest, op("neg", half)),
                                                          odd))  # fmt: skip
-    found = op("select", above, op("sub", rest, size), rest)
-    found = op("select", below, op("add", rest, size), found)
-    return op("select", op("eq", size, math.inf), x, found)
+    remainder = op("select", above, op("sub", rest, size), rest)
+    remainder = op("select", below, op("add", rest, size), remainder)
+    return op("select", op("eq", size, math.inf), x, remainder)
 
 
 @of(math.isclose)

@@ -18,9 +18,9 @@ __all__ = ["called_object", "enter_splines"]
 
 def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
     """Return what an object of a library, that can be called, makes of arrays of expressions."""
-    for kinds, own in _kinds():
+    for kinds, written in _kinds():
         if isinstance(thing, kinds):
-            return own(graph, thing, *arguments, **options)
+            return written(graph, thing, *arguments, **options)
     raise Untraceable(f"{type(thing).__name__} is not known here")
 
 
@@ -56,7 +56,7 @@ def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
     return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
 
 
-def _each(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
+def _elementwise(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
     cells = mapped(lambda e: function(graph.number(e)), traced(graph, x).elements())
     return Tracer(graph, cells)
 
@@ -77,19 +77,19 @@ def piecewise_polynomial(
     def at(e: Expr) -> Expr:
         pieces = [_of_piece(graph, e, breaks[j], coefficients[:, j])
                   for j in range(breaks.size - 1)]  # fmt: skip
-        found = interval_choice(graph, e, list(breaks[1:-1]), pieces)
+        value = interval_choice(graph, e, list(breaks[1:-1]), pieces)
         nan = graph.const(np.nan)
-        return found if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), found, nan, nan)
+        return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
-    return _each(graph, x, at)
+    return _elementwise(graph, x, at)
 
 
 def _beyond(
-    graph: Graph, x: Expr, ends: Sequence[Any], found: Expr, below: Expr, above: Expr
+    graph: Graph, x: Expr, ends: Sequence[Any], inside: Expr, below: Expr, above: Expr
 ) -> Expr:
     """Return what is inside of a range, and other values beyond its ends."""
-    found = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, found)
-    return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, found)
+    inside = graph.op("select", graph.op("gt", x, graph.const(float(ends[-1]))), above, inside)
+    return graph.op("select", graph.op("lt", x, graph.const(float(ends[0]))), below, inside)
 
 
 def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
@@ -101,10 +101,10 @@ def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
 def _of_piece(graph: Graph, x: Expr, start: float, coefficients: np.ndarray) -> Expr:
     """Return a polynomial in x - start, the highest power first in the coefficients."""
     inside = graph.op("sub", x, graph.const(float(start)))
-    found = graph.const(float(coefficients[0]))
+    value = graph.const(float(coefficients[0]))
     for c in coefficients[1:]:
-        found = graph.op("add", graph.op("mul", found, inside), graph.const(float(c)))
-    return found
+        value = graph.op("add", graph.op("mul", value, inside), graph.const(float(c)))
+    return value
 
 
 def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None) -> Any:
@@ -130,20 +130,20 @@ def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
     t, c, k = tck
     t, c = _floats(_numbers(t)), _floats(_numbers(c))
     spline = BSpline(t, c[: t.size - k - 1], k)
-    found = b_spline(graph, spline, x, der, True)
+    values = b_spline(graph, spline, x, der, True)
     ends = t[k], t[t.size - k - 1]
     if ext == 0:
-        return found
+        return values
     array = traced(graph, x)
     if ext == 2:
         for e in array.elements().reshape(-1):
             _guard_range(graph, graph.number(e), ends)
-        return found
+        return values
     edges = [0.0, 0.0] if ext == 1 else [float(spline(e, der)) for e in ends]
     below, above = map(graph.const, edges)
     cells = mapped(
         lambda e, f: _beyond(graph, graph.number(e), ends, f, below, above),
-        array.elements(), found.elements(),
+        array.elements(), values.elements(),
     )  # fmt: skip
     return Tracer(graph, cells)
 
@@ -151,10 +151,10 @@ def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
 def _numbers(values: Any) -> Any:
     from .table import constant_value
 
-    found = constant_value(values) if isinstance(values, Tracer) else values
-    if isinstance(found, Tracer):
+    constant = constant_value(values) if isinstance(values, Tracer) else values
+    if isinstance(constant, Tracer):
         raise Untraceable("a spline that depends on the state or on parameters")
-    return found
+    return constant
 
 
 def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
@@ -183,14 +183,14 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
                     for v in _fill(thing))  # fmt: skip
 
     def at(e: Expr) -> Expr:
-        found, ends = rule(e), (thing.x[0], thing.x[-1])
+        value, ends = rule(e), (thing.x[0], thing.x[-1])
         if bounded:
             _guard_range(graph, e, ends)
         if extrapolates or below is None or above is None:
-            return found
-        return _beyond(graph, e, ends, found, below, above)
+            return value
+        return _beyond(graph, e, ends, value, below, above)
 
-    return _each(graph, x, at)
+    return _elementwise(graph, x, at)
 
 
 def _of_one_value(spline: Any) -> Any:
@@ -227,11 +227,11 @@ def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
     rows = array.short().reshape(1, -1) if array.ndim == 1 else array.short()
     if isinstance(xi, tuple) and array.ndim > 1:
         raise Untraceable("an interpolation on a grid at several points")
-    found = [_on_grid(graph, thing, values, [graph.number(e) for e in row.elements()])
+    results = [_on_grid(graph, thing, values, [graph.number(e) for e in row.elements()])
              for row in rows]  # fmt: skip
-    made = np.empty(len(found), dtype=object)
-    made[:] = found
-    whole = Tracer(graph, made)
+    cells = np.empty(len(results), dtype=object)
+    cells[:] = results
+    whole = Tracer(graph, cells)
     return whole[0] if flat else whole
 
 
@@ -239,19 +239,19 @@ def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) ->
     cells: Any = np.frompyfunc(lambda v: graph.const(float(v)), 1, 1)(values)
     for axis in range(len(x) - 1, -1, -1):
         places = np.asarray(thing.grid[axis], dtype=float)
-        made = np.empty(cells.shape[:-1], dtype=object)
-        for index in np.ndindex(made.shape):
-            made[index] = _between(graph, places, cells[index], x[axis])
-        cells = made
-    found: Any = cells[()] if isinstance(cells, np.ndarray) else cells
+        reduced = np.empty(cells.shape[:-1], dtype=object)
+        for index in np.ndindex(reduced.shape):
+            reduced[index] = _between(graph, places, cells[index], x[axis])
+        cells = reduced
+    value: Any = cells[()] if isinstance(cells, np.ndarray) else cells
     for axis, e in enumerate(x):
         ends = thing.grid[axis][0], thing.grid[axis][-1]
         if thing.bounds_error:
             _guard_range(graph, e, ends)
         elif thing.fill_value is not None:
             fill = graph.const(float(thing.fill_value))
-            found = _beyond(graph, e, ends, found, fill, fill)
-    return found
+            value = _beyond(graph, e, ends, value, fill, fill)
+    return value
 
 
 def _between(graph: Graph, places: np.ndarray, values: Sequence[Expr], x: Expr) -> Expr:

@@ -26,9 +26,9 @@ UFUNC_OPERATIONS["divide"] = "div"
 def of(*functions: Any, makes: bool = False) -> Callable[[Any], Any]:
     """Enter a function of a graph and arguments into the table."""
 
-    def entered(own: Any) -> Any:
-        enter(functions, own, makes=makes)
-        return own
+    def entered(written: Any) -> Any:
+        enter(functions, written, makes=makes)
+        return written
 
     return entered
 
@@ -36,21 +36,21 @@ def of(*functions: Any, makes: bool = False) -> Callable[[Any], Any]:
 def formula(*functions: Any) -> Callable[[Any], Any]:
     """Enter a function that is a formula of others, which it takes from its first argument."""
 
-    def entered(own: Any) -> Any:
+    def entered(written: Any) -> Any:
         def of_graph(graph: Graph, *rest: Any, **named: Any) -> Any:
             arrays = [traced(graph, v) if isinstance(v, list) else v for v in rest]
-            return own(Facade(graph), *arrays, **named)
+            return written(Facade(graph), *arrays, **named)
 
         enter(functions, of_graph)
-        return own
+        return written
 
     return entered
 
 
-def enter(functions: Iterable[Any], own: Callable[..., Any], *, makes: bool = False) -> None:
+def enter(functions: Iterable[Any], written: Callable[..., Any], *, makes: bool = False) -> None:
     """Enter a function into the table under each of its names."""
     for function in functions:
-        WRITTEN[function] = own
+        WRITTEN[function] = written
         if makes:
             ARRAY_MAKERS.add(function)
 
@@ -120,7 +120,7 @@ def written_out(graph: Graph, function: Any, *arguments: Any, **options: Any) ->
 
 
 def of_ufunc(
-    graph: Graph, function: Any, own: Callable[..., Any], arguments: Any, options: Any
+    graph: Graph, function: Any, written: Callable[..., Any], arguments: Any, options: Any
 ) -> Any:
     """Return a ufunc, with the options that all have."""
     count = function.nin
@@ -129,22 +129,22 @@ def of_ufunc(
     if len(arguments) > count:
         out, arguments = arguments[count], arguments[:count]
     out = out[0] if isinstance(out, tuple) else out
-    known = set(options) <= {"out", "where", "dtype", "casting"}
-    if not known or len(arguments) < count or dtype not in (None, float, np.float64):
+    are_known = set(options) <= {"out", "where", "dtype", "casting"}
+    if not are_known or len(arguments) < count or dtype not in (None, float, np.float64):
         raise Untraceable(f"{function.__name__} with other arguments")
     if where is not True:
         if out is None:
             raise Untraceable("where= without out=: what is not computed is arbitrary")
-        return _where(graph, own, arguments, out, where)
-    found = own(*arguments)
+        return _where(graph, written, arguments, out, where)
+    result = written(*arguments)
     if out is None:
-        return found
-    out[...] = found
+        return result
+    out[...] = result
     return out
 
 
-def _where(graph: Graph, own: Any, arguments: Any, out: Any, where: Any) -> Any:
-    out[...] = elementwise(graph, "select", where, own(*arguments), out)
+def _where(graph: Graph, written: Any, arguments: Any, out: Any, where: Any) -> Any:
+    out[...] = elementwise(graph, "select", where, written(*arguments), out)
     return out
 
 
@@ -157,12 +157,12 @@ def _method(array: Tracer, name: str) -> Any:
     """Return a method of an array, or the part that it names."""
     if name not in ARRAY_METHODS:
         text = f"an array of expressions has no {name}"
-        known = hasattr(np.ndarray, name) or hasattr(np.float64, name)
-        raise Untraceable(text) if known else AttributeError(text)
-    known = ARRAY_METHODS[name]
-    if known in WRITTEN:  # a function that does the same
-        return lambda *rest, **named: written_out(array.graph, known, array, *rest, **named)
-    return lambda *rest, **named: known(
+        method = hasattr(np.ndarray, name) or hasattr(np.float64, name)
+        raise Untraceable(text) if method else AttributeError(text)
+    method = ARRAY_METHODS[name]
+    if method in WRITTEN:  # a function that does the same
+        return lambda *rest, **named: written_out(array.graph, method, array, *rest, **named)
+    return lambda *rest, **named: method(
         array.graph, array, *map(unwrapped, rest), **{k: unwrapped(v) for k, v in named.items()}
     )
 

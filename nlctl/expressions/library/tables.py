@@ -68,22 +68,22 @@ def _linear(
         slope = op("div", rise, const(float(places[j + 1] - places[j])))
         inside = op("sub", x, const(float(places[j])))
         pieces.append(op("add", op("mul", slope, inside), values[j]))
-    found = interval_choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
-    found = op("select", op("eq", x, const(float(places[-1]))), values[-1], found)
-    found = op("select", op("gt", x, const(float(places[-1]))), right, found)
-    return op("select", op("lt", x, const(float(places[0]))), left, found)
+    value = interval_choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
+    value = op("select", op("eq", x, const(float(places[-1]))), values[-1], value)
+    value = op("select", op("gt", x, const(float(places[-1]))), right, value)
+    return op("select", op("lt", x, const(float(places[0]))), left, value)
 
 
 def _place(graph: Graph, x: Expr, bounds: np.ndarray, side: str) -> Expr:
     """Return how many bounds are below x; NaN is behind all."""
     x = graph.number(x)
     name = "lt" if side == "left" else "le"
-    found = graph.const(0)
+    count = graph.const(0)
     for bound in bounds:
         beyond = graph.op(name, graph.const(float(bound)), x)
         beyond = graph.op("or", beyond, graph.op("ne", x, x))
-        found = graph.op("add", found, graph.integer(beyond))
-    return found
+        count = graph.op("add", count, graph.integer(beyond))
+    return count
 
 
 @of(np.searchsorted)
@@ -104,14 +104,14 @@ def digitize(graph: Graph, x: Any, bins: Any, right: bool = False) -> Tracer:
 
 
 def _bisected(side: str) -> Callable[..., Any]:
-    def own(graph: Graph, a: Any, x: Any) -> Any:
+    def written(graph: Graph, a: Any, x: Any) -> Any:
         if traced(graph, x).shape:
             raise Untraceable("a bisection for an array")
         bounds, guard = _constants(graph, a, "places of a table"), traced(graph, x)
         graph.guards.append(graph.op("eq", guard.only, guard.only))  # by halving: not what NaN does
         return searchsorted(graph, bounds, x, side)
 
-    return own
+    return written
 
 
 of(bisect.bisect_left)(_bisected("left"))
@@ -122,7 +122,7 @@ of(bisect.bisect_right)(_bisected("right"))
 def polynomial(graph: Graph, x: Any, c: Any, tensor: bool = True) -> Any:
     """Return a polynomial by its coefficients, the constant first."""
     x, coefficients = traced(graph, x), list(traced(graph, c))
-    found = coefficients[-1] + x * 0.0
+    value = coefficients[-1] + x * 0.0
     for coefficient in reversed(coefficients[:-1]):
-        found = coefficient + found * x
-    return found
+        value = coefficient + value * x
+    return value

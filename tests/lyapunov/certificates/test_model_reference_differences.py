@@ -132,7 +132,7 @@ REFUSED = {
     ),
     "a constrained law": (
         lambda: first_order(sigma(), law=nlctl.ConstrainedLaw(u_max=10.0)),
-        "about a ModelReferenceLaw or DirectLaw in the place of 'law', got ConstrainedLaw",
+        "about a ModelReferenceLaw or DirectLaw as 'law', got ConstrainedLaw",
     ),
     "a law of another kind": (
         lambda: first_order(

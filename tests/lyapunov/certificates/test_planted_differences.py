@@ -221,7 +221,7 @@ EQUATIONS = {
                 nlctl.FilteredError, output=lambda t, x, u, p: (u[0] - u[2], u[0] - u[2], -u[4])
             )
         },
-        "about a FilteredError in the place of 'filtered_error', got OwnFilteredError",
+        "about a FilteredError as 'filtered_error', got OwnFilteredError",
     ),
     "a law of another kind": (lambda: {"law": SlowBurst()}, "got SlowBurst"),
     "a law with a constant gain": (lambda: {"law": nlctl.FixedGainLaw()}, "got FixedGainLaw"),
@@ -240,7 +240,7 @@ EQUATIONS = {
                 order=2, function=lambda t: (np.sin(t), 0.5 * np.cos(t), -np.sin(t))
             )
         },
-        "about a SumOfSines in the place of 'reference'",
+        "about a SumOfSines as 'reference'",
     ),
     "the robust term's function replaced in the block": (
         lambda: patched("robust", updfcn=without_leak), "'robust' has another update function",
