@@ -25,6 +25,8 @@ _STANDSTILL = 200  # steps in a row that do not advance the time
 _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
 _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
+_WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
+_ROUNDED = 1.0 + 1e-9
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -134,7 +136,8 @@ class Driver:
         ):  # only rounding sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
-        solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
+        bounded = self._bounded(t, stop)
+        solver, bound = self.method(self._rates, t, x, stop, **bounded), bounded["max_step"]
         seen = self._first_seen(t, x)
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
@@ -143,8 +146,10 @@ class Driver:
             if solver.status == "failed":
                 raise RuntimeError(f"solve_ivp failed: {message}")
             state = self._solution(solver)
-            if self._slept(solver, state):
-                short = {**self._bounded(t, stop), "max_step": self._span / _PLACES}
+            allowed = self._allowed(solver, state, bound)
+            if allowed:
+                bound = allowed
+                short = {**self._bounded(t, stop), "max_step": bound}
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             event = self._event(solver, state, seen)
@@ -173,6 +178,18 @@ class Driver:
         if self._before is not None and self._before.shape == seen.shape:
             seen[own] = np.where(seen[own] == 0.0, self._before[own], seen[own])
         return seen
+
+    def _allowed(self, solver: Any, state: Any, bound: float) -> float:
+        """Return how long the step just made should have been, 0 if it is right.
+
+        One from which a function of t alone moves soon is shorter; behind that they grow again.
+        """
+        longest = min(self.settings["max_step"], self.stops.space(float(solver.t_old)))
+        length = float(solver.t - solver.t_old)
+        may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
+        if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
+            return longest
+        return self._span / _PLACES if self._slept(solver, state) else 0.0
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
