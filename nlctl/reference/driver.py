@@ -152,6 +152,7 @@ class Driver:
                 short = {**self._bounded(t, stop), "max_step": bound}
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
+            self._note_left(float(solver.t_old), float(solver.t), state)
             event = self._event(solver, state, seen)
             until = event.time if event else float(solver.t)
             closes = event is not None or solver.status == "finished"
@@ -167,16 +168,16 @@ class Driver:
                 sides = seen[: sides.size] >= 0.0
                 self.jumps.check_resolved(until, seen)
             if closes:
-                self._before = None if event else seen
                 return until, x, sides, pieces, event
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Return what is seen where a flow begins; of what is exactly 0 at a stop, before that."""
+        """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
         seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
-        guards, others = self.jumps.kinds
-        own = slice(guards, guards + others)
-        if self._before is not None and self._before.shape == seen.shape:
-            seen[own] = np.where(seen[own] == 0.0, self._before[own], seen[own])
+        sides = self._signs(seen)
+        came = self._came if self._came.size else np.zeros(sides.size)
+        self._came = np.where(sides == 0.0, came, sides)
+        own = seen[: sides.size]
+        own[:] = np.where(own == 0.0, came * np.finfo(float).tiny, own)
         return seen
 
     def _allowed(self, solver: Any, state: Any, bound: float) -> float:
@@ -247,23 +248,44 @@ class Driver:
             FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
         if event is not None:
-            self._note(event, seen, state)
+            self._note(event, state)
         return event
 
     def _looked(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen, on the side of the next stop that the run comes from."""
         return self.jumps.look(min(t, self._last), x)
 
-    def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
+    def _note(self, event: Event, state: Any) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
-        x, (guards, others) = state(event.time), self.jumps.kinds
+        x = state(event.time)
         self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
-        rows = np.arange(guards, guards + others)
-        changed = rows[(seen[rows] != 0.0) & (seen[rows] * after[rows] <= 0.0)]
-        for i in changed.tolist():
-            self._note_change(i, event.time, bool(after[i] > seen[i]), x)
+        sides = self._signs(after)
+        if event.number < sides.size and sides[event.number] == 0.0:  # by rounding, right behind it
+            sides[event.number] = -self._came[event.number]
+        for i in np.flatnonzero(self._came * sides < 0.0).tolist():
+            self._note_change(i, event.time, bool(sides[i] > 0.0), x)
+        self._came = np.where(sides == 0.0, self._came, sides)
+
+    def _signs(self, seen: np.ndarray) -> np.ndarray:
+        """Return the sides of switching functions, conditions and what the run watches."""
+        guards, others = self.jumps.kinds
+        sides = np.nan_to_num(np.sign(seen[: guards + others]))
+        sides[:guards] = 1.0
+        return sides
+
+    def _note_left(self, t: float, until: float, state: Any) -> None:
+        """Note what leaves the 0 at which it has been since the run began; no run ends by that."""
+        if self._came.all():
+            return
+        s = t + STEP_PLACES[1] * (until - t)
+        sides, x = self._signs(self._looked(s, state(s))), state(t)
+        for i in np.flatnonzero((self._came == 0.0) & (sides != 0.0)).tolist():
+            rises = bool(sides[i] > 0.0)
+            if not self.jumps.ends(i, rises):
+                self._note_change(i, t, rises, x)
+            self._came[i] = sides[i]
 
     def _note_jumps(self, t: float, x: np.ndarray, left: np.ndarray | None) -> None:
         """Note the functions that the run watches whose signs have jumped at an instant."""
@@ -298,7 +320,7 @@ class Driver:
             self.progress(self.reached)
 
     _repeated, _longest, _ended = 0, 0.0, False
-    _before: np.ndarray | None = None
+    _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:
         """Record the times of the response that a step has passed, but not what is to jump."""
