@@ -20,11 +20,11 @@ from .diagram.schedule import AlgebraicLoopError
 from .ensemble import ensemble_response
 from .ensemble_result import Ensemble
 from .integrate.methods.tableau import Tableau
-from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
 from .machine.store import CacheWarning
 from .response import Response, uninterrupted
+from .results import Statistics
 from .settings import Settings
 from .typesetting import BlockEquations, typeset
 

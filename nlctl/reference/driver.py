@@ -168,6 +168,8 @@ class Driver:
                 sides = seen[: sides.size] >= 0.0
                 self.jumps.check_resolved(until, seen)
             if closes:
+                own = self.jumps.switching
+                self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -248,25 +250,27 @@ class Driver:
             FEW_PLACES if length < _SHORT * self._longest else STEP_PLACES,
         )
         if event is not None:
-            self._note(event, state)
+            self._note(event, seen, state)
         return event
 
     def _looked(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen, on the side of the next stop that the run comes from."""
         return self.jumps.look(min(t, self._last), x)
 
-    def _note(self, event: Event, state: Any) -> None:
+    def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
         x = state(event.time)
         self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
-        sides = self._signs(after)
-        if event.number < sides.size and sides[event.number] == 0.0:  # by rounding, right behind it
-            sides[event.number] = -self._came[event.number]
-        for i in np.flatnonzero(self._came * sides < 0.0).tolist():
+        came, sides, own = self._came, self._signs(after), self.jumps.switching
+        came[own] = np.sign(seen[own])  # 0 as long as a memory is carried along
+        reached = (sides == 0.0) & (np.arange(sides.size) == event.number)  # by rounding
+        reached[own] = sides[own] == 0.0
+        sides = np.where(reached, -came, sides)
+        for i in np.flatnonzero(came * sides < 0.0).tolist():
             self._note_change(i, event.time, bool(sides[i] > 0.0), x)
-        self._came = np.where(sides == 0.0, self._came, sides)
+        self._came = np.where(sides == 0.0, came, sides)
 
     def _signs(self, seen: np.ndarray) -> np.ndarray:
         """Return the sides of switching functions, conditions and what the run watches."""
@@ -277,11 +281,13 @@ class Driver:
 
     def _note_left(self, t: float, until: float, state: Any) -> None:
         """Note what leaves the 0 at which it has been since the run began; no run ends by that."""
-        if self._came.all():
+        waits = self._came == 0.0
+        waits[self.jumps.switching] = False
+        if not waits.any():
             return
         s = t + STEP_PLACES[1] * (until - t)
         sides, x = self._signs(self._looked(s, state(s))), state(t)
-        for i in np.flatnonzero((self._came == 0.0) & (sides != 0.0)).tolist():
+        for i in np.flatnonzero(waits & (sides != 0.0)).tolist():
             rises = bool(sides[i] > 0.0)
             if not self.jumps.ends(i, rises):
                 self._note_change(i, t, rises, x)

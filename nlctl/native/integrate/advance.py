@@ -346,18 +346,19 @@ def _note_events(task, lanes, w, found, done):
 
 @numba.njit(**INNER)
 def _note_left(task, lane, w, located, j):
-    """Note what a step has led away from 0: to the side that it has not come from.
+    """Note the conditions that a step has led away from 0: to the side that they do not come from.
 
-    What has been 0 since the run began comes from neither; no run ends by that.
+    What has been 0 since the run began comes from neither; no run ends by that.  What blocks
+    declare is 0 as long as a memory is carried along: where it turns is no event.
     """
     events, rows = w.events, task.rows
-    for i in range(rows.guarded):
+    for i in range(rows.bending, rows.guarded):
         if events.g_start[i, j] != 0.0 or not abs(events.g[i, j]) > 0.0:
             continue
         now, came = events.g[i, j], events.came[i, j]
         if came == 0.0 and i >= rows.watched and rows.ending[i - rows.watched]:
             continue
-        is_rounding = rows.bending <= i < rows.declared and abs(now) <= SMALL_KINK * task.atol
+        is_rounding = i < rows.declared and abs(now) <= SMALL_KINK * task.atol
         if came == 0.0 or (came * now < 0.0 and not is_rounding):
             t = lane.t if located and came != 0.0 else lane.begun
             if _counts(task, lane, i, now):
