@@ -15,12 +15,10 @@ HOW = [
 how = pytest.mark.parametrize("how", HOW, ids=lambda how: "-".join(map(str, how.values())))
 
 
-def swing(*more):
-    """A harmonic oscillator, and what is integrated along it."""
-    return ct.nlsys(
-        lambda t, x, u, p: [x[1], -x[0], *(one(x) for one in more)], None,
-        inputs=0, outputs=2 + len(more), states=2 + len(more), name="swing",
-    )  # fmt: skip
+def swing():
+    """A harmonic oscillator."""
+    return ct.nlsys(lambda t, x, u, p: [x[1], -x[0]], None, inputs=0, outputs=2, states=2,
+                    name="swing")  # fmt: skip
 
 
 def position(t, x, u, params):
@@ -40,7 +38,10 @@ def test_what_begins_at_0_and_leaves_it_is_an_event(how, way):
 @how
 def test_a_condition_of_the_equations_that_begins_at_0(how):
     """1 where x = sin t > 0, otherwise 2, up to t = 4: pi + 2 (4 - pi)."""
-    loop = swing(lambda x: np.where(x[0] > 0, 1.0, 2.0))
+    loop = ct.nlsys(
+        lambda t, x, u, p: [x[1], -x[0], np.where(x[0] > 0, 1.0, 2.0)], None, inputs=0, outputs=3,
+        states=3, name="loop",
+    )  # fmt: skip
     made = nlctl.input_output_response(loop, [0, 4], 0, [0, 1, 0], **how)
     assert made.states[2, -1] == pytest.approx(8 - np.pi, abs=1e-5 if how["rtol"] > 1e-7 else 1e-8)
     np.testing.assert_allclose(made.events["time"], [0, np.pi], rtol=0, atol=1e-5)
@@ -92,7 +93,7 @@ def test_resets_at_given_times_are_rows_of_the_table(how):
     made = nlctl.input_output_response(nlctl.block(Impulses(), "impulses"), [0, 5.2], **how)
     resets = made.events[made.events["which"] == "guard"]
     at = np.arange(0.5, 5.0)
-    np.testing.assert_allclose(resets["time"], at, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(resets["time"], at, rtol=0, atol=1e-8)
     assert set(resets["block"]) == {"impulses"}
     wanted = np.exp(-5.2) + np.exp(at - 5.2).sum()
     assert made.outputs.ravel()[-1] == pytest.approx(wanted, abs=1e-5)
