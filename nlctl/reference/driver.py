@@ -131,9 +131,8 @@ class Driver:
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
         self._held, self._last = x, float(np.nextafter(stop, -np.inf))
-        if stop - t <= TIME_ROUNDING * max(
-            abs(t), abs(stop), self._span
-        ):  # only rounding sets them apart
+        rounding = TIME_ROUNDING * max(abs(t), abs(stop), self._span)
+        if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
         bounded = self._bounded(t, stop)
