@@ -21,7 +21,6 @@ from .ensemble import ensemble_response
 from .ensemble_result import Ensemble
 from .frequency import frequency_response
 from .integrate.methods.tableau import Tableau
-from .integrate.results import Statistics
 from .integrate.state import Status
 from .linearized import linearize
 from .machine.store import CacheWarning
@@ -32,6 +31,7 @@ from .operating_points import (
     find_operating_points,
 )
 from .response import Response, uninterrupted
+from .results import Statistics
 from .settings import Settings
 from .stepping import Stepper, StepperState, stepper
 from .typesetting import BlockEquations, typeset

@@ -8,7 +8,7 @@ import numpy as np
 from ..annotations import as_annotated
 from .along import derivatives
 from .compiled import Compiled
-from .integrate.discrete import compile_discrete
+from .discrete import compile_discrete
 from .machine.evaluations import ENSEMBLE_WIDTH, machine
 from .taylor.turns import series_ahead
 

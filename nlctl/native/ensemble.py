@@ -28,14 +28,14 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
+from .driver import begin, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike
 from .histories import variations
-from .integrate.driver import begin, finish, prepared, trajectory, watched
 from .integrate.methods.tableau import Tableau
-from .integrate.results import Trajectory, made
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
+from .results import Trajectory, made
 from .run import Run
 from .settings import Settings
 

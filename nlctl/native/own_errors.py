@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 
 from ..diagrams import overridden
 from ..upstream.control_internals import outputs_now, rates_now
-from .integrate.results import Trajectory
 from .reading import Reading
+from .results import Trajectory
 
 _FURTHER = 1e-3  # part of the run behind its end that is looked at
 _CALLS = 2000  # of the functions, beyond which no error is expected

@@ -17,10 +17,10 @@ from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled, with_watched
-from .integrate.driver import trajectory
-from .integrate.results import Statistics, Trajectory
+from .driver import trajectory
 from .integrate.state import Status
 from .own_errors import own_error
+from .results import Statistics, Trajectory
 from .settings import Settings
 
 

@@ -56,6 +56,8 @@ def first_event(
     guards, signed = kinds[0], sum(kinds)
     sides = _side(seen[:, :signed])
     sides[:, :guards] = np.where(seen[:, :guards] >= 0.0, 1.0, -1.0)
+    for k in range(1, len(t)):  # what is exactly 0 is still on its side
+        sides[k] = np.where(sides[k] == 0.0, sides[k - 1], sides[k])
     found = Event(np.inf, -1)
     for i, k in _suspects(seen[:, :signed], sides, guards):
         if t[max(k - 1, 0)] < found.time:
@@ -97,7 +99,7 @@ def _crossing(look, t, side, i, k, values, is_guard) -> Event:
     """Return where a function leaves its side behind a place, or dips around it."""
 
     def stays(value: float) -> bool:
-        return (value >= 0.0) if is_guard else (_side(value) == side)
+        return (value >= 0.0) if is_guard else (_side(value) in (side, 0.0))
 
     last = t.size - 1
     a, b = float(t[k]), float(t[min(k + 1, last)])

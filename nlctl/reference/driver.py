@@ -25,6 +25,8 @@ _STANDSTILL = 200  # steps in a row that do not advance the time
 _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there is read
 _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
+_WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
+_ROUNDED = 1.0 + 1e-9
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -129,12 +131,12 @@ class Driver:
     def _flow(self, t: float, x: np.ndarray, stop: float, sides: np.ndarray) -> Any:
         """Integrate to a stop, or to where something happens before it."""
         self._held, self._last = x, float(np.nextafter(stop, -np.inf))
-        if stop - t <= TIME_ROUNDING * max(
-            abs(t), abs(stop), self._span
-        ):  # only rounding sets them apart
+        rounding = TIME_ROUNDING * max(abs(t), abs(stop), self._span)
+        if stop - t <= rounding:  # only that sets them apart
             self._record_within(stop, lambda _: x, closes=True)
             return stop, x + (stop - t) * self._rates(t, x), sides, [(t, lambda _: x)], None
-        solver = self.method(self._rates, t, x, stop, **self._bounded(t, stop))
+        bounded = self._bounded(t, stop)
+        solver, bound = self.method(self._rates, t, x, stop, **bounded), bounded["max_step"]
         seen = self._first_seen(t, x)
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
@@ -143,10 +145,13 @@ class Driver:
             if solver.status == "failed":
                 raise RuntimeError(f"solve_ivp failed: {message}")
             state = self._solution(solver)
-            if self._slept(solver, state):
-                short = {**self._bounded(t, stop), "max_step": self._span / _PLACES}
+            allowed = self._allowed(solver, state, bound)
+            if allowed:
+                bound = allowed
+                short = {**self._bounded(t, stop), "max_step": bound}
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
+            self._note_left(float(solver.t_old), float(solver.t), state)
             event = self._event(solver, state, seen)
             until = event.time if event else float(solver.t)
             closes = event is not None or solver.status == "finished"
@@ -162,17 +167,31 @@ class Driver:
                 sides = seen[: sides.size] >= 0.0
                 self.jumps.check_resolved(until, seen)
             if closes:
-                self._before = None if event else seen
+                own = self.jumps.switching
+                self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Return what is seen where a flow begins; of what is exactly 0 at a stop, before that."""
+        """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
         seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
-        guards, others = self.jumps.kinds
-        own = slice(guards, guards + others)
-        if self._before is not None and self._before.shape == seen.shape:
-            seen[own] = np.where(seen[own] == 0.0, self._before[own], seen[own])
+        sides = self._signs(seen)
+        came = self._came if self._came.size else np.zeros(sides.size)
+        self._came = np.where(sides == 0.0, came, sides)
+        own = seen[: sides.size]
+        own[:] = np.where(own == 0.0, came * np.finfo(float).tiny, own)
         return seen
+
+    def _allowed(self, solver: Any, state: Any, bound: float) -> float:
+        """Return how long the step just made should have been, 0 if it is right.
+
+        One from which a function of t alone moves soon is shorter; behind that they grow again.
+        """
+        longest = min(self.settings["max_step"], self.stops.space(float(solver.t_old)))
+        length = float(solver.t - solver.t_old)
+        may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
+        if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
+            return longest
+        return self._span / _PLACES if self._slept(solver, state) else 0.0
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -239,14 +258,39 @@ class Driver:
 
     def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
-        x, (guards, others) = state(event.time), self.jumps.kinds
+        x = state(event.time)
         self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
-        rows = np.arange(guards, guards + others)
-        changed = rows[(seen[rows] != 0.0) & (seen[rows] * after[rows] <= 0.0)]
-        for i in changed.tolist():
-            self._note_change(i, event.time, bool(after[i] > seen[i]), x)
+        came, sides, own = self._came, self._signs(after), self.jumps.switching
+        came[own] = np.sign(seen[own])  # 0 as long as a memory is carried along
+        reached = (sides == 0.0) & (np.arange(sides.size) == event.number)  # by rounding
+        reached[own] = sides[own] == 0.0
+        sides = np.where(reached, -came, sides)
+        for i in np.flatnonzero(came * sides < 0.0).tolist():
+            self._note_change(i, event.time, bool(sides[i] > 0.0), x)
+        self._came = np.where(sides == 0.0, came, sides)
+
+    def _signs(self, seen: np.ndarray) -> np.ndarray:
+        """Return the sides of switching functions, conditions and what the run watches."""
+        guards, others = self.jumps.kinds
+        sides = np.nan_to_num(np.sign(seen[: guards + others]))
+        sides[:guards] = 1.0
+        return sides
+
+    def _note_left(self, t: float, until: float, state: Any) -> None:
+        """Note what leaves the 0 at which it has been since the run began; no run ends by that."""
+        waits = self._came == 0.0
+        waits[self.jumps.switching] = False
+        if not waits.any():
+            return
+        s = t + STEP_PLACES[1] * (until - t)
+        sides, x = self._signs(self._looked(s, state(s))), state(t)
+        for i in np.flatnonzero(waits & (sides != 0.0)).tolist():
+            rises = bool(sides[i] > 0.0)
+            if not self.jumps.ends(i, rises):
+                self._note_change(i, t, rises, x)
+            self._came[i] = sides[i]
 
     def _note_jumps(self, t: float, x: np.ndarray, left: np.ndarray | None) -> None:
         """Note the functions that the run watches whose signs have jumped at an instant."""
@@ -281,7 +325,7 @@ class Driver:
             self.progress(self.reached)
 
     _repeated, _longest, _ended = 0, 0.0, False
-    _before: np.ndarray | None = None
+    _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:
         """Record the times of the response that a step has passed, but not what is to jump."""

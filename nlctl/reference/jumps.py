@@ -82,6 +82,7 @@ class Jumps:
         self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
         self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
         self.kinds: tuple[int, int] = (0, 0)
+        self.switching = slice(0, 0)  # rows that blocks declare, of what `look` returns
         self.labels: list[tuple[str, str]] | None = None
         self._own = any(self._blocks.values())
         self.any = self._own or bool(self.watched or self.crossings)
@@ -122,6 +123,7 @@ class Jumps:
         )
         self.labels = [*before, *conditions, *watched, *own["commit"]]
         self.kinds = (len(own["guard"]), signed - len(own["guard"]))
+        self.switching = slice(len(own["guard"]), len(before))
 
     def label(self, number: int) -> tuple[str, str]:
         """Return block and name of a row of what `look` returns."""

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import DivergedError, ParameterError
 
 __all__ = [
+    "Events",
     "Watched",
     "check_moves",
     "check_numbers",
@@ -20,6 +21,9 @@ __all__ = [
     "watched_functions",
     "watches_nan",
 ]  # fmt: skip
+
+EventFunction = Callable[..., Any]  # (t, x, u, params) -> a number
+Events = EventFunction | Sequence[EventFunction] | Mapping[str, EventFunction]
 
 STOP = "stop_when"
 _IS_NAN = " is NaN"
@@ -66,7 +70,9 @@ def nan_error(name: str, time: float) -> DivergedError:
     return DivergedError(f"event function '{name}' is NaN at t = {time:.6g} s", float(time))
 
 
-def watched_functions(stop_when: Any, events: Any) -> tuple[Watched, ...]:
+def watched_functions(
+    stop_when: EventFunction | None, events: Events | None
+) -> tuple[Watched, ...]:
     """Return what is watched in a run."""
     given: list[tuple[str, Any]] = [] if stop_when is None else [(STOP, stop_when)]
     if isinstance(events, Mapping):

@@ -11,9 +11,9 @@ import numpy as np
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.happened import row_labels
-from ..native.integrate.results import Trajectory
 from ..native.integrate.state import Status
 from ..native.jacobians import searches_of
+from ..native.results import Trajectory
 from .program import Differentiated
 from .record import NoDerivative
 

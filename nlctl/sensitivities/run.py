@@ -14,12 +14,12 @@ from ..errors import CompileError, InexactWarning
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
+from ..native.driver import begin, prepared, trajectory
 from ..native.histories import variations
-from ..native.integrate.driver import begin, prepared, trajectory
-from ..native.integrate.results import Trajectory
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
+from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
 from .missing import missing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
@@ -19,7 +19,7 @@ from ..diagram.parameters import length
 from ..diagram.program import count_guards, count_switching_functions, memory
 from ..diagram.schedule import Schedule, during
 from ..opaque.calls import Call
-from .located import Conditions, found_conditions
+from .located import Conditions, Located, found_conditions
 from .reader import Reader
 from .relays import with_sliding
 from .watched import watched_conditions
@@ -59,6 +59,15 @@ class Equations:
         return [piece for _, array in self.results[name] for piece in array.pieces()]
 
 
+class _Events(NamedTuple):
+    """What blocks and the run declare, as rows of their first numbers and these numbers."""
+
+    declared: list[tuple[int, Tracer]]  # switching functions
+    guards: dict[int, tuple[int, Tracer]]  # by their blocks' places
+    committed: dict[int, tuple[int, Tracer]]  # what memories become, likewise
+    watched: list[Located]  # functions of the run
+
+
 def equations(
     schedule: Schedule,
     layout: Any,
@@ -79,17 +88,14 @@ def equations(
         reader.read(schedule)
         rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
         y = reader.wired(schedule.outputs)
-        declared, committed = _events(reader)
-        guards, watched = _guards(reader), watched_conditions(reader, schedule)
-        found = _conditions(
-            schedule.system, reader, rates, y, (declared, guards, committed, watched)
-        )
-        found = replace(found, located=(*found.located, *watched))
-        falls = [(row + found.rows, guard) for row, guard in guards.values()]
+        events = _events(reader, schedule)
+        found = _conditions(schedule.system, reader, rates, y, events)
+        found = replace(found, located=(*found.located, *events.watched))
+        falls = [(row + found.rows, guard) for row, guard in events.guards.values()]
         results = {
             "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
-            "g": declared + _located(reader, found) + falls,
-            "m": list(committed.values()),
+            "g": events.declared + _located(reader, found) + falls,
+            "m": list(events.committed.values()),
             "y": [(0, y)],
         }
         if any(count_guards(node) for node in reader.blocks):
@@ -118,7 +124,7 @@ def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
 
 
 def _conditions(
-    system: System, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: Any
+    system: System, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: _Events
 ) -> Conditions:
     """Return what a diagram in continuous time switches at without saying so.
 
@@ -126,11 +132,11 @@ def _conditions(
     """
     if not ct.isctime(system):
         return Conditions()
-    declared, guards, committed, watched = events
-    falls = {i: guard for i, (_, guard) in guards.items()}
-    signs, kept = [array for _, array in declared], [array for _, array in committed.values()]
+    falls = {i: guard for i, (_, guard) in events.guards.items()}
+    signs = [array for _, array in events.declared]
+    kept = [array for _, array in events.committed.values()]
     others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
-    given = [each.function for each in watched if not watches_nan(each.what)]
+    given = [each.function for each in events.watched if not watches_nan(each.what)]
     return found_conditions(reader, rates, signs, falls, others, given)
 
 
@@ -182,8 +188,8 @@ def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     return found
 
 
-def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], dict[int, tuple[int, Tracer]]]:
-    """Return switching functions of all blocks, and by their places what memories become."""
+def _events(reader: Reader, schedule: Schedule) -> _Events:
+    """Return what blocks and the run declare."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
     at, behind, declared, committed = 0, 0, [], {}
     for i, (own, kept) in enumerate(counts):
@@ -192,4 +198,5 @@ def _events(reader: Reader) -> tuple[list[tuple[int, Tracer]], dict[int, tuple[i
             declared.append((at, events[:own]))
             committed[i] = (behind, events[own:])
             at, behind = at + own, behind + kept
-    return declared, committed
+    watched = watched_conditions(reader, schedule)
+    return _Events(declared=declared, guards=_guards(reader), committed=committed, watched=watched)

@@ -2,5 +2,5 @@
 
 `advance` takes steps of an explicit pair or of `stiff` (`rodas5p`) as `control` chooses them,
 `events` are located and `restart` resumes behind them; `memory` is what turns, `state` and
-`workspace` are what a lane has.  `driver` runs it all; `discrete` is discrete time.
+`workspace` are what a lane has.  All is compiled to bitcode, which `nlctl.native.driver` calls.
 """

@@ -22,6 +22,7 @@ from .events.location import (
     CLEAR,
     EVENT,
     REFUSED,
+    SMALL_KINK,
     jumped,
     locate,
     locate_jump,
@@ -102,14 +103,14 @@ def _accept(task, lanes, w, found, done, passed):
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
         step_accepted(lane, event)
-        lane.t = t_new
+        lane.begun, lane.t = lane.t, t_new
         if task.timed.opaque:
             lane.rests = _rests(task, w, j)
         if lane.across:
-            lane.left_zero = _was_zero(task, w, j)
+            lane.left_zero = _left_zero(task, w, j)
             lane.across, lane.cross = 0, 0.0
         else:
-            lane.left_zero = lane.left_zero and _was_zero(task, w, j)
+            lane.left_zero = lane.left_zero and _left_zero(task, w, j)
             next_step(lane, w.error[j], w.rate[j], task)
         if task.fixed == 0.0 and has_events(w):
             lane.h = min(lane.h, w.inside.resolved[j])
@@ -125,10 +126,10 @@ def _accept(task, lanes, w, found, done, passed):
 
 
 @numba.njit(**INNER)
-def _was_zero(task, w, j):
-    """Whether a step began where a condition was exactly 0."""
+def _left_zero(task, w, j):
+    """Whether a step has led away from where a condition was exactly 0."""
     for i in range(task.rows.declared, task.rows.guarded):
-        if w.events.g_start[i, j] == 0.0:
+        if w.events.g_start[i, j] == 0.0 and w.events.g[i, j] != 0.0:
             return 1
     return 0
 
@@ -291,7 +292,7 @@ def _note_jumps(task, lanes, w, done):
             if not done[j] or before == now:
                 continue
             if before * now < 0.0 and _counts(task, lanes[j], i, now):
-                note(task, lanes[j], w, i, now > 0.0, j)
+                note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
             events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
 
 
@@ -325,18 +326,43 @@ def _note_events(task, lanes, w, found, done):
     """
     events, rows = w.events, task.rows
     for j in range(lanes.size):
+        if done[j]:
+            _note_left(task, lanes[j], w, found[j] == EVENT, j)
         if not done[j] or found[j] != EVENT:
             continue
         turns = 1 if rows.memory.size else 0
         for i in range(rows.guarded):
-            if events.g_start[i, j] * events.g[i, j] < 0.0 or left_to_other_side(task, w, i, j):
+            if events.g_start[i, j] * events.g[i, j] < 0.0:
                 turns = 0
                 if _counts(task, lanes[j], i, events.g[i, j]):
-                    note(task, lanes[j], w, i, events.g[i, j] > 0.0, j)
+                    note(task, lanes[j], w, lanes[j].t, i, events.g[i, j] > 0.0, j)
+            elif left_to_other_side(task, w, i, j):
+                turns = 0
         for i in range(rows.guarded, rows.switching):
             if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
         lanes[j].turns += turns
+
+
+@numba.njit(**INNER)
+def _note_left(task, lane, w, located, j):
+    """Note the conditions that a step has led away from 0: to the side that they do not come from.
+
+    What has been 0 since the run began comes from neither; no run ends by that.  What blocks
+    declare is 0 as long as a memory is carried along: where it turns is no event.
+    """
+    events, rows = w.events, task.rows
+    for i in range(rows.bending, rows.guarded):
+        if events.g_start[i, j] != 0.0 or not abs(events.g[i, j]) > 0.0:
+            continue
+        now, came = events.g[i, j], events.came[i, j]
+        if came == 0.0 and i >= rows.watched and rows.ending[i - rows.watched]:
+            continue
+        is_rounding = i < rows.declared and abs(now) <= SMALL_KINK * task.atol
+        if came == 0.0 or (came * now < 0.0 and not is_rounding):
+            t = lane.t if located and came != 0.0 else lane.begun
+            if _counts(task, lane, i, now):
+                note(task, lane, w, t, i, now > 0.0, j)
 
 
 @numba.njit(**INNER)
@@ -352,7 +378,7 @@ def _happens(task, lanes, w, passed, sampled):
             passed[j] |= sampled[j]
             lanes[j].log_error_before *= 0.0 if sampled[j] else 1.0
             if sampled[j]:
-                note(task, lanes[j], w, OF_TIME, True, j)
+                note(task, lanes[j], w, lanes[j].t, OF_TIME, True, j)
     if task.clocks.ticks.size and take_samples(task, lanes, w, sampled):
         again = True
         for j in range(lanes.size):

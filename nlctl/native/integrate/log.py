@@ -33,12 +33,12 @@ def log_room(task: Any, rows: int, expected: int = 0) -> int:
 
 
 @numba.njit(**INNER)
-def note(task, lane, w, row, rises, j):
+def note(task, lane, w, t, row, rises, j):
     """Count an event of a lane, and write it down in a single run: there is room for it."""
     if task.alone:
         if lane.noted >= w.log.t.size:  # never, see `log_is_full`
             return
-        w.log.t[lane.noted] = lane.t
+        w.log.t[lane.noted] = t
         w.log.row[lane.noted] = 2 * row + (1 if rises else 0)
     lane.noted += 1
 

@@ -118,7 +118,7 @@ def _jump(task, lanes, w, fallen, chosen):
         for i in range(fallen.shape[0]):
             if not fallen[i, j]:
                 continue
-            note(task, lane, w, task.rows.guarded + i, False, j)
+            note(task, lane, w, lane.t, task.rows.guarded + i, False, j)
             lane.culprit = i
             for m in range(task.resets.states.size):
                 if task.resets.owned[i, m]:

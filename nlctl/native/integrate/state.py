@@ -39,6 +39,7 @@ INNER = {
 
 _FIELDS = [
     ("t", "f8"),  # time reached
+    ("begun", "f8"),  # and time at which the last accepted step has begun
     ("h", "f8"),  # step proposed by error control
     ("step", "f8"),  # step being tried
     ("last", "f8"),  # last accepted step

@@ -12,12 +12,12 @@ from ..audit import Audit, Trial
 from ..audit import audit as compare
 from ..chattering.detection import new_paces
 from ..compiled import Compiled
+from ..driver import ROUNDS, begin, differentiated, go_on, watched
 from ..happened import happened
 from ..histories import arriving_first
-from ..integrate.driver import ROUNDS, begin, differentiated, go_on, watched
-from ..integrate.results import Trajectory, made
 from ..integrate.state import OK, RUNNING
 from ..integrators import integrators
+from ..results import Trajectory, made
 from ..run import Run
 from ..settings import Settings
 from ..taylor.turns import turned, with_turns

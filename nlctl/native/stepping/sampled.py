@@ -10,9 +10,9 @@ import numpy as np
 from ..audit import Audit, Trial
 from ..audit import audit as compare
 from ..compiled import Compiled
-from ..integrate.results import Statistics, Trajectory
 from ..integrate.state import Status
 from ..machine.evaluations import prepared_parameters
+from ..results import Statistics, Trajectory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

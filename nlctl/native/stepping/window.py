@@ -14,8 +14,8 @@ import numpy as np
 from ...delays.variation import Variation
 from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
+from ..driver import prepared
 from ..histories import variations
-from ..integrate.driver import prepared
 from ..integrate.memory import type_of, with_fields
 from ..integrate.workspace import Task
 from ..run import Run

@@ -48,7 +48,7 @@ def break_points(
             else:
                 found.append(_exact(indicator, places, values, span))
     every = np.unique(np.concatenate(found))
-    return every[(every > span[0]) & (every < span[1])]
+    return every[(every > span[0]) & (every <= span[1])]
 
 
 def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:

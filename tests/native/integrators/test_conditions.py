@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl.native.integrate.driver import begin, finish, go_on, prepared
-from nlctl.native.integrate.results import made as result
+from nlctl.native.driver import begin, finish, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
+from nlctl.native.results import made as result
 from nlctl.native.settings import Settings
 
 ROOT2 = np.sqrt(2.0)

@@ -5,7 +5,7 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.native.integrate.driver import begin, differentiated, go_on, prepared
+from nlctl.native.driver import begin, differentiated, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
 from nlctl.native.settings import Settings
 

@@ -16,8 +16,7 @@ from numba.core import config, event
 
 import nlctl
 from nlctl import paper
-from nlctl.native import integrators
-from nlctl.native.integrate import driver
+from nlctl.native import driver, integrators
 from nlctl.native.integrators import SHIPPED, WANTED, shipped_bitcode, sources_key
 from nlctl.native.ship import source_files
 

@@ -10,7 +10,7 @@ from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
 from nlctl.native import ensemble_response
 from nlctl.native.compiled import compile as compile_diagram
-from nlctl.native.integrate.discrete import simulate_discrete
+from nlctl.native.discrete import simulate_discrete
 
 
 def simulated(system, times, inputs=0.0, x0=None, params=None):

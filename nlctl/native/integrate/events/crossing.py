@@ -24,6 +24,7 @@ _CLOSEST = 8e-16  # of the time: no condition can be told closer than that
 _ROUNDING = 1e-14  # of what is integrated, in the error of a step
 _WIDER = 4.0  # each time that a step across has not led across
 _TRIES = 60
+_DECADES = 0.01  # of a bracket: nothing is foreseen of what leaves 0, not even how soon
 _GROWS = 100.0  # an error that is small by chance
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
@@ -259,7 +260,8 @@ def _next_try(task, lane, w, bad, j):
     width = lane.high - lane.low
     aim = root - 0.5 * close if root > close else 1.5 * close
     if root < 0.0 or (lane.tries > 6 and lane.tries % 2):
-        aim = lane.low + 0.5 * width
+        leaves_zero = root < 0.0 and 0.0 < lane.low < _DECADES * lane.high
+        aim = np.sqrt(lane.low * lane.high) if leaves_zero else lane.low + 0.5 * width
     rest = min(1e-3 * width, 0.5 * close)
     lane.step = min(max(aim, lane.low + rest), lane.high - rest)
     lane.ends = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numba
+import numpy as np
 
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, arrays_of
 from ..state import INNER
@@ -35,6 +36,7 @@ class Events(NamedTuple):
     g_high: Reals2
     behind: Reals2  # 1 where the step before ended with this event; of a condition that is
     # exactly 0 the side that it has come from
+    came: Reals2  # the side on which it was last, 0 if it has been at 0 since the run began
     before_jump: Reals2  # at the end of a step, before anything jumps there
     table: Places2
 
@@ -106,6 +108,8 @@ def begin_next(w, j):
     events, memories = w.events, w.memories
     for i in range(events.g.shape[0]):
         events.g_start[i, j] = events.g[i, j]
+        if events.g[i, j] != 0.0:
+            events.came[i, j] = np.sign(events.g[i, j])
     for i in range(memories.m.shape[0]):
         memories.m_start[i, j] = memories.m[i, j]
         memories.slope_start[i, j] = memories.slope[i, j]

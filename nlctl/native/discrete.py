@@ -9,13 +9,13 @@ import control as ct
 import numba
 import numpy as np
 
-from ...errors import ParameterError
-from ..compiled import Compiled
-from ..machine import address
-from ..machine.address import call_out, call_rhs
-from ..machine.evaluations import prepared_parameters
-from ..machine.fingerprint import function_key, module_key
-from ..machine.machine_code import Wanted, machine_code
+from ..errors import ParameterError
+from .compiled import Compiled
+from .machine import address
+from .machine.address import call_out, call_rhs
+from .machine.evaluations import prepared_parameters
+from .machine.fingerprint import function_key, module_key
+from .machine.machine_code import Wanted, machine_code
 
 MATRIX, COLUMNS = numba.float64[:, ::1], numba.float64[:, :, ::1]
 LOOP = numba.int64(

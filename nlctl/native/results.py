@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...responses.event_log import NO_EVENTS, EventLog
-from ..chattering.detection import Jump
-from .state import Status
+from ..responses.event_log import NO_EVENTS, EventLog
+from .chattering.detection import Jump
+from .integrate.state import Status
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,34 +10,34 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ...delays.variation import Variation
-from ...errors import ParameterError
-from ...sampling.clock import Instants
-from ..along import derivatives
-from ..chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
-from ..compiled import Compiled
-from ..diagram.program import instants_of
-from ..happened import happened, with_log
-from ..histories import lines_of, variations, with_past, with_room
-from ..integrators import integrators
-from ..laid import laid_out
-from ..machine.evaluations import Machine, machine
-from ..run import Run
-from ..settings import METHODS, Settings
-from ..taylor.method import with_taylor
-from ..taylor.turns import turned, with_turns
-from ..timed.ahead import ahead
+from ..delays.variation import Variation
+from ..errors import ParameterError
+from ..sampling.clock import Instants
+from .along import derivatives
+from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
+from .compiled import Compiled
+from .diagram.program import instants_of
 from .discrete import simulate_discrete
-from .log import log_room
-from .memory import with_fields, with_table
-from .methods.lu import WHOLE
-from .methods.stiff import DIFFERENCES, EXACT, stiff_method
-from .methods.tableau import Tableau, pair_of
-from .methods.taylor import OTHER_METHOD, SLOPES
+from .happened import happened, with_log
+from .histories import lines_of, variations, with_past, with_room
+from .integrate.log import log_room
+from .integrate.memory import with_fields, with_table
+from .integrate.methods.lu import WHOLE
+from .integrate.methods.stiff import DIFFERENCES, EXACT, stiff_method
+from .integrate.methods.tableau import Tableau, pair_of
+from .integrate.methods.taylor import OTHER_METHOD, SLOPES
+from .integrate.samples import Ticks, Timed
+from .integrate.state import DERIVATIVES, EXPLICIT, RUNNING, Status
+from .integrate.workspace import Task, new_work
+from .integrators import integrators
+from .laid import laid_out
+from .machine.evaluations import Machine, machine
 from .results import Statistics, Trajectory, at_its_end, made
-from .samples import Ticks, Timed
-from .state import DERIVATIVES, EXPLICIT, RUNNING, Status
-from .workspace import Task, new_work
+from .run import Run
+from .settings import METHODS, Settings
+from .taylor.method import with_taylor
+from .taylor.turns import turned, with_turns
+from .timed.ahead import ahead
 
 _NOTED = 1000  # events of a run for which there is room from the beginning
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
