@@ -284,13 +284,16 @@ def _close(task, lane):
 def _foreseen(task, lane, w, bad, j):
     """Return where the first condition lies in the bracket, -1 if nothing is known of that.
 
-    Between both ends where the farther one is right; otherwise by what is known of the near side.
+    Between both ends where the farther one is right, unless the near side leads away from 0;
+    otherwise by what is known of the near side.
     """
     first = -1.0
     for i in range(task.rows.declared, task.rows.switching):
         root = -1.0
-        if _crossed(task, w, i, w.events.g_high[i, j], j) and (lane.right_high or lane.low == 0.0):
-            now, end = w.events.g_low[i, j], w.events.g_high[i, j]
+        now, end = w.events.g_low[i, j], w.events.g_high[i, j]
+        leads_away = lane.low > 0.0 and abs(now) > abs(w.events.g_start[i, j])
+        right = (lane.right_high or lane.low == 0.0) and not leads_away
+        if _crossed(task, w, i, end, j) and right:
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)
