@@ -102,7 +102,7 @@ def _accept(task, lanes, w, found, done, passed):
         t_new = next_stop(task, lane, w, j) if lane.ends else lane.t + lane.step
         if t_new >= task.times[lane.segment + 1]:
             _sample(lane, j, task, t_new, w)
-        step_accepted(lane, event)
+        _counted(task, lane, w, event, j)
         lane.begun, lane.t = lane.t, t_new
         if task.timed.opaque:
             lane.rests = _rests(task, w, j)
@@ -123,6 +123,24 @@ def _accept(task, lanes, w, found, done, passed):
         if task.method == AUTO:
             choose_method(lane, task)
     return any_passed
+
+
+@numba.njit(**INNER)
+def _counted(task, lane, w, event, j):
+    """Count an accepted step; where a condition stays exactly 0 its steps across stay wide."""
+    misses = lane.misses
+    step_accepted(lane, event)
+    if _stays_at_zero(task, w, j):
+        lane.misses = misses  # what shorter ones add to a state is lost in rounding
+
+
+@numba.njit(**INNER)
+def _stays_at_zero(task, w, j):
+    """Whether a condition was exactly 0 where a step began and is so at its end."""
+    for i in range(task.rows.declared, task.rows.guarded):
+        if w.events.g_start[i, j] == 0.0 and w.events.g[i, j] == 0.0:
+            return True
+    return False
 
 
 @numba.njit(**INNER)
