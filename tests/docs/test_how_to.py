@@ -1,0 +1,46 @@
+"""Commands of the how-to pages print what the pages say, and their code runs."""
+
+import re
+import shlex
+
+import pytest
+from command_line import nlctl_here
+from places import ROOT
+
+HOW_TO = ROOT / "docs" / "how-to"
+COMMANDS = re.compile(r"^\$ nlctl (.*)\n((?:(?!\$ ).+\n)*)", re.MULTILINE)
+
+
+def blocks(page, kind):
+    return re.findall(
+        rf"```{kind}\n(.*?)```", (HOW_TO / page).read_text(encoding="utf-8"), re.DOTALL
+    )
+
+
+@pytest.mark.slow
+def test_commands_that_export_print_the_files(tmp_path):
+    """Each prints the lines behind it, and the files are there."""
+    commands = [
+        pair for block in blocks("export.md", "console") for pair in COMMANDS.findall(block)
+    ]
+    assert len(commands) == 3
+    for command, printed in commands:
+        told = nlctl_here(*shlex.split(command), cwd=tmp_path)
+        assert (told.returncode, told.stdout) == (0, printed), told.stderr
+        assert all((tmp_path / name).stat().st_size > 1000 for name in printed.split())
+
+
+@pytest.mark.slow
+def test_code_that_exports_runs():
+    (code,) = blocks("export.md", "python")
+    exec(compile(code, "export.md", "exec"), {})
+
+
+def test_signatures_on_the_page_are_those_of_the_header():
+    from nlctl import paper
+    from nlctl.export import c_files, export_controller
+
+    controller = export_controller(paper.example_1(), "controller", dt=0.0002, method="euler")
+    header = c_files(controller)["controller.h"]
+    (declared,) = blocks("export.md", "c")
+    assert all(line in header for line in declared.splitlines())
