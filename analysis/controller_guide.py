@@ -73,6 +73,7 @@ GUIDES = (
         parameters=6,
         time=1.0,
         code="nlctl.PID()",
+        instead=("PID2",),
     ),
     ControllerGuide(
         name="sliding mode",
@@ -232,18 +233,7 @@ GUIDES = (
 
 
 def rows_of(guide: ControllerGuide) -> dict[str, str]:
-    """Return what is said of a controller, in words, as one row of a table.
-
-    Parameters
-    ----------
-    guide : ControllerGuide
-        The controller's record.
-
-    Returns
-    -------
-    dict of str
-        By "plant", "measured", "known", "proved", "costs" and "code".
-    """
+    """Return plant, measured, known, proved, costs and code of a controller, in words."""
     costs = f"{counted(guide.states, 'state')}, {counted(guide.parameters, 'parameter')}"
     if guide.time is not None:
         costs += f"; time of a run, with PID as 1: {guide.time:g}"

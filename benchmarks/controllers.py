@@ -36,7 +36,7 @@ def main() -> None:
     """Print the table, and what the records say."""
     loops = {g.name: compiled(g.code) for g in GUIDES if g.time is not None}
     rounds = [{name: seconds(loop) for name, loop in loops.items()} for _ in range(ROUNDS)]
-    spent = {name: min(each[name] for each in rounds) for name in loops}
+    spent = {name: min(timed[name] for timed in rounds) for name in loops}
     table = Table("controller", "ms a run", "with PID as 1", "recorded")
     for guide in GUIDES:
         if guide.name in spent:

@@ -64,13 +64,13 @@ def by_runs(response: Callable[..., Any]) -> Callable[[Any], float]:
 def ways(system: Any) -> list[Callable[[np.ndarray], float]]:
     """Return the three ways, each as a function that returns the time of a step."""
     compiled = nlctl.compile(system)
-    made = nlctl.stepper(compiled, DT)
+    steps = nlctl.stepper(compiled, DT)
 
     def stepped(inputs: np.ndarray) -> float:
-        made.reset()
+        steps.reset()
         start = time.perf_counter()
         for u in inputs:
-            made.step(u)
+            steps.step(u)
         return (time.perf_counter() - start) / len(inputs)
 
     def native(times: np.ndarray, u: float, x: Any) -> Any:
@@ -96,9 +96,9 @@ def main() -> None:
     for name, system in systems.items():
         functions = ways(system)
         rounds = [[way(inputs) for way in functions] for _ in range(ROUNDS)]
-        own, *others = (min(found[i] for found in rounds) for i in range(3))
-        ratios = " and ".join(f"{other / own:.0f}" for other in others)
-        table.add_row(name, *(f"{1e3 * each:.3f}" for each in (own, *others)), ratios)
+        stepper, *others = (min(times[i] for times in rounds) for i in range(3))
+        ratios = " and ".join(f"{other / stepper:.0f}" for other in others)
+        table.add_row(name, *(f"{1e3 * t:.3f}" for t in (stepper, *others)), ratios)
     console.print(table)
 
 

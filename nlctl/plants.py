@@ -20,7 +20,7 @@ from .errors import ParameterError
 from .names import unknown
 from .params import HIGHEST_ORDER, integer, param, record
 
-__all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock", "integrator_chain"]
+__all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock"]
 
 
 def integrator_chain(f: Callable, d: Callable) -> Callable:

@@ -29,7 +29,7 @@ from .responses.arguments import (
     with_aliases,
 )
 from .responses.time_response import Response
-from .responses.watched import Events, Watched, check_moves, watched_functions
+from .responses.watched import Watched, WatchedEvents, check_moves, watched_functions
 from .sliding.relay import SLIDING
 from .upstream.control_internals import StandIn, is_system
 from .upstream.systems import System
@@ -89,7 +89,7 @@ def input_output_response(
     max_step: float | None = None,
     step: float | None = None,
     stop_when: Callable[..., Any] | None = None,
-    events: Events | None = None,
+    events: WatchedEvents | None = None,
     progress: Callable[[float], object] | None = None,
     **aliases: Any,
 ) -> Response:

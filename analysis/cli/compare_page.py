@@ -16,7 +16,7 @@ __all__ = ["compose_comparison"]
 
 def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
     """Compose the page of two reports or runs, which have been checked."""
-    from ..pages.compared import comparison
+    from ..pages.compared import comparison_page
     from ..studies import origin_differences
     from ..studies.differences import long_table_differences
 
@@ -29,7 +29,7 @@ def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Rep
             others.insert(0, f"The runs were not computed from the same: {told}")
     command = ["nlctl", "compare", *(path.as_posix() for path in both)]
     command += ["--rtol", f"{rtol:g}"] * (rtol > 0) + ["--out", out.as_posix()]
-    return comparison(
+    return comparison_page(
         *(_compared(path) for path in both),
         rtol=rtol,
         common=are_runs,

@@ -17,10 +17,10 @@ from nlctl.plotting.axes import (
     BLUE,
     GREEN,
     GREY,
-    INK,
     ORANGE,
     PURPLE,
     SHORT_LINE,
+    TEXT_INK,
     WIDTH,
     legend_above,
     stacked_axes,
@@ -64,7 +64,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
             label=None if name in labelled else plain(name),
         )  # fmt: skip
         labelled.add(name)
-    ax.step(np.arange(1, y.size + 1), y, where="post", color=INK, linewidth=1.4)
+    ax.step(np.arange(1, y.size + 1), y, where="post", color=TEXT_INK, linewidth=1.4)
     ax.axhline(0.0, color=GREY, linewidth=1.0, linestyle="--")
     legend_above(ax)
     ax.set(xlabel="runs", ylabel="lowest margin (1)")

@@ -16,13 +16,13 @@ from nlctl.plotting.labels import plain
 
 __all__ = ["trend"]
 
-LOOKS = {  # how a claim ended: colour, marker, word
+_LOOKS = {  # how a claim ended: colour, marker, word
     "holds": (BLUE, "o", "holds"),
     "open": (GREY, "D", "open"),
     "fails": (ORANGE, "X", "fails or is refuted"),
 }
-ROW, PANEL, FRAME = 0.3, 1.1, 0.9  # in
-MOST = 20  # labels of revisions
+ROW, PANEL, _FRAME = 0.3, 1.1, 0.9  # in
+_MOST = 20  # labels of revisions
 
 
 @as_annotated
@@ -48,8 +48,8 @@ def trend(
     Figure
         Of matplotlib; nothing is written or shown.
     """
-    heights = [FRAME / 2 + ROW * len(claims)] * bool(claims) + [PANEL] * len(numbers)
-    figure = Figure(figsize=(WIDTH, sum(heights) + FRAME), layout="constrained")
+    heights = [_FRAME / 2 + ROW * len(claims)] * bool(claims) + [PANEL] * len(numbers)
+    figure = Figure(figsize=(WIDTH, sum(heights) + _FRAME), layout="constrained")
     count = max(1, len(heights))
     rows = list(np.ravel(figure.subplots(count, 1, sharex=True, height_ratios=heights or None)))
     at = np.arange(len(labels))
@@ -64,7 +64,7 @@ def trend(
         ax.margins(y=0.2)
     last = figure.axes[-1]
     last.set_xlim(-0.4, len(labels) - 0.6)
-    step = -(-len(labels) // MOST)  # of very many not each has its label
+    step = -(-len(labels) // _MOST)  # of very many not each has its label
     turned = max(map(len, labels), default=0) * len(labels) > LINE
     last.set_xticks(
         at[::step],
@@ -80,8 +80,8 @@ def _marks(ax: Axes, claims: Mapping[str, Sequence[str]]) -> None:
     drawn: dict[str, Any] = {}
     for row, ends in enumerate(claims.values()):
         for place, end in enumerate(ends):
-            if end in LOOKS:
-                colour, marker, word = LOOKS[end]
+            if end in _LOOKS:
+                colour, marker, word = _LOOKS[end]
                 (drawn[word],) = ax.plot([place], [row], marker, color=colour, markersize=7)
     ax.set_yticks(range(len(claims)), [plain(name) for name in claims], parse_math=False)
     ax.set_ylim(len(claims) - 0.5, -0.5)

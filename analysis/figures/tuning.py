@@ -13,9 +13,9 @@ from nlctl.plotting.axes import (
     BLUE,
     GREEN,
     GREY,
-    INK,
     PURPLE,
     SHORT_LINE,
+    TEXT_INK,
     TIME,
     legend_above,
     stacked_axes,
@@ -86,7 +86,7 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
             ax.plot(runs[own], y[own], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)
-        ax.step(runs, best, where="post", color=INK, linewidth=1.4, label="best")
+        ax.step(runs, best, where="post", color=TEXT_INK, linewidth=1.4, label="best")
     legend_above(ax)
     ax.set(xlabel="runs (1 + 0.7 k for k derivatives)", ylabel="cost" if cost else "least margin")
     return figure

@@ -14,7 +14,7 @@ from nlctl.wording import counted
 
 from .. import figures
 from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figure_changes
-from ..report.compare import ABSENT, Difference, differences
+from ..report.compare import ABSENT, Difference, differing_numbers
 from ..report.document import (
     Claim,
     Figure,
@@ -28,10 +28,10 @@ from ..report.document import (
 )
 from ..report.outline import sort_key, summary
 
-__all__ = ["Compared", "comparison"]
+__all__ = ["Compared", "comparison_page"]
 
-LISTED = 100  # numbers of a table
-DRAWN = 4  # signals of a figure
+_LISTED = 100  # numbers of a table
+_DRAWN = 4  # signals of a figure
 _CLAIM_COLUMNS = (
     "before", "after", "claim", "found before", "found after", "limit before", "limit after",
 )  # fmt: skip
@@ -61,7 +61,7 @@ class Compared:
     folder: Path | None = None
 
 
-def comparison(
+def comparison_page(
     first: Compared,
     second: Compared,
     *,
@@ -71,7 +71,7 @@ def comparison(
     command: str = "",
 ) -> Report:
     """Compose the page; `others` are differences that the reports lack, such as of long tables."""
-    found = differences(first.content, second.content, rtol, common=common)
+    found = differing_numbers(first.content, second.content, rtol, common=common)
     claims = claim_changes(first.content["claims"], second.content["claims"])
     numbers, words = _sorted_out(found)
     pictures = [
@@ -229,11 +229,11 @@ def _numbers_section(numbers: Sequence[Difference], rtol: float) -> Section:
 def _numbers_table(
     caption: str, numbers: Sequence[Difference], rtol: float, *, folded: bool
 ) -> Table:
-    more = f" The first {LISTED} of {len(numbers)}; nlctl compare prints all."
+    more = f" The first {_LISTED} of {len(numbers)}; nlctl compare prints all."
     return Table(
-        caption=f"{caption}, the largest share first.{more * (len(numbers) > LISTED)}",
+        caption=f"{caption}, the largest share first.{more * (len(numbers) > _LISTED)}",
         columns=_NUMBER_COLUMNS,
-        rows=[_number_row(one, rtol) for one in numbers[:LISTED]],
+        rows=[_number_row(one, rtol) for one in numbers[:_LISTED]],
         folded=folded,
     )
 
@@ -262,13 +262,13 @@ def _signal_items(
         names = sorted(apart, key=lambda n: -np.nan_to_num(_range_share(one, n, apart[n][0])))
         if not names:
             continue
-        both = [(c.time, {n: c.signals[n] for n in names[:DRAWN]}) for c in (one, other)]
-        caption = f"{key.removesuffix('-history')}: {', '.join(names[:DRAWN])} before and after."
+        both = [(c.time, {n: c.signals[n] for n in names[:_DRAWN]}) for c in (one, other)]
+        caption = f"{key.removesuffix('-history')}: {', '.join(names[:_DRAWN])} before and after."
         yield Figure(
             key=f"overlaid-{key}",
             caption=caption,
             description=f"{caption} Largest differences: "
-            + "; ".join(f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:DRAWN]),
+            + "; ".join(f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:_DRAWN]),
             figure=figures.overlaid(*both, unit=one.unit),
         )
         yield Table(
@@ -309,10 +309,10 @@ def _figures_section(pictures: Sequence[tuple[str, str, str]]) -> Section:
 
 
 def _words_section(words: Sequence[Difference], others: Sequence[str]) -> Section:
-    rows = [(_place(d.where), d.first, d.second) for d in words[:LISTED]]
+    rows = [(_place(d.where), d.first, d.second) for d in words[:_LISTED]]
     items: list[Item] = []
     if rows:
-        more = f" The first {LISTED} of {len(words)}." * (len(words) > LISTED)
+        more = f" The first {_LISTED} of {len(words)}." * (len(words) > _LISTED)
         items.append(
             Table(
                 caption=f"Words, and what only one report has ({ABSENT} in the other).{more}",

@@ -9,7 +9,7 @@ from ..report.trends import Trend
 
 __all__ = ["trend_figure"]
 
-DRAWN = 4  # numbers of a figure
+_DRAWN = 4  # numbers of a figure
 _ENDS = {
     **dict.fromkeys(("pass", "proved", "checked"), "holds"),
     **dict.fromkeys(("refuted", "fail"), "fails"),
@@ -19,7 +19,7 @@ _ENDS = {
 def trend_figure(trend: Trend) -> Figure:
     """Return the figure: how each claim ended, and the first of the main numbers."""
     claims = {name: [_end(claim) for claim in row] for name, row in trend.claims.items()}
-    numbers = dict(list(trend.numbers.items())[:DRAWN])
+    numbers = dict(list(trend.numbers.items())[:_DRAWN])
     ended = "; ".join(
         f"{name}: {', '.join(end or 'not made' for end in ends)}" for name, ends in claims.items()
     )

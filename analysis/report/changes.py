@@ -13,13 +13,21 @@ import numpy as np
 from ..json_values import from_json
 from .document import Claim
 from .drawings import drawings
-from .history import SIGNALS
+from .history import SIGNALS_FILE
 from .outline import claim_status
 
-__all__ = ["RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
+__all__ = ["STATUS_RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
 
-RANK = {"pass": 0, "proved": 0, "checked": 0, "neutral": 1, "caution": 1, "refuted": 2, "fail": 2}
-GONE, NEW = "gone", "new"
+STATUS_RANK = {
+    "pass": 0,
+    "proved": 0,
+    "checked": 0,
+    "neutral": 1,
+    "caution": 1,
+    "refuted": 2,
+    "fail": 2,
+}
+_GONE, _NEW = "gone", "new"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,13 +40,15 @@ class ClaimChange:
     @property
     def statuses(self) -> tuple[str, str]:
         """What became of it in both."""
-        before = NEW if self.first is None else claim_status(self.first)[0]
-        return before, GONE if self.second is None else claim_status(self.second)[0]
+        before = _NEW if self.first is None else claim_status(self.first)[0]
+        return before, _GONE if self.second is None else claim_status(self.second)[0]
 
     @property
     def worse(self) -> int:
         """How much worse it is: from shown to refuted 2, from refuted to shown -2."""
-        ranks = [1 if c is None else RANK[claim_status(c)[1]] for c in (self.first, self.second)]
+        ranks = [
+            1 if c is None else STATUS_RANK[claim_status(c)[1]] for c in (self.first, self.second)
+        ]
         return ranks[1] - ranks[0]
 
     @property
@@ -96,7 +106,7 @@ def figure_changes(
     for key in dict.fromkeys([*one, *other]):
         caption = (other.get(key) or one[key])["caption"]
         if key not in one or key not in other:
-            yield key, caption, NEW if key in other else GONE
+            yield key, caption, _NEW if key in other else _GONE
         elif all(key in pictures for pictures in drawn):
             is_same = drawn[0][key] == drawn[1][key]
             yield key, caption, "as before" if is_same else "drawn differently"
@@ -141,7 +151,7 @@ class Curves:
 def curves_of(folder: Path | None) -> dict[str, Curves]:
     """Return the charts next to a page by key; nothing where there are none, or none to be read."""
     try:
-        charts = {} if folder is None else json.loads((folder / SIGNALS).read_text("utf-8"))
+        charts = {} if folder is None else json.loads((folder / SIGNALS_FILE).read_text("utf-8"))
         return {key: _curves(from_json(chart)) for key, chart in charts.items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return {}

@@ -18,7 +18,7 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["ABSENT", "Difference", "compare_contents", "differences", "read_report"]
+__all__ = ["ABSENT", "Difference", "compare_contents", "differing_numbers", "read_report"]
 
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
@@ -89,10 +89,10 @@ def compare_contents(
     []
     """
     _check_tolerance(rtol)
-    return differences(read_report(first), read_report(second), rtol, common=common)
+    return differing_numbers(read_report(first), read_report(second), rtol, common=common)
 
 
-def differences(
+def differing_numbers(
     first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
 ) -> list[Difference]:
     """Compare two reports as `compare_contents` does, given what is in their files."""

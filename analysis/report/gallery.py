@@ -12,7 +12,7 @@ from urllib.parse import quote
 from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 
-from .changes import RANK
+from .changes import STATUS_RANK
 from .compare import read_report
 from .document import Claim, Figure, Headline
 from .outline import claim_status, summary
@@ -98,7 +98,7 @@ def _requirements(claims: Sequence[Claim]) -> list[tuple[str, str, str]]:
     for claim in claims:
         status, look = claim_status(claim)
         for one in claim.ids:
-            if one not in found or RANK[look] > RANK[found[one][0]]:
+            if one not in found or STATUS_RANK[look] > STATUS_RANK[found[one][0]]:
                 found[one] = (look, status)
     return [(one, *ended) for one, ended in found.items()]
 

@@ -11,9 +11,9 @@ from ..json_values import as_json
 from .document import History, Report
 from .outline import place_anchors
 
-__all__ = ["SIGNALS", "chart", "signals_json", "thinned"]
+__all__ = ["SIGNALS_FILE", "chart", "signals_json", "thinned"]
 
-SIGNALS = "signals.json"
+SIGNALS_FILE = "signals.json"
 """File beside a page with the time histories of the page, for comparisons."""
 
 _COUNT = 2000  # samples of each signal on the page

@@ -23,7 +23,7 @@ from nlctl.errors import ParameterError
 
 from ..json_values import as_json
 from .document import Figure, History, Item, Report, Table
-from .history import SIGNALS, chart, signals_json
+from .history import SIGNALS_FILE, chart, signals_json
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
@@ -103,7 +103,7 @@ def render_html(
         told=told,
         margins=any(claim.margin for claim in report.claims),
         meanings=meanings(report.claims),
-        has_signals=SIGNALS in own,
+        has_signals=SIGNALS_FILE in own,
         made_by=_pairs("What made it.", ("what", "version or value"), report.provenance),
         beside=_pairs(
             "Files that belong to this page, with their places as seen from it.",
@@ -115,7 +115,7 @@ def render_html(
 
 def _own_files(report: Report) -> dict[str, str]:
     """Return the files next to a page with their SHA-256."""
-    texts = {"report.json": render_json(report), SIGNALS: signals_json(report)}
+    texts = {"report.json": render_json(report), SIGNALS_FILE: signals_json(report)}
     return {name: _digest(text) for name, text in texts.items() if text}
 
 
@@ -257,10 +257,10 @@ def write_report(
         check_report_folder(folder)
     page = render_html(report, interactive=interactive, pool=pool, drawn=drawn)
     signals = signals_json(report)
-    texts = {SIGNALS: signals} if signals else {}
+    texts = {SIGNALS_FILE: signals} if signals else {}
     write_files(folder, {"report.json": render_json(report), **texts, "index.html": page})
     if not signals:
-        (folder / SIGNALS).unlink(missing_ok=True)  # of a page that was here before
+        (folder / SIGNALS_FILE).unlink(missing_ok=True)  # of a page that was here before
     return folder / "index.html"
 
 

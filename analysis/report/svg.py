@@ -36,8 +36,12 @@ THEME = {
     axes.GREEN.lower(): "var(--green)",
     axes.PURPLE.lower(): "var(--purple)",
 }
-LETTERS = 11.2  # points: 9 px where a figure of WIDTH is as wide as a phone
-_SETTINGS: dict[Any, Any] = {"svg.hashsalt": "nlctl", "svg.fonttype": "path", "font.size": LETTERS}
+LEAST_LETTERS = 11.2  # points: 9 px where a figure of WIDTH is as wide as a phone
+_SETTINGS: dict[Any, Any] = {
+    "svg.hashsalt": "nlctl",
+    "svg.fonttype": "path",
+    "font.size": LEAST_LETTERS,
+}
 _WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
 DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")

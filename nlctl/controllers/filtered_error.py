@@ -28,6 +28,11 @@ def binomial_lambdas(order: int) -> tuple[float, ...]:
     -------
     tuple of float
         n - 1 numbers.
+
+    Examples
+    --------
+    >>> nlctl.controllers.binomial_lambdas(3)
+    (2.0, 1.0)
     """
     return tuple(float(c) for c in np.atleast_1d(np.poly(-np.ones(order - 1)))[1:])
 

@@ -29,6 +29,11 @@ class Target:
         As LLVM calls them.
     meaning : str
         What has it.
+
+    Examples
+    --------
+    >>> TARGETS["thumbv7em-none-eabihf"].cpu
+    'cortex-m7'
     """
 
     cpu: str

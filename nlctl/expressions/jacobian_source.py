@@ -47,15 +47,15 @@ def _unit(graph: Graph, j: int) -> Callable[[Expr], Expr | None]:
 def _source(rows: list[list[Expr | None]], names: str) -> str:
     """Return the code of a function of these arguments that returns the expressions."""
     nodes = needed([e for row in rows for e in row if e is not None])
-    told: dict[Expr, str] = {}
+    texts: dict[Expr, str] = {}
     lines = [f"def jacobian({', '.join(names)}):"]
     for node in nodes:
-        told[node] = _written(node, [told[arg] for arg in node.args])
+        texts[node] = _written(node, [texts[arg] for arg in node.args])
         if node.op not in ("const", "leaf"):
-            lines.append(f"    e{node.index} = {told[node]}")
-            told[node] = f"e{node.index}"
+            lines.append(f"    e{node.index} = {texts[node]}")
+            texts[node] = f"e{node.index}"
     body = ", ".join(
-        "[" + ", ".join("0.0" if e is None else told[e] for e in row) + "]" for row in rows
+        "[" + ", ".join("0.0" if e is None else texts[e] for e in row) + "]" for row in rows
     )
     return "\n".join([*lines, f"    return np.array([{body}])", ""])
 

@@ -14,12 +14,12 @@ __all__ = [
     "BLUE",
     "GREEN",
     "GREY",
-    "INK",
     "LINE",
     "ORANGE",
     "PURPLE",
     "SHORT_LINE",
     "STYLES",
+    "TEXT_INK",
     "TIME",
     "WIDTH",
     "draw_lines",
@@ -33,10 +33,10 @@ __all__ = [
 #   BLUE           what a figure is about: the output, what was found, after a change
 #   PURPLE, GREEN  the second and the third of several of a kind: signals, options, ways to search
 #   GREY           what it is compared with: the reference, before a change, 0
-#   INK            single runs over bands, and the best so far: the colour of the text
+#   TEXT_INK            single runs over bands, and the best so far: the colour of the text
 #   ORANGE         a limit, and what violates it: a violation, a burst, a run that was lost
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#B3558A", "#6b7280"
-INK = "#000000"
+TEXT_INK = "#000000"
 STYLES = ((BLUE, "-"), (PURPLE, "--"), (GREEN, "-."), (GREY, ":"))  # of several of a kind
 TIME = "time t (s)"
 WIDTH = 6.2  # in, with letters that can still be read on a phone

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..annotations import as_annotated
-from .axes import BLUE, INK, ORANGE, STYLES, TIME, legend_above, stacked_axes
+from .axes import BLUE, ORANGE, STYLES, TEXT_INK, TIME, legend_above, stacked_axes
 from .labels import plain
 
 __all__ = ["LIMIT", "Limit", "bands", "most_frequent", "quantile", "upper_envelope"]
@@ -60,7 +60,12 @@ def bands(
         for k, (label, line) in enumerate(lines.items()):
             style = LINES[k % len(LINES)]
             ax.plot(
-                time, np.clip(line[name], low, high), style, color=INK, linewidth=1.2, label=label
+                time,
+                np.clip(line[name], low, high),
+                style,
+                color=TEXT_INK,
+                linewidth=1.2,
+                label=label,
             )
         for value, start, end in own:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)

@@ -186,7 +186,7 @@ class Driver:
 
         One from which a function of t alone moves soon is shorter; behind that they grow again.
         """
-        longest = min(self.settings["max_step"], self.stops.space(float(solver.t_old)))
+        longest = self._longest_step(float(solver.t_old), float(solver.t_bound))
         length = float(solver.t - solver.t_old)
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
         if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
@@ -213,11 +213,15 @@ class Driver:
 
     def _bounded(self, t: float, stop: float) -> dict[str, Any]:
         """Return the integrator's arguments between two stops."""
-        longest = min(self.stops.space(t), self.known.longest_step(t, stop))
-        found = {**self.settings, "max_step": min(self.settings["max_step"], longest)}
+        found = {**self.settings, "max_step": self._longest_step(t, stop)}
         if found.get("first_step"):
             found["first_step"] = min(found["first_step"], stop - t)
         return found
+
+    def _longest_step(self, t: float, stop: float) -> float:
+        """Return how long a step from a time on may be, by samples, functions of t and delays."""
+        known = self.known.longest_step(t, stop)
+        return min(self.settings["max_step"], self.stops.space(t), known)
 
     def _solution(self, solver: Any) -> Callable[[float], np.ndarray]:
         """Return the state within the step just made, with what stands still as it is held."""

@@ -11,8 +11,8 @@ import numpy as np
 from ..errors import DivergedError, ParameterError
 
 __all__ = [
-    "Events",
     "Watched",
+    "WatchedEvents",
     "check_moves",
     "check_numbers",
     "nan_error",
@@ -23,7 +23,7 @@ __all__ = [
 ]  # fmt: skip
 
 EventFunction = Callable[..., Any]  # (t, x, u, params) -> a number
-Events = EventFunction | Sequence[EventFunction] | Mapping[str, EventFunction]
+WatchedEvents = EventFunction | Sequence[EventFunction] | Mapping[str, EventFunction]
 
 STOP = "stop_when"
 _IS_NAN = " is NaN"
@@ -71,7 +71,7 @@ def nan_error(name: str, time: float) -> DivergedError:
 
 
 def watched_functions(
-    stop_when: EventFunction | None, events: Events | None
+    stop_when: EventFunction | None, events: WatchedEvents | None
 ) -> tuple[Watched, ...]:
     """Return what is watched in a run."""
     given: list[tuple[str, Any]] = [] if stop_when is None else [(STOP, stop_when)]

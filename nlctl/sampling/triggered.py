@@ -43,7 +43,7 @@ class TriggeredHold:
     ... )
     >>> run = nlctl.input_output_response(loop, [0, 5], 0, {"plant.x[0]": 1.0})
     >>> print(len(run.events), run.outputs[1, -1].round(4), np.log(2 - 1 / 1.3).round(4))
-    25 0.2076 0.2076
+    26 0.2076 0.2076
     """
 
     n: int = param(1, unit="1", meaning="number of signals", at_least=1)

@@ -188,7 +188,7 @@ def test_the_line_of_the_closure_says_what_was_looked_for(number):
     assert (line.status, line.reading) == ("violated", "paper")
     assert line.evidence.startswith("none up to |x_i| <= 1000 closes, whatever Q")
     assert "on this box C_0 = " in line.evidence
-    assert "supposed and not shown" in line.follows
+    assert "assumed and not shown" in line.follows
 
 
 def test_the_integral_is_that_of_its_samples():

@@ -53,8 +53,8 @@ def test_options_and_single_runs_differ_from_the_limit():
     assert axes.ORANGE in limit
     found = colours_of(figure)
     assert axes.ORANGE not in found.values()
-    assert found["nominal"] == found["worst"] == axes.INK
-    assert found["a"] != found["b"] != axes.INK
+    assert found["nominal"] == found["worst"] == axes.TEXT_INK
+    assert found["a"] != found["b"] != axes.TEXT_INK
 
 
 def test_what_was_before_is_grey_and_what_is_after_is_blue():

@@ -11,7 +11,7 @@ from test_report import made_up_runs
 from test_report_history import charted
 from test_report_page import HOSTILE, every_kind
 
-from nlctl.analysis.pages.compared import Compared, comparison
+from nlctl.analysis.pages.compared import Compared, comparison_page
 from nlctl.analysis.pages.trend import trend_figure
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import (
@@ -26,7 +26,7 @@ from nlctl.analysis.report import (
 )
 from nlctl.analysis.report.browser import BROWSERS
 from nlctl.analysis.report.compare import read_report
-from nlctl.analysis.report.svg import LETTERS
+from nlctl.analysis.report.svg import LEAST_LETTERS
 
 pytestmark = pytest.mark.browser
 
@@ -65,7 +65,9 @@ def pages(tmp_path_factory):
     for name, shift in (("first", 0.0), ("second", 0.3)):
         write_report(revised(name, shift), folder / "revisions" / name)
     both = [folder / "revisions" / name for name in ("first", "second")]
-    of_both = comparison(*(Compared(name=p.name, content=read_report(p), folder=p) for p in both))
+    of_both = comparison_page(
+        *(Compared(name=p.name, content=read_report(p), folder=p) for p in both)
+    )
     made["compared"] = write_report(of_both, folder / "compared")
     return made | {"gallery": write_gallery(folder, draw=trend_figure)}
 
@@ -261,7 +263,9 @@ def test_a_phone_shows_whole_figures_with_letters_of_9_px(visit, name):
         points = float(drawing.get_attribute("viewBox").split()[2])
         assert box["width"] > 0.5 * PHONE
         assert is_diagram or box["width"] <= PHONE - box["x"]
-        assert (SMALLEST_OF_DIAGRAMS if is_diagram else LETTERS) * box["width"] / points >= 9.0
+        assert (SMALLEST_OF_DIAGRAMS if is_diagram else LEAST_LETTERS) * box[
+            "width"
+        ] / points >= 9.0
 
 
 @pytest.mark.parametrize("scripts", [True, False])

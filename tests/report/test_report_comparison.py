@@ -10,7 +10,7 @@ from command_line import nlctl
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nlctl.analysis.pages.compared import Compared, comparison
+from nlctl.analysis.pages.compared import Compared, comparison_page
 from nlctl.analysis.report import Claim, Figure, History, Report, Section, write_report
 from nlctl.analysis.report.changes import Curves, claim_changes, curves_of
 from nlctl.analysis.report.compare import read_report
@@ -54,7 +54,7 @@ def compared(tmp_path):
         for name, made in (("one", first), ("other", second)):
             folder = write_report(made, tmp_path / name).parent
             both.append(Compared(name=name, content=read_report(folder), folder=folder))
-        return comparison(*both, **options)
+        return comparison_page(*both, **options)
 
     return go
 

@@ -24,7 +24,7 @@ from nlctl.analysis.pages.study.histories import Histories
 from nlctl.analysis.pages.study.rows import fan_items
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import Figure, History, Report, Section, render_html, write_report
-from nlctl.analysis.report.history import SIGNALS, chart, thinned
+from nlctl.analysis.report.history import SIGNALS_FILE, chart, thinned
 from nlctl.errors import UsageError
 
 VENDOR = ROOT / "analysis" / "report" / "vendor" / "uplot"
@@ -77,14 +77,14 @@ def test_signals_lie_next_to_the_page_and_go_with_them(tmp_path):
     """As the charts would have them; a page without histories leaves none of an older one."""
     report = charted()
     write_report(report, tmp_path)
-    kept = json.loads((tmp_path / SIGNALS).read_text(encoding="utf-8"))
+    kept = json.loads((tmp_path / SIGNALS_FILE).read_text(encoding="utf-8"))
     every = [i for s in report.sections for i in s.items if isinstance(i, History)]
     assert list(kept) == ["waves", "odd", "odd-2"]
     assert list(kept.values()) == [
         json.loads(json.dumps(as_json(chart(history)))) for history in every
     ]
     write_report(without_histories(report), tmp_path)
-    assert not (tmp_path / SIGNALS).exists()
+    assert not (tmp_path / SIGNALS_FILE).exists()
 
 
 def test_a_page_has_charts_only_if_they_are_asked_for():

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.container import BarContainer
 from matplotlib.legend import Legend
 
-from nlctl.analysis.report.svg import LETTERS
+from nlctl.analysis.report.svg import LEAST_LETTERS
 
 EDGE = 0.01  # inches: half the width of a line
 
@@ -18,7 +18,7 @@ def hidden(figure):
 
     Letters are as large as on a page.
     """
-    with mpl.rc_context({"font.size": LETTERS}):
+    with mpl.rc_context({"font.size": LEAST_LETTERS}):
         return _hidden(figure, FigureCanvasAgg(figure).get_renderer())
 
 

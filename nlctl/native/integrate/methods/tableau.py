@@ -110,7 +110,13 @@ class Tableau:
         return len(self.c)
 
     def pair(self) -> ExplicitPair:
-        """Return the arrays that steps are made with."""
+        """Return the arrays that steps are made with.
+
+        Returns
+        -------
+        ExplicitPair
+            For the integrators.
+        """
         A = np.zeros((self.stages, max(self.stages, 6)))
         for s, row in enumerate(self.a, start=1):
             A[s, :s] = row
