@@ -20,6 +20,11 @@ def paper_names() -> list[str]:
     -------
     list of str
         Each ``author_year``.
+
+    Examples
+    --------
+    >>> "tabuada_2007" in nlctl.analysis.papers.paper_names()
+    True
     """
     return list(paper_summaries())
 
@@ -43,6 +48,11 @@ def paper_key(name: str, kind: str = "paper") -> str:
     ------
     UnknownNameError
         If there is no such paper; the nearest is named.
+
+    Examples
+    --------
+    >>> nlctl.analysis.papers.paper_key("tabuada-2007")
+    'tabuada_2007'
     """
     key = name.replace("-", "_")
     if key not in paper_names():

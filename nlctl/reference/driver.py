@@ -145,7 +145,7 @@ class Driver:
             if solver.status == "failed":
                 raise RuntimeError(f"solve_ivp failed: {message}")
             state = self._solution(solver)
-            allowed = self._allowed(solver, state, bound)
+            allowed = self._allowed(solver, state, bound, stop)
             if allowed:
                 bound = allowed
                 short = {**self._bounded(t, stop), "max_step": bound}
@@ -181,12 +181,12 @@ class Driver:
         own[:] = np.where(own == 0.0, came * np.finfo(float).tiny, own)
         return seen
 
-    def _allowed(self, solver: Any, state: Any, bound: float) -> float:
+    def _allowed(self, solver: Any, state: Any, bound: float, stop: float) -> float:
         """Return how long the step just made should have been, 0 if it is right.
 
         One from which a function of t alone moves soon is shorter; behind that they grow again.
         """
-        longest = self._longest_step(float(solver.t_old), float(solver.t_bound))
+        longest = self._longest_step(float(solver.t_old), stop)
         length = float(solver.t - solver.t_old)
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
         if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
