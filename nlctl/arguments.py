@@ -47,6 +47,16 @@ def one_of(who: str, name: str, value: object, options: Iterable[str]) -> Any:
     raise ParameterError(f"{who} needs {name} to be {rule}, got {value!r}{hint}")
 
 
+def names_in(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return one name, or several, as a tuple."""
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def are_names(names: Iterable[object]) -> bool:
+    """Whether all of them are texts with something in them."""
+    return all(isinstance(name, str) and name for name in names)
+
+
 def pairs(who: str, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> None:
     """Check that a block's signals come in pairs, one before it for each behind it."""
     if len(inputs) != len(outputs) or not inputs:

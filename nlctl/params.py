@@ -284,7 +284,7 @@ def _normalised(who: str, name: str, value: object, rule: Param, kind: Any) -> A
         if not (math.isfinite(array) and float(array).is_integer()):
             raise ParameterError(f"{who} needs an integer for {name}, got {value!r}")
         return int(array)
-    return _nested_tuple(array.tolist())
+    return nested_tuple(array.tolist())
 
 
 def integer(who: str, name: str, value: Any, at_least: int, at_most: float = math.inf) -> int:
@@ -311,8 +311,9 @@ def checked_times(timepts: Any) -> np.ndarray:
     return times
 
 
-def _nested_tuple(value: object) -> Any:
-    return tuple(map(_nested_tuple, value)) if isinstance(value, list) else value
+def nested_tuple(value: object) -> Any:
+    """Return lists in lists as tuples in tuples."""
+    return tuple(map(nested_tuple, value)) if isinstance(value, list) else value
 
 
 def _check_bounds(who: str, name: str, value: object, rule: Param) -> None:

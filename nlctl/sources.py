@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import flag, number, one_of
+from .arguments import are_names, flag, names_in, number, one_of
 from .equations import equation
 from .errors import ParameterError
 from .params import param, record
@@ -23,8 +23,8 @@ _MOST = 4096  # points of a table
 
 def _check_output(spec: Any) -> None:
     """A source has one output."""
-    names = (spec.outputs,) if isinstance(spec.outputs, str) else tuple(spec.outputs)
-    if len(names) != 1 or not all(isinstance(name, str) and name for name in names):
+    names = names_in(spec.outputs)
+    if len(names) != 1 or not are_names(names):
         raise ParameterError(f"{type(spec).__name__} needs one name in outputs, got {names}")
     object.__setattr__(spec, "outputs", names)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import number, one_of
+from ..arguments import are_names, names_in, number, one_of
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
@@ -197,8 +197,8 @@ class PID2:
 
     def check(self) -> None:
         """Signals that fit, limits in order, and no parameter that nothing reads."""
-        names = (self.signals,) if isinstance(self.signals, str) else tuple(self.signals)
-        if len(names) not in (1, 2) or not all(isinstance(each, str) and each for each in names):
+        names = names_in(self.signals)
+        if len(names) not in (1, 2) or not are_names(names):
             raise ParameterError(
                 f"PID2 needs signals ('ref', 'y') or ('e',), by names of yours, got {names}"
             )

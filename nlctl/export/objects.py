@@ -15,7 +15,7 @@ from ..errors import CompileError
 from ..names import unknown
 from ..native.codegen.ir.program import COPY, program_text
 from ..native.codegen.ir.text import float_text
-from ..native.machine.finish import PASSES
+from ..native.machine.finish import program_code
 from .records import ExportedController
 
 
@@ -91,16 +91,8 @@ def object_code(controller: ExportedController, target: str) -> bytes:
     """
     if target not in TARGETS:
         raise unknown("target", target, TARGETS, "of object code")
-    machine = _machine(target)
-    module = llvm.parse_assembly(module_text(controller))
-    module.triple, module.data_layout = target, str(machine.target_data)
-    module.verify()
-    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
-    passes = llvm.create_new_module_pass_manager()
-    for name in PASSES:
-        getattr(passes, f"add_{name}_pass")()
-    passes.run(module, builder)
-    return _with_float_abi(machine.emit_object(module), target)
+    code = program_code(module_text(controller), _machine(target))
+    return _with_float_abi(code, target)
 
 
 def _machine(target: str) -> Any:

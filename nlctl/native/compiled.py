@@ -295,6 +295,11 @@ class Compiled(Reading, StandIn):
     __str__ = __repr__
 
 
+def as_compiled(system: System | Compiled, params: Mapping[str, Any] | None = None) -> Compiled:
+    """Return a diagram, compiled unless it is already."""
+    return system if isinstance(system, Compiled) else compile(system, params=params)
+
+
 @as_annotated
 def compile(  # noqa: A001 (what it does)
     system: System,

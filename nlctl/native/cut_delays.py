@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import CompileError, ParameterError, UsageError
-from ..params import as_numbers
 from ..wording import counted
 from .compiled import Compiled
 from .diagram.parameters import length
-from .jacobians import Tangent, differentiated_at, open_tangent
+from .jacobians import Tangent, check_assumed, differentiated_at, open_tangent, point_inputs
 
 _STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
 
@@ -45,13 +44,7 @@ class CutDiagram:
         self.lines, self.noutputs = len(read.lines), system.noutputs or 0
         self.p = compiled.parameter_vector(params)
         self.tangent: Tangent = open_tangent(compiled)
-        for place, value in self.tangent.assumed.items():
-            if self.p[place] != value:
-                raise UsageError(
-                    f"the equations of '{system.name}' were differentiated for an integer "
-                    f"parameter of {value}, which is {self.p[place]:g} now: compile again with "
-                    "params={...}"
-                )
+        check_assumed(compiled, self.tangent, self.p)
         self._rates, self._shown = compiled.native
         rows = compiled.lowered.rows
         self._dx, self._g, self._m = (np.empty(k) for k in (self.n, rows["g"], rows["m"]))
@@ -109,10 +102,8 @@ class CutDiagram:
 
     def inputs(self, who: str, name: str, given: Any) -> np.ndarray:
         """Return the inputs at a point, shape (ninputs,)."""
-        u = as_numbers(0.0 if given is None else given)
-        if u is not None:
-            u = np.full(self.m, float(u)) if u.ndim == 0 else u.reshape(-1)
-        if u is None or u.size != self.m or not np.all(np.isfinite(u)):
+        u = point_inputs(self.compiled.system, given)
+        if u is None:
             raise ParameterError(
                 f"{who} needs {counted(self.m, 'finite number')} for {name} of "
                 f"'{self.compiled.system.name}', got {given!r}"

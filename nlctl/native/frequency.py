@@ -14,7 +14,7 @@ from ..arguments import number, vector
 from ..errors import ParameterError
 from ..responses.arguments import checked_params, state_array
 from ..upstream.systems import System
-from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram, Derivatives
 from .jacobians import tell_of_differences
 
@@ -90,7 +90,7 @@ def frequency_response(
     True
     """
     checked_params(params)
-    made = system if isinstance(system, Compiled) else compile(system, params=params)
+    made = as_compiled(system, params)
     if not ct.isctime(made.system):
         raise ParameterError(
             f"{_WHO} needs a diagram in continuous time, and '{made.system.name}' has "

@@ -154,15 +154,25 @@ def jacobian(
     """
     system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
     p = reading.parameter_vector(params)
+    check_assumed(reading, made, p)
+    u = point_inputs(system, u0)
+    if u is None:
+        count = counted(system.ninputs or 0, "finite number")
+        raise ParameterError(f"u0 needs {count} for '{system.name}', got {u0!r}")
+    u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
+    columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
+    return differentiated_at(reading, made, columns, directions)
+
+
+def check_assumed(reading: Reading, made: Tangent, p: np.ndarray) -> None:
+    """Refuse parameters for which the equations were not differentiated."""
     for place, value in made.assumed.items():
         if p[place] != value:
             raise UsageError(
-                f"the equations of '{system.name}' were differentiated for an integer parameter "
-                f"of {value}, which is {p[place]:g} now: compile again with params={{...}}"
+                f"the equations of '{reading.system.name}' were differentiated for an integer "
+                f"parameter of {value}, which is {p[place]:g} now: compile again with "
+                "params={...}"
             )
-    u = np.append(_inputs(system, u0), np.zeros(reading.schedule.rates))  # they stand still
-    columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
-    return differentiated_at(reading, made, columns, directions)
 
 
 def differentiated_at(
@@ -195,16 +205,12 @@ def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
     return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
 
 
-def _inputs(system: System, u0: Any) -> np.ndarray:
-    count = system.ninputs or 0
-    u = as_numbers(0.0 if u0 is None else u0)
+def point_inputs(system: System, given: Any) -> np.ndarray | None:
+    """Return the inputs at a point, shape (ninputs,), 0 by default; None if they are not that."""
+    count, u = system.ninputs or 0, as_numbers(0.0 if given is None else given)
     if u is not None:
         u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
-    if u is None or u.size != count or not np.all(np.isfinite(u)):
-        raise ParameterError(
-            f"u0 needs {counted(count, 'finite number')} for '{system.name}', got {u0!r}"
-        )
-    return u
+    return u if u is not None and u.size == count and np.all(np.isfinite(u)) else None
 
 
 def linear_system(

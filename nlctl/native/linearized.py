@@ -9,7 +9,7 @@ import control as ct
 
 from ..annotations import as_annotated
 from ..upstream.systems import System
-from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .compiled import as_compiled
 
 __all__ = ["linearize"]
 
@@ -80,5 +80,5 @@ def linearize(
     >>> print(linear.dt, linear.A[0, 0].round(6), linear.B[0, 0].round(6))  # exp(-0.1), 1 - it
     0.1 0.904837 0.095163
     """
-    made = system if isinstance(system, Compiled) else compile(system, params=params)
+    made = as_compiled(system, params)
     return made.linearize(x0, u0, t, params, copy_names=copy_names, **names)

@@ -19,7 +19,7 @@ from ..params import as_numbers
 from ..responses.arguments import checked_params, state_array
 from ..upstream.systems import System
 from ..wording import counted
-from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram
 from .happened import row_labels
 
@@ -270,7 +270,7 @@ def find_operating_points(
     >>> [p.states.round(6).item() for p in nlctl.find_operating_points(cubic, [[-2], [0.1], [3]])]
     [-1.0, 0.0, 1.0]
     """
-    made = system if isinstance(system, Compiled) else compile(system, params=given.get("params"))
+    made = as_compiled(system, given.get("params"))
     found: list[OperatingPoint] = []
     for start in starts:
         try:
@@ -287,8 +287,7 @@ def find_operating_points(
 def _cut(system: Any, t: float, params: Any) -> CutDiagram:
     """Return a diagram, compiled, with its delays cut."""
     checked_params(params)
-    made = system if isinstance(system, Compiled) else compile(system, params=params)
-    return CutDiagram(_WHO, made, number(_WHO, "t", t), params)
+    return CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
 
 
 def _with_short_names(named: dict[str, Any], aliases: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..expressions.graph import Untraceable
 from ..expressions.jacobian_source import jacobian_function
-from ..params import as_numbers, param, record
+from ..params import as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
 __all__ = ["ExtendedKalmanFilter"]
@@ -197,7 +197,7 @@ def _numbers(name: str, given: Any, otherwise: np.ndarray) -> Any:
         raise ParameterError(
             f"ExtendedKalmanFilter needs finite numbers of shape {shape} for {name}, got {given!r}"
         )
-    return tuple(map(tuple, found.tolist())) if found.ndim == 2 else tuple(found.tolist())
+    return nested_tuple(found.tolist())
 
 
 def _check_covariance(name: str, rows: Any, *, definite: bool = False) -> None:

@@ -144,16 +144,14 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
         )
     if (poles is None) == (L is None):
         raise ParameterError("luenberger needs either poles or L, got both or neither")
-    gain = _placed(plant, poles) if L is None else np.reshape(L, (plant.nstates, plant.noutputs))
+    matrices: dict[str, Any] = {key: getattr(plant, key) for key in "ABCD"}
+    matrices["L"] = (
+        _placed(plant, poles) if L is None else np.reshape(L, (plant.nstates, plant.noutputs))
+    )
     return LuenbergerObserver(
         known=tuple(plant.input_labels), measured=tuple(plant.output_labels),
-        A=_rows(plant.A), B=_rows(plant.B), C=_rows(plant.C), D=_rows(plant.D), L=_rows(gain),
+        **matrices,
     )  # fmt: skip
-
-
-def _rows(matrix: object) -> tuple[tuple[float, ...], ...]:
-    """Return a matrix as a tuple of its rows."""
-    return tuple(map(tuple, np.asarray(matrix, dtype=float).tolist()))
 
 
 def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..arguments import are_names, names_in
 from ..errors import ParameterError
 
 
@@ -15,8 +16,8 @@ def estimate_names(count: int) -> tuple[str, ...]:
 def set_names(spec: Any, key: str, count: int | None, at_least: int = 1) -> None:
     """Make a field of a record a tuple of names; refuse what is none, and another number."""
     who, given = type(spec).__name__, getattr(spec, key)
-    names = (given,) if isinstance(given, str) else tuple(given)
-    if not all(isinstance(each, str) and each for each in names) or len(set(names)) < len(names):
+    names = names_in(given)
+    if not are_names(names) or len(set(names)) < len(names):
         raise ParameterError(f"{who} needs different names in {key}, got {names}")
     if len(names) < at_least or count not in (None, len(names)):
         wanted = f"{count}" if count is not None else f"at least {at_least}"

@@ -130,7 +130,7 @@ def _counted(task, lane, w, event, j):
     """Count an accepted step; where a condition stays exactly 0 its steps across stay wide."""
     misses = lane.misses
     step_accepted(lane, event)
-    if _stays_at_zero(task, w, j):
+    if misses > 0 and _stays_at_zero(task, w, j):
         lane.misses = misses  # what shorter ones add to a state is lost in rounding
 
 

@@ -88,16 +88,23 @@ def _check_symbols(text: str) -> None:
 def _object_code(source: str | bytes) -> bytes:
     machine = _machine()
     if isinstance(source, str):
-        module = llvm.parse_assembly(source)
-        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
-        passes = llvm.create_new_module_pass_manager()
-        for name in PASSES:
-            getattr(passes, f"add_{name}_pass")()
-    else:
-        module = llvm.parse_bitcode(lzma.decompress(source))
-        builder = llvm.create_pass_builder(machine, _tuning())
-        passes = builder.getModulePassManager()
-        passes.add_refprune_pass()
+        return program_code(source, machine)
+    builder = llvm.create_pass_builder(machine, _tuning())
+    passes = builder.getModulePassManager()
+    passes.add_refprune_pass()
+    return _emitted(llvm.parse_bitcode(lzma.decompress(source)), machine, passes, builder)
+
+
+def program_code(text: str, machine: Any) -> bytes:
+    """Return the IR of a program as object code for a machine of LLVM's."""
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options())
+    passes = llvm.create_new_module_pass_manager()
+    for name in PASSES:
+        getattr(passes, f"add_{name}_pass")()
+    return _emitted(llvm.parse_assembly(text), machine, passes, builder)
+
+
+def _emitted(module: Any, machine: Any, passes: Any, builder: Any) -> bytes:
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     module.verify()
     passes.run(module, builder)

@@ -18,7 +18,7 @@ from ...responses.arguments import checked_params, state_array
 from ...responses.event_log import NO_EVENTS
 from ...upstream.systems import System
 from ...wording import counted
-from ..compiled import Compiled, compile  # noqa: A004 (what it does)
+from ..compiled import Compiled, as_compiled
 from ..integrate.methods.tableau import Tableau
 from ..own_errors import own_error
 from ..response import failure
@@ -394,7 +394,7 @@ def stepper(
         rtol=rtol, atol=atol, method="auto" if method is None else method,
         **{name: value for name, value in given.items() if value is not None},
     )  # fmt: skip
-    made = system if isinstance(system, Compiled) else compile(system)
+    made = as_compiled(system)
     own = made.system.dt
     if not ct.isctime(made.system) and own is not True and not np.isclose(own, dt):
         raise ParameterError(

@@ -185,7 +185,6 @@ class CBody:
         """Call a function; a second result is written to its last argument."""
         full = f"nlctl_{name}"
         if full not in self.module.functions:
-            self.module.functions[full] = ""  # before those that it calls
             inner = CBody(self.module)
             given = [Value(f"x{i}", 0) for i in range(len(args))]
             results = make(inner, *given)
@@ -195,8 +194,7 @@ class CBody:
                 inner.write(f"*second = {results[1].text};")
             inner.write(f"return {results[0].text};")
             text = f"static double {full}({', '.join(taken)})\n{{\n{inner.text()}}}\n"
-            del self.module.functions[full]
-            self.module.functions[full] = text
+            self.module.functions[full] = text  # behind those that it calls
         passed = [v.text for v in args]
         if count == 1:
             return (self.new(f"{full}({', '.join(passed)})"),)

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
 from ....expressions.graph import Expr
+from ..ir.loops import turn_of
 from ..ir.numbers import Writer, one_line
 from ..plan import Function, LoopOfLevel
 from .body import CBody, CModule
 
 if TYPE_CHECKING:
     from ..ir.text import Body
-
-_TURN = (4, 2, 1)  # elements that machine code adds up at a time
 
 
 def function_text(module: CModule, name: str, function: Function, labels: Mapping[str, str]) -> str:
@@ -43,7 +42,7 @@ def function_text(module: CModule, name: str, function: Function, labels: Mappin
 
 def _loop(w: Writer, b: CBody, loop: LoopOfLevel) -> None:
     """Write a loop; its sums are of the parts, and added up, as machine code does it."""
-    step = next(k for k in _TURN if k <= loop.size)
+    step = turn_of(loop.size)
     whole = loop.size // step * step
     sums = [node for node in loop.nodes if node.op == "sum"]
     b.note("")
