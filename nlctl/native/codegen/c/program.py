@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
 from ....expressions.graph import Expr
-from ..ir.loops import turn_of
+from ..ir.loops import elements_per_turn
 from ..ir.numbers import Writer, one_line
 from ..plan import Function, LoopOfLevel
 from .body import CBody, CModule
@@ -42,7 +42,7 @@ def function_text(module: CModule, name: str, function: Function, labels: Mappin
 
 def _loop(w: Writer, b: CBody, loop: LoopOfLevel) -> None:
     """Write a loop; its sums are of the parts, and added up, as machine code does it."""
-    step = turn_of(loop.size)
+    step = elements_per_turn(loop.size)
     whole = loop.size // step * step
     sums = [node for node in loop.nodes if node.op == "sum"]
     b.note("")

@@ -17,7 +17,7 @@ PER_ROUND = 3  # elements of several members in a round
 _STRAIGHT = 16  # turns of one member up to which they are written one after the other
 
 
-def turn_of(size: int) -> int:
+def elements_per_turn(size: int) -> int:
     """Return how many elements of one member a turn of a loop takes."""
     return next(k for k in (_WIDE, 2, 1) if k <= size)
 
@@ -32,7 +32,7 @@ class _Loop:
 
     def __init__(self, w: Writer, loop: LoopOfLevel) -> None:
         self.w, self.b, self.loop, self.lanes = w, w.b, loop, w.lanes
-        self.step = 1 if self.lanes > 1 else turn_of(loop.size)
+        self.step = 1 if self.lanes > 1 else elements_per_turn(loop.size)
         self.chunk = w.width or self.step
         self.sums = [node for node in loop.nodes if node.op == "sum"]
 
