@@ -102,6 +102,26 @@ def report(
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Let the page of a loop run it, with sliders.")
+    ] = False,
+    move: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--move",
+            metavar="NAME[=LOW:HIGH]",
+            help='What the sliders move: "plant.a", "plant.x1(0)", an input, the block of a '
+            "fault; a sensible few by default.",
+        ),
+    ] = None,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--require",
+            metavar="TEXT",
+            help='What the page watches: "always from 5 s on |e| <= 0.1", as in a study.',
+        ),
+    ] = None,
     revision: Annotated[
         str, typer.Option(help="Of what is reported; it stands on the page and in galleries.")
     ] = "",
@@ -119,7 +139,7 @@ def report(
     }  # fmt: skip
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
-        _check_loop_options(is_loop, set_, input_, until, step)
+        _check_loop_options(is_loop, set_, input_, until, step, live or None, move, require)
         check_junit(junit)
         if what is None:
             made = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
@@ -127,7 +147,8 @@ def report(
             key = paper_key(str(what), "file, folder or paper")
             made = _paper(key, out or Path("reports", key), jobs, far=far, **options)
         elif is_loop:
-            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
+            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE,
+                   move or live, require or [])  # fmt: skip
             made = _loop(str(what), run, out, **options)
         else:
             made = _study(what, out, jobs, trust=trust, **options)
@@ -157,8 +178,8 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
 
     if not is_loop and any(option is not None for option in options):
         raise UsageError(
-            "--set, --input, --until and --step are of a loop, path/to/file.py:function; a study "
-            "has them in its file"
+            "--set, --input, --until, --step, --live, --move and --require are of a loop, "
+            "path/to/file.py:function; a study has them in its file"
         )
 
 

@@ -22,7 +22,7 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
 from ..json_values import as_json
-from .document import Figure, History, Item, Report, Table
+from .document import Figure, History, Item, Live, Report, Table
 from .history import SIGNALS_FILE, chart, signals_json
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
@@ -32,7 +32,7 @@ from .typography import plain_text
 __all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
 
 RARE = ("ids", "links")
-DRAWN = ("figure", "time", "signals")  # curves are on the page only
+DRAWN = ("figure", "time", "signals", "program")  # curves are on the page only
 _TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",
@@ -91,6 +91,7 @@ def render_html(
     return fill(
         "report.html",
         interactive=bool(charts),
+        live=any(isinstance(item, Live) for item in items.values()),
         charts=charts,
         report=report,
         byline=_byline(report),

@@ -12,7 +12,6 @@ import numpy as np
 
 from ... import native
 from ...annotations import as_annotated
-from ...diagrams import initial_state as state_of
 from ...errors import CompileError, ParameterError
 from ...native.driver import prepared
 from ...native.histories import variations
@@ -23,7 +22,7 @@ from ...native.integrate.methods.stiff import DIFFERENCES, stiff_method
 from ...native.integrate.state import LANE, Status
 from ...native.run import Run
 from ...native.settings import Settings
-from ...responses.arguments import input_array
+from ...responses.arguments import input_array, state_array
 from ..words import check_written_out, digest, parameter_values
 from .here import carried_out, here
 from .host import FUNCTIONS, HOST
@@ -62,6 +61,8 @@ class WebProgram:
         The diagram.
     run : Run
         The same run in this process, from the same memory; it has ended.
+    p, x0, u : ndarray
+        Parameters, initial states, and the inputs' samples of the run as it stands.
     digest : str
         A key of the program and its numbers.
 
@@ -78,7 +79,15 @@ class WebProgram:
     parameters: Mapping[str, float]
     compiled: native.Compiled
     run: Run
+    p: np.ndarray
+    x0: np.ndarray
+    u: np.ndarray
     digest: str
+
+    @property
+    def signals(self) -> dict[str, np.ndarray]:
+        """Samples of the outputs in the run of this process, by name."""
+        return dict(zip(self.outputs, self.run.work.y[:, :, 0].T, strict=False))
 
 
 @as_annotated
@@ -88,7 +97,7 @@ def web_program(
     inputs: Any = 0.0,
     *,
     params: Mapping[str, Any] | None = None,
-    initial_state: Mapping[str, float] | None = None,
+    initial_state: Any = None,
     rtol: float | None = None,
     atol: float | None = None,
 ) -> WebProgram:
@@ -104,8 +113,8 @@ def web_program(
         As in `nlctl.input_output_response`.
     params : mapping, optional
         Parameters by qualified names, on top of those of the diagram.
-    initial_state : mapping of str to float, optional
-        Initial states by name; by default those that blocks declare.
+    initial_state : mapping or array_like, optional
+        As in `nlctl.input_output_response`.
     rtol, atol : float, optional
         Tolerances; by default those of `nlctl.input_output_response`.
 
@@ -138,7 +147,7 @@ def web_program(
     _check(compiled, what)
     grid = np.asarray(times, dtype=float)
     given = {k: v for k, v in (("rtol", rtol), ("atol", atol)) if v is not None}
-    p, start = compiled.parameter_vector(params), state_of(diagram, initial_state)
+    p, start = compiled.parameter_vector(params), state_array(compiled.system, initial_state)
     u = np.ascontiguousarray(input_array(compiled.system, inputs, grid))
     settings = Settings(**given, max_steps=1_000_000_000)
     run = _laid_out(compiled, grid, u, start, p, settings)
@@ -159,6 +168,7 @@ def web_program(
         module=module, facts=_facts(run, timed, p, grid, settings),
         states=tuple(compiled.state_labels or ()), outputs=tuple(diagram.output_labels or ()),
         inputs=tuple(diagram.input_labels or ()), parameters=values, compiled=compiled, run=run,
+        p=p, x0=start, u=u,
         digest=digest(lowered.text, values, start),
     )  # fmt: skip
 
