@@ -98,8 +98,7 @@ def live_numbers(program: WebProgram) -> dict[str, Any]:
     """Return what ``report.json`` has of a page's run as it stands: the same numbers."""
     lane = program.run.lanes[0]
     ends = {
-        name: [float(y.min()), float(y.max()), float(y[-1])]
-        for name, y in program.signals.items()
+        name: [float(y.min()), float(y.max()), float(y[-1])] for name, y in program.signals.items()
     }
     return {
         "program": program.digest,
@@ -110,9 +109,8 @@ def live_numbers(program: WebProgram) -> dict[str, Any]:
 
 
 def _plain(handle: Handle) -> dict[str, Any]:
-    return {name: value for name, value in vars(handle).items() if value not in ("", False)} | {
-        "place": handle.place
-    }
+    """Return a handle without what it has not."""
+    return {name: value for name, value in vars(handle).items() if value not in ("", None)}
 
 
 def _rows(

@@ -106,7 +106,9 @@ def place_anchors(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            wanted = item.key if isinstance(item, Figure | History | Live) else f"{heading}-{kind(item)}"
+            wanted = (
+                item.key if isinstance(item, Figure | History | Live) else f"{heading}-{kind(item)}"
+            )
             anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)

@@ -36,9 +36,7 @@ UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
 
-def fill(
-    template: str, *, interactive: bool = False, live: bool = False, **content: object
-) -> str:
+def fill(template: str, *, interactive: bool = False, live: bool = False, **content: object) -> str:
     """Return a template filled in, with the page's style and script, and the policy for them.
 
     An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one what

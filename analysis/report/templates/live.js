@@ -179,7 +179,12 @@ class LivePart {
     if (handle.meaning && !handle.fault) box.title = handle.meaning;
     const slider = put("input", "", box);
     Object.assign(slider, { type: "range", min: handle.low, max: handle.high, step: (handle.high - handle.low) / 200 });
-    slider.setAttribute("aria-label", handle.name);
+    slider.id = `${id}-slider`;
+    label.htmlFor = toggle ? `${id}-switch` : slider.id;
+    if (toggle) {
+      toggle.id = label.htmlFor;
+      slider.setAttribute("aria-label", handle.name);
+    }
     const field = put("input", "", box);
     Object.assign(field, { type: "number", step: "any", id });
     field.setAttribute("aria-label", `${handle.name}, exact value`);

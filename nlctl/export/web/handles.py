@@ -19,7 +19,7 @@ from ...native.diagram.parameters import Slot
 
 _MOST = 8  # handles, where the author names none
 _OF_STATES = 2
-_FAULT = ("onset", "duration", "has_condition")  # what the record of every fault has
+_FAULT = ("onset", "duration")  # what the record of every fault has
 _CLOSE = 8192 / 2  # switches of functions of time in a run that a page tells apart
 
 
@@ -209,7 +209,9 @@ class _Reader:
             for each in self.compiled.program.layout[len(self.compiled.schedule.nodes) + k].values()
         }
         if place in clocks:
-            raise ParameterError(f"'{name}' says when samples are taken, which a page does not move")
+            raise ParameterError(
+                f"'{name}' says when samples are taken, which a page does not move"
+            )
         self._check_switches(name, place)
         for value in ends:
             try:

@@ -18,6 +18,7 @@ import llvmlite.binding as llvm
 from ...errors import CompileError, UsageError
 from ...native import integrators
 from ...native.machine import store
+from .layout import laid_out_as_here
 from .rounding import integrators_alike
 
 OF_MATH = (
@@ -124,4 +125,4 @@ def integrators_text() -> str:
     text = re.sub(
         r'@"?(_Z[\w.$]+)"?', lambda m: f"@f{short.setdefault(m[1], str(len(short)))}", text
     )
-    return integrators_alike(text)
+    return integrators_alike(laid_out_as_here(text))

@@ -32,7 +32,7 @@ def memory_text(
     for path, array in _arrays(records):
         address = data_address(array)
         if address in symbols:
-            lines.append(f'@{path} = alias i64, ptr @{symbols[address]}')
+            lines.append(f"@{path} = alias i64, ptr @{symbols[address]}")
             continue
         symbols[address] = path
         if path in functions:

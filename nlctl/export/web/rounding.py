@@ -71,9 +71,7 @@ def _number(value: float) -> str:
 
 def _exact(text: str) -> str:
     """Return IR with decimal numbers bit by bit."""
-    return re.sub(
-        r"(?<=[ ,])-?\d+\.\d+(?:e-?\d+)?\b", lambda m: _number(float(m[0])), text
-    )
+    return re.sub(r"(?<=[ ,])-?\d+\.\d+(?:e-?\d+)?\b", lambda m: _number(float(m[0])), text)
 
 
 def _factorials(count: int) -> list[float]:
