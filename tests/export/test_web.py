@@ -56,7 +56,7 @@ def here(program):
 @nlctl.record
 class Ball:
     inputs, outputs, states, feedthrough = (), ("h",), ("h", "v"), False
-    initial = {"h": 1.0}  # noqa: RUF012
+    initial = {"h": 1.0}
     g: float = nlctl.param(2.0, unit="m/s^2", meaning="gravity", above=0)
 
     @staticmethod

@@ -430,5 +430,5 @@ for (const figure of document.querySelectorAll("figure.live")) {
     figure.hidden = false;
     put("p", "said bad", figure, `The loop does not run in this browser: ${error.message}`);
   });
-  figure.part = part;
+  figure.loop = part; // for whoever looks on: what runs, and what it has found
 }

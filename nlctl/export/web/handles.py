@@ -12,7 +12,6 @@ import numpy as np
 
 from ...diagrams import parameters, state_names
 from ...errors import ParameterError, UsageError
-from ...faults.effects import NEVER
 from ...names import unknown
 from ...native import Compiled
 from ...native.diagram.parameters import Slot

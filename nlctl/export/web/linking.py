@@ -21,10 +21,29 @@ from ...native.machine import store
 from .layout import laid_out_as_here
 from .rounding import integrators_alike
 
-OF_MATH = (
-    "exp log log2 log10 log1p expm1 sin cos tan sinh cosh asin acos atan asinh acosh atanh cbrt "
-    "atan2 hypot pow"
-).split()
+OF_MATH = [
+    "exp",
+    "log",
+    "log2",
+    "log10",
+    "log1p",
+    "expm1",
+    "sin",
+    "cos",
+    "tan",
+    "sinh",
+    "cosh",
+    "asin",
+    "acos",
+    "atan",
+    "asinh",
+    "acosh",
+    "atanh",
+    "cbrt",
+    "atan2",
+    "hypot",
+    "pow",
+]
 """Functions of the C library that are JavaScript's ``Math``, by the same names."""
 PROVIDED = frozenset({*OF_MATH, "fmod", "nextafter"})
 _SCRIPT = Path(__file__).with_name("wasm_object.py")

@@ -21,7 +21,7 @@ def rounding_alike(text: str) -> str:
     text = re.sub(r"\bcontract ", "", text)
     found = [match.groups() for match in _FUSED.finditer(text)]
     text = _FUSED.sub("", text)
-    for kind, name, suffix in found:
+    for _, name, suffix in found:
         text = text.replace(f"@llvm.{name}.{suffix}(", f"@page.{name}.{suffix}(")
     return text + "".join(_written(*each) for each in found)
 
