@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..report.document import Report
     from ..robustness.stl.spec import Requirement
 
-__all__ = ["compose_page", "is_loop_name", "is_paper_name", "page_folder"]
+__all__ = ["compose_page", "is_loop_name", "is_paper_name", "live_words", "page_folder"]
 
 HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
@@ -75,7 +75,7 @@ def compose_page(
         ledger=proof if applies else None,
         sections=[checks_section(every)],
         command=_command("report", name, settings, inputs, until, step)
-        + _live_words(live, required),
+        + live_words(live, required),
         live=live,
         requirements=requirements,
         repeat=shlex.split(_command("simulate", name, settings, inputs, until, step)),
@@ -94,7 +94,7 @@ def _requirements(texts: Sequence[str], until: float) -> list[Requirement]:
     ]
 
 
-def _live_words(live: bool | Sequence[str], required: Sequence[str]) -> str:
+def live_words(live: bool | Sequence[str], required: Sequence[str] = ()) -> str:
     """Return the options of a page that runs."""
     words = [] if isinstance(live, bool) else [w for name in live for w in ("--move", name)]
     words = ["--live"] * (live is True) + words + [w for r in required for w in ("--require", r)]

@@ -103,7 +103,7 @@ def report(
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
     live: Annotated[
-        bool, typer.Option("--live", help="Let the page of a loop run it, with sliders.")
+        bool, typer.Option("--live", help="Let the page of a loop or study run it, with sliders.")
     ] = False,
     move: Annotated[
         list[str] | None,
@@ -139,8 +139,10 @@ def report(
     }  # fmt: skip
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
-        _check_loop_options(is_loop, set_, input_, until, step, live or None, move, require)
+        _check_loop_options(is_loop, set_, input_, until, step, require)
         check_junit(junit)
+        if (live or move) and (what is None or is_paper_name(str(what))):
+            raise _no_live()
         if what is None:
             made = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
         elif is_paper_name(str(what)):
@@ -151,7 +153,7 @@ def report(
                    move or live, require or [])  # fmt: skip
             made = _loop(str(what), run, out, **options)
         else:
-            made = _study(what, out, jobs, trust=trust, **options)
+            made = _study(what, out, jobs, trust=trust, live=move or live, **options)
         from ..report.typography import plain_text
 
         say(plain_text(made.told))
@@ -172,13 +174,22 @@ class Made:
     code: int
 
 
+def _no_live() -> UsageError:
+    from nlctl.errors import UsageError
+
+    return UsageError(
+        "--live and --move are of a loop or a study; the paper's loops are 'nlctl report "
+        "nlctl.paper:example_1 --live' and example_2"
+    )
+
+
 def _check_loop_options(is_loop: bool, *options: object) -> None:
     """Refuse what is set of a loop where there is none."""
     from nlctl.errors import UsageError
 
     if not is_loop and any(option is not None for option in options):
         raise UsageError(
-            "--set, --input, --until, --step, --live, --move and --require are of a loop, "
+            "--set, --input, --until, --step and --require are of a loop, "
             "path/to/file.py:function; a study has them in its file"
         )
 
@@ -265,6 +276,7 @@ def _study(
     force: bool,
     trust: bool,
     stamp: Stamp,
+    live: bool | Sequence[str],
 ) -> Made:
     """Report a study."""
     from ..pages.study.claims import claims
@@ -287,6 +299,7 @@ def _study(
         force=force,
         trust=trust,
         stamp=stamp,
+        live=live,
     )
     code = EXIT_CODES.get(result.answer, 0)
     if not result.complete:
