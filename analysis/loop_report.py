@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import control as ct
 
@@ -41,7 +41,6 @@ from .pages.study.redrawn import loop_again, rows_again
 from .pages.study.report import numbers, study_sections
 from .report.document import Claim, Figure, Live, Paragraph, Report, Section, versions
 from .response_of_loop import check_response, own_parameters
-from .robustness import Prepared
 from .robustness.stl.spec import Requirement
 from .studies.origin import diagram_differences
 from .studies.page.text import without_assumptions
@@ -101,36 +100,25 @@ def loop_report(
     """
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
     found = [f"The loop '{loop.name}' has {blocks} and {states}."]
-    moved: WebProgram | None = None
     parts = diagram_sections(loop, ("loop", "loop-equations"))
-    kept, given = None, {}
+    given = {}
     if response is not None:
         given = own_parameters(loop, response) if params is None else dict(params)
         check_response(loop, response, given)
         parts.append(run_section(loop, response, signals, given))
-        moved = _moved(loop, response, given, live)
-    elif live:
-        raise ParameterError("a page that runs begins with a run: give response=")
+    moved = _moved(loop, response, given, live)
     parts += sections
-    if ledger is not None:
-        _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
-        found.append(ledger_text(ledger))
-        parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
-    if certificate is not None:
-        _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
-        found.append(f"Certificate: {certificate.verdict}.")
-        parts.append(certificate_section(certificate))
+    _proved(loop, ledger, certificate, found, parts)
+    again = _Again(asked=requirements)
     if study is not None:
         _check_study(loop, study)
         found.append(without_assumptions(study.verdict))
-        prepared, kept, lost = _again(study)
-        parts += _studied(study, kept, lost)
-        if prepared is not None:
-            requirements = (*requirements, *prepared.experiment.spec.requirements)
+        again = _again(study, requirements)
+        parts += _studied(study, again)
     if moved is not None:
         item = live_item(
             moved, response, () if isinstance(live, bool) else live, signals=signals,
-            requirements=requirements, histories=kept, command=repeat, base=given,
+            requirements=again.asked, histories=again.kept, command=repeat, base=given,
         )  # fmt: skip
         parts = [_with_live(part, item) for part in parts]
     described, sources = ([], []) if study is None else methods(study)
@@ -152,11 +140,33 @@ def loop_report(
     )
 
 
+def _proved(
+    loop: ct.InputOutputSystem,
+    ledger: Ledger | None,
+    certificate: Certificate | None,
+    found: list[str],
+    parts: list[Section],
+) -> None:
+    """Add what was proved to what was found, and to the parts of the page."""
+    if ledger is not None:
+        _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
+        found.append(ledger_text(ledger))
+        parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
+    if certificate is not None:
+        _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
+        found.append(f"Certificate: {certificate.verdict}.")
+        parts.append(certificate_section(certificate))
+
+
 def _moved(
     loop: ct.InputOutputSystem, response: Any, params: Mapping[str, Any], live: object
 ) -> WebProgram | None:
     """Return what runs on the page, if it is to run."""
-    return live_program(loop, as_response(response, loop), params) if live else None
+    if not live:
+        return None
+    if response is None:
+        raise ParameterError("a page that runs begins with a run: give response=")
+    return live_program(loop, as_response(response, loop), params)
 
 
 def _with_live(section: Section, item: Live) -> Section:
@@ -168,22 +178,31 @@ def _with_live(section: Section, item: Live) -> Section:
     return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
 
 
-def _again(result: Result) -> tuple[Prepared | None, Histories | None, list[str]]:
-    """Return a study's loop and some of its runs again, and what was lost of them."""
+class _Again(NamedTuple):
+    """What is asked of a loop, some runs of its study, and what was lost of that."""
+
+    asked: Sequence[Requirement]
+    kept: Histories | None = None
+    lost: Sequence[str] = ()
+
+
+def _again(result: Result, requirements: Sequence[Requirement]) -> _Again:
+    """Return what a study asks, and some of its runs again."""
     lost: list[str] = []
     prepared = loop_again(result, tell=lost.append)
-    return prepared, rows_again(result, prepared), lost
+    own = () if prepared is None else prepared.experiment.spec.requirements
+    return _Again((*requirements, *own), rows_again(result, prepared), lost)
 
 
-def _studied(result: Result, kept: Histories | None, lost: Sequence[str]) -> list[Section]:
+def _studied(result: Result, again: _Again) -> list[Section]:
     """Return a study as the part behind everything else."""
-    intro = [result.study.study.question or result.study.study.title, *lost]
+    intro = [result.study.study.question or result.study.study.title, *again.lost]
     heading = Section(
         key="study",
         title=f"The study: {result.study.study.title}",
         items=[Paragraph(text=words) for words in intro],
     )
-    return [heading, *study_sections(result, kept, prefix="study-", level=3, limits=False)]
+    return [heading, *study_sections(result, again.kept, prefix="study-", level=3, limits=False)]
 
 
 def _numbers(response: Any, study: Result | None, moved: WebProgram | None) -> dict[str, Any]:

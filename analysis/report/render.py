@@ -82,11 +82,8 @@ def render_html(
         anchor: svg(figure, file, anchor, shapes)
         for (anchor, figure), file in zip(figures.items(), files, strict=True)
     }
-    charts = {
-        anchor: chart(item)
-        for anchor, item in items.items()
-        if interactive and isinstance(item, History)
-    }
+    shown = items.items() if interactive else ()
+    charts = {anchor: chart(item) for anchor, item in shown if isinstance(item, History)}
     own = _own_files(report)
     return fill(
         "report.html",

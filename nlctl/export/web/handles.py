@@ -71,8 +71,45 @@ def handles(
 ) -> tuple[Handle, ...]:
     """Return what the names stand for; a sensible few where there are none.
 
-    A name may have a range: ``"plant.a=0:3"``.  That of a fault's block stands for its onset and
-    its value.
+    Parameters
+    ----------
+    compiled : Compiled
+        The diagram.
+    names : sequence of str
+        A name may have a range: ``"plant.a=0:3"``.  That of a fault's block stands for its onset
+        and its value.
+    p, x0 : ndarray
+        Parameters and initial states of the run as it stands.
+    u : ndarray of shape (inputs, m)
+        Its inputs.
+    span : tuple of 2 floats
+        From when to when it goes (s).
+
+    Returns
+    -------
+    tuple of Handle
+        In the order of the names.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such parameter, state, input or fault.
+    ParameterError
+        If it cannot be moved on a page: an integer, a choice, a sampling time, what other numbers
+        follow from, a range that the block forbids.
+
+    Examples
+    --------
+    >>> import nlctl
+    >>> from nlctl.export.web import handles
+    >>> loop = nlctl.paper.example_1()
+    >>> compiled = nlctl.compile(loop)
+    >>> x0, u = nlctl.initial_state(loop), np.zeros((0, 2))
+    >>> (beta,) = handles(
+    ...     compiled, ["controller.law.beta=1:4"], compiled.parameter_vector(), x0, u, (0, 20)
+    ... )
+    >>> beta.value, beta.low, beta.high
+    (2.5, 1.0, 4.0)
     """
     reader = _Reader(compiled, p, x0, u, span)
     if not names:

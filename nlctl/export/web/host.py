@@ -92,7 +92,7 @@ define void @live_timed_prepare() nounwind {{
   ret void
 }}
 """
-FUNCTIONS = (
+HOST_FUNCTIONS = (
     "live_prepare", "live_start", "live_advance", "live_outputs", "live_timed",
     "live_timed_prepare",
 )  # fmt: skip

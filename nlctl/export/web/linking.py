@@ -66,7 +66,18 @@ define internal {i64, i1} @size(i64 %a, i64 %b) alwaysinline nounwind {
 
 
 def check_linker() -> None:
-    """Refuse, before anything is computed, where there is no linker."""
+    """Refuse, before anything is computed, where there is no linker.
+
+    Raises
+    ------
+    UsageError
+        If Zig, which links WebAssembly, is not installed.
+
+    Examples
+    --------
+    >>> from nlctl.export.web import check_linker
+    >>> check_linker()  # doctest: +SKIP
+    """
     if importlib.util.find_spec("ziglang") is None:
         raise UsageError(_NO_ZIG)
 
@@ -77,7 +88,7 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "integrators.o").write_bytes(_integrators())
-        objects = object_code(texts, folder, what)
+        objects = wasm_objects(texts, folder, what)
         command = [
             sys.executable, "-m", "ziglang", "wasm-ld", *(path.name for path in objects),
             "integrators.o", "-o", "page.wasm", "--no-entry", "--gc-sections", "--strip-all",
@@ -90,7 +101,7 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
         return page.read_bytes()
 
 
-def object_code(texts: Mapping[str, str], folder: Path, what: str, speed: int = 2) -> list[Path]:
+def wasm_objects(texts: Mapping[str, str], folder: Path, what: str, speed: int = 2) -> list[Path]:
     """Write object code of modules of IR; LLVM works in a child process, which it may end."""
     paths = [folder / f"{name}.ll" for name in texts]
     for path, text in zip(paths, texts.values(), strict=True):
@@ -117,7 +128,7 @@ def _integrators() -> bytes:
     if code is None:
         with tempfile.TemporaryDirectory() as folder:
             texts = {"integrators": text}
-            code = object_code(texts, Path(folder), "the integrators")[0].read_bytes()
+            code = wasm_objects(texts, Path(folder), "the integrators")[0].read_bytes()
         store.write(key.hexdigest(), code)
     return code
 

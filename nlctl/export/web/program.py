@@ -25,7 +25,7 @@ from ...native.settings import Settings
 from ...responses.arguments import input_array, state_array
 from ..words import check_written_out, digest, parameter_values
 from .here import carried_out, here
-from .host import FUNCTIONS, HOST
+from .host import HOST, HOST_FUNCTIONS
 from .linking import PROVIDED, check_linker, linked
 from .memory import memory_text, places_in_table
 from .rounding import rounding_alike
@@ -159,7 +159,7 @@ def web_program(
         "host": _host(run, p, timed),
     }
     _check_library("\n".join(texts.values()), what)
-    module = linked(texts, (*FUNCTIONS, *_read_of(texts["host"])), what)
+    module = linked(texts, (*HOST_FUNCTIONS, *_read_of(texts["host"])), what)
     code = here(texts["program"], tuple(lowered.functions))
     run = carried_out(run, code, p)
     _check_end(run, what)
