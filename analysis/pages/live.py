@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -73,7 +73,7 @@ def live_item(
         "handles": [_plain(handle) for handle in moved],
         "never": NEVER,
         "outputs": list(program.outputs),
-        "rows": _rows(response, known, signals),
+        "rows": _rows(response, known, signals, limits),
         "limits": {name: [[*line] for line in lines] for name, lines in limits.items()},
         "bands": {} if histories is None else _bands(histories, known),
         "requirements": [
@@ -114,12 +114,22 @@ def _plain(handle: Handle) -> dict[str, Any]:
 
 
 def _rows(
-    response: Any, known: Mapping[str, np.ndarray], signals: Sequence[str]
+    response: Any,
+    known: Mapping[str, np.ndarray],
+    signals: Sequence[str],
+    watched: Collection[str],
 ) -> list[dict[str, Any]]:
-    """Return the rows of the static figure, with the outputs that the page computes."""
+    """Return the rows of the static figure, with the outputs that the page computes.
+
+    What requirements always ask of a signal is seen in a row of its own.
+    """
     _, rows = as_response(response, None).rows([*signals] or None)
-    kept = {title: [n for n in names if n in known] for title, names in rows.items()}
-    return [{"title": title, "names": names} for title, names in kept.items() if names]
+    apart = [] if signals else [name for name in known if name in watched]
+    kept = {name: [name] for name in apart}
+    for title, names in rows.items():
+        left = [name for name in names if name in known and name not in apart]
+        kept |= {title if len(left) == len(names) else ", ".join(left): left} if left else {}
+    return [{"title": title, "names": names} for title, names in kept.items()]
 
 
 def _bands(histories: Histories, known: Mapping[str, np.ndarray]) -> dict[str, Any]:

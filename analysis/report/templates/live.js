@@ -338,9 +338,11 @@ class LivePart {
     const isLast = k === content.rows.length - 1;
     const width = Math.max(this.view.clientWidth - 12, 240);
     const many = names.length > 1;
-    const [left, right, top, bottom] = [54, 8, many ? 24 : 10, isLast ? 38 : 22];
-    const height = top + bottom + (content.rows.length > 1 ? 120 : 190);
     const shown = names.slice(0, 4);
+    const labels = many ? this.labels(shown, 54, width) : [];
+    const lines = labels.length ? labels.at(-1).line + 1 : 0;
+    const [left, right, top, bottom] = [54, 8, 10 + 16 * lines, isLast ? 38 : 22];
+    const height = top + bottom + (content.rows.length > 1 ? 122 : 190);
     const t = engine.times.subarray(0, last.done);
     const before = reported?.given && reported !== last ? shown.map((name) => reported.signals[name]) : [];
     const curves = shown.map((name) => last.signals[name]);
@@ -392,17 +394,23 @@ class LivePart {
       const side = place > width / 2;
       draw("text", { class: "falls-at", x: place + (side ? -4 : 4), y: top + 12, "text-anchor": side ? "end" : "start" }, svg, `${fall.key} ✗`);
     }
-    if (many) this.legend(svg, shown, left);
+    labels.forEach(({ x, line, word }, i) => {
+      draw("path", { class: `curve curve-${i}`, d: `M${x} ${10 + 16 * line}h22` }, svg);
+      draw("text", { x: x + 27, y: 14 + 16 * line }, svg, word);
+    });
     return svg;
   }
 
-  legend(svg, names, left) {
-    let x = left;
-    names.forEach((name, i) => {
-      draw("path", { class: `curve curve-${i}`, d: `M${x} 10h22` }, svg);
+  // Where the names of curves stand, in as many lines as they need.
+  labels(names, left, width) {
+    let [x, line] = [left, 0];
+    return names.map((name) => {
       const word = name.length > 18 ? `${name.slice(0, 17)}…` : name;
-      draw("text", { x: x + 27, y: 14 }, svg, word);
-      x += 41 + 7 * word.length;
+      const size = 41 + 7 * word.length;
+      if (x + size > width && x > left) [x, line] = [left, line + 1];
+      const place = { x, line, word };
+      x += size;
+      return place;
     });
   }
 
