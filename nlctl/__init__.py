@@ -18,7 +18,7 @@ _listed, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> object:
     """Return what is listed; of what has moved into a room, with a warning that names it."""
     if name not in __all__:
-        from .host.rooms import moved  # late: few ask
+        from .host.rooms import found_in_room  # late: few ask
 
-        return moved(name) or _listed(name)
+        return found_in_room(name) or _listed(name)
     return _listed(name)

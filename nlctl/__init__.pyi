@@ -63,6 +63,8 @@ from .sliding import IdealRelay
 from .sources import Sine, Step
 
 __all__ = [
+    "PID",
+    "PID2",
     "Backlash",
     "Block",
     "Clock",
@@ -73,8 +75,6 @@ __all__ = [
     "Gain",
     "IdealRelay",
     "Lag",
-    "PID",
-    "PID2",
     "PureFeedback",
     "Quantiser",
     "RateLimiter",

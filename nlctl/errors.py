@@ -37,7 +37,7 @@ class UsageError(ValueError):
     --------
     >>> try:
     ...     nlctl.interconnect({"gain": nlctl.Gain(k="high")})
-    ... except nlctl.UsageError as error:
+    ... except nlctl.errors.UsageError as error:
     ...     print(error)
     Gain needs numbers for k, got 'high'
     """
@@ -121,7 +121,7 @@ class DivergedError(RuntimeError):
     >>> escapes = ct.nlsys(lambda t, x, u, params: x**2, inputs=0, states=1, name="escapes")
     >>> try:
     ...     nlctl.input_output_response(escapes, [0.0, 2.0], 0, [1.0])
-    ... except nlctl.DivergedError as error:
+    ... except nlctl.errors.DivergedError as error:
     ...     print(round(error.time, 6))
     1.0
     """
@@ -145,7 +145,7 @@ class ChatteringError(DivergedError):
     >>> holds = ct.nlsys(lambda t, x, u, params: -np.sign(x), inputs=0, states=1, name="holds")
     >>> try:
     ...     nlctl.input_output_response(holds, [0.0, 2.0], 0, [1.0])
-    ... except nlctl.ChatteringError as error:
+    ... except nlctl.errors.ChatteringError as error:
     ...     print(round(error.time, 3))
     1.0
     """
@@ -171,7 +171,7 @@ class ZenoError(DivergedError):
     >>> ball = nlctl.block(Ball(), "ball")
     >>> try:
     ...     nlctl.input_output_response(ball, [0.0, 4.0], engine="python-control")
-    ... except nlctl.ZenoError as error:
+    ... except nlctl.errors.ZenoError as error:
     ...     print(round(error.time, 4))
     3.0
     """
@@ -270,7 +270,7 @@ class AuditError(UsageError):
     code does not.  With ``engine="auto"`` python-control takes over, and an `EngineWarning` says
     so:
 
-    >>> issubclass(nlctl.AuditError, nlctl.UsageError)
+    >>> issubclass(nlctl.errors.AuditError, nlctl.errors.UsageError)
     True
     """
 
@@ -291,7 +291,7 @@ class OperatingPointError(UsageError):
     >>> never = ct.nlsys(lambda t, x, u, params: x**2 + 1, inputs=0, states=1, name="never")
     >>> try:
     ...     nlctl.find_operating_point(never)
-    ... except nlctl.OperatingPointError as error:
+    ... except nlctl.errors.OperatingPointError as error:
     ...     print(error.residual)
     1.0
     """

@@ -16,7 +16,7 @@ from importlib import import_module
 from .checkout import NLCTL_FOLDER
 from .former_name import GONE_IN
 
-__all__ = ["face", "moved", "public_names"]
+__all__ = ["face", "found_in_room", "public_names"]
 
 _MOVED_TO = ("actuators", "controllers", "describing", "errors", "native", "observers", "plants")
 _MOVED_TO += ("references", "sampling", "sensitivities", "sources")
@@ -45,7 +45,7 @@ def _places() -> dict[str, str]:
     return {name: room for room in _MOVED_TO for name in public_names(room)}
 
 
-def moved(name: str) -> object:
+def found_in_room(name: str) -> object:
     """Return what a former name of the top means, with a warning where it is used; or None.
 
     Python asks for every module of nlctl that it is about to import, too.

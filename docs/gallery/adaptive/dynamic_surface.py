@@ -25,9 +25,11 @@ def pendulum(x, v):
 
 
 tau, omega = 0.02, 1.3
-grid = nlctl.GaussianBasis(centres=nlctl.grid_centres([7, 7], -2, 2), widths=(0.8,))
-learning = nlctl.AdaptiveWeights(nodes=49, Gamma=50.0, sigma_1=0.001)
-none = nlctl.Zero(outputs=("W_psi", "W_norm"))
+grid = nlctl.controllers.GaussianBasis(
+    centres=nlctl.controllers.grid_centres([7, 7], -2, 2), widths=(0.8,)
+)
+learning = nlctl.controllers.AdaptiveWeights(nodes=49, Gamma=50.0, sigma_1=0.001)
+none = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
 loops = {
     "known plant": (integrator, nlctl.Gain(), none),
     "pendulum, no network": (pendulum, nlctl.DeadZone(), none),
@@ -37,7 +39,7 @@ t, late = np.linspace(0, 40, 8001), {}
 _, axes = plt.subplots(figsize=(6, 3))
 for label, (f, actuator, weights) in loops.items():
     controller = nlctl.dynamic_surface_control(
-        nlctl.DynamicSurface(c=(2.0, 8.0), tau=(tau,)), basis=grid, weights=weights
+        nlctl.controllers.DynamicSurface(c=(2.0, 8.0), tau=(tau,)), basis=grid, weights=weights
     )
     blocks = {
         "reference": nlctl.SumOfSines(order=1, amplitudes=1.0, frequencies=omega, phases=0.0),

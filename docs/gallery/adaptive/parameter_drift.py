@@ -33,16 +33,18 @@ def d(x, t):
 nothing = nlctl.SumOfSines(order=0, amplitudes=0.0, frequencies=1.0, phases=0.0)
 plant = nlctl.PureFeedback(order=1, f=f, d=d)
 remedies = {
-    "gradient": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
-    "sigma-modification": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.02),
-    "e-modification": nlctl.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=0.05),
-    "projection": nlctl.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5, width=0.1),
+    "gradient": nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
+    "sigma-modification": nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.02),
+    "e-modification": nlctl.controllers.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=0.05),
+    "projection": nlctl.controllers.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5, width=0.1),
 }
 t, found = np.linspace(0, 2000, 4001), {}
 figure, axes = plt.subplots(figsize=(6, 3))
 for label, weights in remedies.items():
-    model = nlctl.ReferenceModel(a=(k,), b=0.0)
-    controller = nlctl.mrac(model, weights=weights, law=nlctl.ModelReferenceLaw(gain=1.0))
+    model = nlctl.controllers.ReferenceModel(a=(k,), b=0.0)
+    controller = nlctl.mrac(
+        model, weights=weights, law=nlctl.controllers.ModelReferenceLaw(gain=1.0)
+    )
     blocks = {"nothing": nothing, "plant": plant, "controller": controller, "a": nlctl.Gain()}
     loop = nlctl.interconnect(blocks, outputs=["x1", "W_norm"])
     start = nlctl.initial_state(loop, {"plant.x1": x_0, "controller.weights.W_hat[0]": 1.0})

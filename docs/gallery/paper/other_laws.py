@@ -13,12 +13,12 @@ import numpy as np
 import nlctl
 
 laws = {
-    "NussbaumLaw": nlctl.NussbaumLaw(),
-    "DeadZoneNussbaumLaw": nlctl.DeadZoneNussbaumLaw(),
-    "LeakyNussbaumLaw": nlctl.LeakyNussbaumLaw(),
-    "MonotoneNussbaumLaw": nlctl.MonotoneNussbaumLaw(),
-    "KnownSignLaw": nlctl.KnownSignLaw(),
-    "FixedGainLaw": nlctl.FixedGainLaw(),
+    "NussbaumLaw": nlctl.controllers.NussbaumLaw(),
+    "DeadZoneNussbaumLaw": nlctl.controllers.DeadZoneNussbaumLaw(),
+    "LeakyNussbaumLaw": nlctl.controllers.LeakyNussbaumLaw(),
+    "MonotoneNussbaumLaw": nlctl.controllers.MonotoneNussbaumLaw(),
+    "KnownSignLaw": nlctl.controllers.KnownSignLaw(),
+    "FixedGainLaw": nlctl.controllers.FixedGainLaw(),
 }
 controllers = {name: nlctl.adaptive_neural(2, law=law) for name, law in laws.items()}
 controllers["SlidingModeLaw"] = nlctl.sliding_mode()
