@@ -41,6 +41,6 @@ def test_an_editor_sees_the_top_and_the_rooms_and_no_former_name(tmp_path):
     names = [f"nlctl.{name}" for name in nlctl.__all__]
     rooms = [name for name in nlctl.__all__ if inspect.ismodule(getattr(nlctl, name))]
     names += [f"nlctl.{room}.{name}" for room in rooms for name in public_names(room)]
-    lines = [f"print({name})" for name in (*names, "nlctl.BoucWen")]
+    lines = [f"print({name})" for name in (*names, "nlctl.actuators.BoucWen")]
     ((line, message),) = strictly_checked(tmp_path, "\n".join(["import nlctl", *lines, ""]))
     assert (line, "BoucWen" in message) == (len(lines) + 1, True)

@@ -6,9 +6,9 @@ With v = k u + eps_u and lambda = beta k / gain > 0, whatever beta, W and k are,
    \delta = x_n' - \beta v - c (\nu + \nu_e) - \lambda W^T \psi + \beta\, \epsilon_u,
 
 with c = 1 - lambda for `nlctl.controllers.ModelReferenceLaw` and c = 1 for
-`nlctl.controllers.DirectLaw`.  beta is the coefficient of v in the plant's own equation, and W takes
-away as much of it as the regressor spans, in rational arithmetic: where it spans all, nothing of
-delta is left but disturbances.
+`nlctl.controllers.DirectLaw`.  beta is the coefficient of v in the plant's own equation, and W
+takes away as much of it as the regressor spans, in rational arithmetic: where it spans all, nothing
+of delta is left but disturbances.
 """
 
 from __future__ import annotations
