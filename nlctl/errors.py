@@ -67,7 +67,14 @@ class UnknownNameError(UsageError):
 
 
 class UnknownKeywordError(UnknownNameError, TypeError):
-    """A record has no parameter of that name; Python's own kind of error as well."""
+    """A record has no parameter of that name; Python's own kind of error as well.
+
+    Examples
+    --------
+    >>> nlctl.DeadZone(br=0.1)
+    Traceback (most recent call last):
+    nlctl.errors.UnknownKeywordError: unknown parameter 'br' of DeadZone; nearest: 'b_r'
+    """
 
 
 class AmbiguousNameError(UsageError):
