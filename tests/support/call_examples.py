@@ -24,7 +24,8 @@ def public_things():
     top = [getattr(nlctl, name) for name in dir(nlctl)]
     rooms = [thing for thing in top if inspect.ismodule(thing)]
     inside = [getattr(room, name) for room in rooms for name in room.__all__]
-    return list({id(thing): thing for thing in (*top, *inside)}.values())
+    found = {id(thing): thing for thing in (*top, *inside)}.values()
+    return sorted(found, key=lambda thing: getattr(thing, "__name__", ""))
 
 
 T = np.linspace(0.0, 1.0, 11)
