@@ -154,7 +154,7 @@ def test_other_initial_states_and_tolerances(in_node):
 LOOPS = {
     "exact backlash": lambda: loop_with(nlctl.Backlash()),
     "relay with hysteresis": lambda: loop_with(nlctl.Relay()),
-    "play operators": lambda: loop_with(nlctl.PrandtlIshlinskii()),
+    "play operators": lambda: loop_with(nlctl.actuators.PrandtlIshlinskii()),
     "resets": ball,
     "a stiff lag": lambda: loop_with(nlctl.Lag(T=1e-5)),
 }

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from command_line import nlctl_here
 from extras import needed, needed_program
 
 import nlctl
@@ -207,3 +208,97 @@ def test_it_is_short_and_its_policy_lets_in_webassembly_alone(report, page):
 def test_a_page_that_runs_needs_a_run():
     with pytest.raises(ParameterError, match="begins with a run: give response="):
         loop_report(nlctl.paper.example_1(), title="Nothing", live=True)
+
+
+LOOP = """
+import nlctl
+import control as ct
+
+def make():
+    return nlctl.interconnect({"ball": nlctl.Lag(T=0.5), "source": nlctl.Sine(outputs=("u",))})
+
+def halved(t, x, u, params):
+    return [float(str(-0.5 * u[0]))]
+
+def called():
+    law = ct.nlsys(None, halved, inputs="v", outputs="u", name="law")
+    return nlctl.interconnect({"lag": nlctl.Lag(T=0.5), "law": law})
+"""
+
+
+def reported(folder, *words):
+    """Run ``nlctl report`` on one of the loops."""
+    (folder / "loop.py").write_text(LOOP, encoding="utf-8")
+    return nlctl_here("report", *words, cwd=folder)
+
+
+def test_the_command_line_writes_a_page_that_runs(tmp_path):
+    needed("ziglang", "export")
+    words = ("loop.py:make", "--until", "2", "--move", "ball.T=0.1:1", "--require", "always v <= 1")
+    told = reported(tmp_path, *words)
+    assert told.returncode == 0, told.stderr
+    text = (tmp_path / "reports" / "loop" / "index.html").read_text(encoding="utf-8")
+    assert "nlctl report loop.py:make --until 2 --move ball.T=0.1:1" in text
+    content = json.loads(re.search(r'<figure class="live".*?json">(.*?)</script>', text)[1])
+    (handle,) = content["handles"]
+    assert (handle["name"], handle["value"], handle["high"]) == ("ball.T", 0.5, 1.0)
+    assert content["command"] == {"shell": "nlctl simulate loop.py:make --until 2"}
+    assert content["limits"] == {"v": [[1.0, 0.0, 2.0]]}
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("loop.py:called", "--live"), "a function of it is called"),
+        (
+            ("loop.py:make", "--move", "ball.tau"),
+            "unknown parameter, initial state",
+        ),
+        (("loop.py:make", "--live", "--require", "v < 1"), "needs '<=' or '>='"),
+        (("lv_2017", "--live"), "--live and --move are of a loop or a study"),
+    ],
+)
+def test_what_a_page_cannot_do_is_refused_before_a_file_is_written(tmp_path, words, why):
+    needed("ziglang", "export")
+    told = (
+        reported(tmp_path, *words, "--until", "2")
+        if ":" in words[0]
+        else reported(tmp_path, *words)
+    )
+    assert told.returncode == 2
+    assert why in told.stderr
+    assert not (tmp_path / "reports").exists()
+
+
+def test_the_page_of_a_study_moves_within_its_box(tmp_path):
+    needed("ziglang", "export")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    told = reported(tmp_path, "study.toml", "--live", "--out", "page")
+    assert told.returncode in (0, 1), told.stderr
+    text = (tmp_path / "page" / "index.html").read_text(encoding="utf-8")
+    content = json.loads(re.search(r'<figure class="live".*?json">(.*?)</script>', text)[1])
+    (handle,) = content["handles"]
+    assert (handle["name"], handle["low"], handle["high"]) == ("ball.T", 0.2, 0.8)
+    assert content["bands"].keys() == content["limits"].keys() == {"v"}
+    assert content["requirements"][0]["key"] == "low"
+    assert content["command"]["shell"].startswith("nlctl simulate loop.py:make --until 2")
+
+
+STUDY = """
+loop = "loop.py:make"
+[study]
+title = "A lag"
+seed = 1
+[space]
+"ball.T" = { uniform = [0.2, 0.8] }
+[spec]
+low = "always v <= 2"
+[time]
+end = 2.0
+step = 0.01
+[runs]
+size = 16
+[[analysis]]
+kind = "probability"
+limit = 0.5
+"""
