@@ -12,7 +12,8 @@ import pytest
 from extras import needed, needed_program
 
 import nlctl
-from nlctl.errors import CompileError, ParameterError, UsageError
+from nlctl import actuators
+from nlctl.errors import CompileError, DivergedError, ParameterError, UsageError
 from nlctl.export.web import handles, web_program
 
 HERE = Path(__file__).parent
@@ -107,6 +108,7 @@ def faulty():
     return nlctl.with_faults(nlctl.paper.example_1(), fault)
 
 
+@pytest.mark.slow
 def test_example_1_has_the_same_numbers_to_the_bit(in_node):
     program = web_program(nlctl.paper.example_1(), TIMES)
     (found,) = in_node(program)
@@ -115,6 +117,7 @@ def test_example_1_has_the_same_numbers_to_the_bit(in_node):
     assert found["ends"] == ""
 
 
+@pytest.mark.ci
 def test_it_is_the_run_of_the_engine_within_its_tolerance():
     needed("ziglang", "export")
     loop = nlctl.paper.example_1()
@@ -123,6 +126,7 @@ def test_it_is_the_run_of_the_engine_within_its_tolerance():
     assert np.abs(here(program) - response.y).max() < 1e-6
 
 
+@pytest.mark.ci
 def test_a_fault_that_is_switched_on_begins_when_it_is_said(in_node):
     loop, onset = faulty(), "fault_actuator_v.onset"
     program = web_program(loop, TIMES)
@@ -134,6 +138,7 @@ def test_a_fault_that_is_switched_on_begins_when_it_is_said(in_node):
     assert any(abs(t - 1.2345) < 1e-12 for t in found["events"])
 
 
+@pytest.mark.ci
 def test_another_reference_is_the_run_that_is_made_with_it(in_node):
     loop = nlctl.paper.example_1()
     program, frequencies = web_program(loop, TIMES), [3.0, 0.5]
@@ -143,6 +148,7 @@ def test_another_reference_is_the_run_that_is_made_with_it(in_node):
     assert np.array_equal(samples(found, program), here(other))
 
 
+@pytest.mark.ci
 def test_other_initial_states_and_tolerances(in_node):
     loop = nlctl.paper.example_1()
     program = web_program(loop, TIMES)
@@ -160,6 +166,7 @@ LOOPS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", LOOPS)
 def test_whatever_jumps_has_the_same_numbers_to_the_bit(in_node, name):
     times = np.linspace(0.0, 2.0, 201)
@@ -170,6 +177,24 @@ def test_whatever_jumps_has_the_same_numbers_to_the_bit(in_node, name):
     assert np.abs(here(program) - response.y).max() < 1e-5 * np.abs(response.y).max()
     if response.events is not None:
         assert len(found["events"]) == len(response.events)
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("name", actuators.__all__)
+def test_every_actuator_has_the_same_numbers_to_the_bit(in_node, name):
+    made = getattr(actuators, name)
+    record = made() if isinstance(made, type) else None
+    if record is None or (len(record.inputs), len(record.outputs)) != (1, 1):
+        pytest.skip("no block from one signal to one")
+    loop = loop_with(nlctl.block(record, "actuator", inputs="u", outputs="v"))
+    times = np.linspace(0.0, 1.0, 101)
+    try:
+        nlctl.input_output_response(loop, times, 0.0)
+    except DivergedError:
+        pytest.skip("not with this plant")
+    program = web_program(loop, times)
+    (found,) = in_node(program)
+    assert np.array_equal(samples(found, program), here(program))
 
 
 def halved(t, x, u, params):
