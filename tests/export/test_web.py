@@ -3,13 +3,14 @@
 import json
 import math
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
 import control as ct
 import numpy as np
 import pytest
-from extras import needed, needed_program
+from extras import needed
 
 import nlctl
 from nlctl import actuators
@@ -24,7 +25,8 @@ TIMES = np.linspace(0.0, 3.0, 301)
 @pytest.fixture(scope="module")
 def node():
     needed("ziglang", "export")
-    return needed_program(("node",))
+    found = shutil.which("node")  # or the one that drives Chromium
+    return found or str(Path(needed("playwright", "browser").__file__).parent / "driver" / "node")
 
 
 @pytest.fixture
@@ -108,7 +110,7 @@ def faulty():
     return nlctl.with_faults(nlctl.paper.example_1(), fault)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_example_1_has_the_same_numbers_to_the_bit(in_node):
     program = web_program(nlctl.paper.example_1(), TIMES)
     (found,) = in_node(program)
@@ -218,6 +220,7 @@ def error_function(t, x, u, params):
     return [-math.erf(u[0])]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_a_page_cannot_hold_is_refused_by_name(what):
     needed("ziglang", "export")
@@ -227,6 +230,7 @@ def test_what_a_page_cannot_hold_is_refused_by_name(what):
         web_program(loop, TIMES)
 
 
+@pytest.mark.ci
 def test_a_loop_that_diverges_as_it_stands_is_refused():
     needed("ziglang", "export")
     plant = nlctl.PureFeedback(order=1, f=escapes, initial={"x1": 1.0})

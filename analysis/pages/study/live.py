@@ -35,7 +35,8 @@ def with_study_live(
     of the study.
     """
     experiment = prepared.experiment
-    space, diagram = experiment.space, loop_of(prepared).diagram
+    space = experiment.space
+    diagram: Any = loop_of(prepared).diagram
     row: pd.DataFrame = as_table(space, [nominal(space)])
     given = {
         what: {name: values[0] for name, values in each.items()}

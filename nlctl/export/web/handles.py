@@ -129,7 +129,7 @@ class _Reader:
             slot.name: slot for block in compiled.program.layout.values() for slot in block.values()
         }
         table = parameters(self.system)
-        self.rows = {str(name): row for name, row in table.iterrows()}
+        self.rows: dict[str, Any] = {str(name): row for name, row in table.iterrows()}
         self.states = {f"{name}(0)": i for i, name in enumerate(state_names(self.system))}
         self.inputs = {label: i for i, label in enumerate(self.system.input_labels or ())}
         self.faults = [
@@ -210,7 +210,8 @@ class _Reader:
             raise ParameterError(
                 f"'{name}' is an integer or a choice, which a page does not move: name a number"
             )
-        row, value = self.rows.get(base, {}), float(self.p[place])
+        row: Any = self.rows.get(base, {})
+        value = float(self.p[place])
         low, high = given or _within(_around(value), str(row.get("bounds", "")))
         self._check_moves(name, base, slot, place, (low, high))
         unit = str(row.get("unit", ""))

@@ -25,7 +25,7 @@ def laid_out_as_here(text: str) -> str:
         raise CompileError(f"the integrators' IR has what no page can hold: {found[0]}")
     text = _ALLOCA.sub(lambda m: _ADDRESS.sub("i64", m[0]), text)
     count = iter(range(len(text)))
-    return _STORE.sub(lambda m: _parts_stored(*m.groups(), next(count)), text)
+    return _STORE.sub(lambda m: _parts_stored(m[1], m[2], m[3], next(count)), text)
 
 
 def _parts_stored(kind: str, value: str, place: str, number: int) -> str:

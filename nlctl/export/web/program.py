@@ -138,15 +138,15 @@ def web_program(
     --------
     >>> import nlctl
     >>> from nlctl.export.web import web_program
-    >>> program = web_program(nlctl.paper.example_1(), [0.0, 0.5, 1.0])
-    >>> program.module[:4], program.states[:2]
+    >>> program = web_program(nlctl.paper.example_1(), [0.0, 0.5, 1.0])  # doctest: +SKIP
+    >>> program.module[:4], program.states[:2]  # doctest: +SKIP
     (b'\\x00asm', ('plant_x1', 'plant_x2'))
     """
     check_linker()
     compiled, what = native.compile(diagram), str(diagram.name)
     _check(compiled, what)
     grid = np.asarray(times, dtype=float)
-    given = {k: v for k, v in (("rtol", rtol), ("atol", atol)) if v is not None}
+    given: dict[str, Any] = {k: v for k, v in (("rtol", rtol), ("atol", atol)) if v is not None}
     p, start = compiled.parameter_vector(params), state_array(compiled.system, initial_state)
     u = np.ascontiguousarray(input_array(compiled.system, inputs, grid))
     settings = Settings(**given, max_steps=1_000_000_000)
@@ -261,7 +261,8 @@ def _facts(
 ) -> dict[str, Any]:
     """Return what a host needs to know."""
     task, work = run.task, run.work
-    offsets = {name: LANE.fields[name][1] for name in _OF_LANE}
+    fields: Any = LANE.fields
+    offsets = {name: fields[name][1] for name in _OF_LANE}
     return {
         "begin": float(times[0]), "end": float(times[-1]), "times": int(times.size),
         "even": _is_even(times), "states": int(work.x.shape[0]), "rows": int(work.y.shape[1]),
