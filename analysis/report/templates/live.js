@@ -19,6 +19,14 @@ const digits = (value, count = 6) => {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "NaN" : value > 0 ? "∞" : "−∞";
   return String(Number(value.toPrecision(count))).replace("-", "−");
 };
+const endsOf = (values) => {
+  let [low, high] = [Infinity, -Infinity];
+  for (const value of values) {
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return [low, high];
+};
 const stepOf = (span) => {
   const size = 10 ** Math.floor(Math.log10(span / 4));
   return size * ([1, 2, 2.5, 5, 10].find((each) => each * size >= span / 5) ?? 10);
@@ -89,11 +97,22 @@ const pathOf = (t, y, across, along) => {
 };
 
 const rangeOf = (curves, reported, limits, bands) => {
-  const all = (lists) => lists.flatMap((y) => Array.from(y).filter(Number.isFinite));
-  const span = (values) => values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
-  const base = span(all([...reported, ...bands]));
+  const finite = (lists, inside = () => true) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (const values of lists) {
+      for (const value of values) {
+        if (!Number.isFinite(value) || !inside(value)) continue;
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
+    }
+    return [low, high];
+  };
+  const base = finite([...reported, ...bands]);
   const size = base[1] - base[0] || Math.abs(base[0]) || 1;
-  let [low, high] = span(all(curves).concat(base).filter((v) => v > base[0] - 8 * size && v < base[1] + 8 * size));
+  const near = (value) => value > base[0] - 8 * size && value < base[1] + 8 * size;
+  let [low, high] = finite([...curves, base], near);
+  if (!(low <= high)) [low, high] = [-1, 1];
   for (const [value] of limits) {
     if (value > low - size && value < high + size) [low, high] = [Math.min(low, value), Math.max(high, value)];
   }
@@ -355,7 +374,10 @@ class LivePart {
       const place = top + (1 - (value - y[0]) / (y[1] - y[0])) * (height - top - bottom);
       return Math.min(Math.max(place, top - 3), height - bottom + 3);
     };
-    const told = shown.map((name, i) => `${name} between ${digits(Math.min(...curves[i]), 4)} and ${digits(Math.max(...curves[i]), 4)}`);
+    const told = shown.map((name, i) => {
+      const [least, largest] = endsOf(curves[i]);
+      return `${name} between ${digits(least, 4)} and ${digits(largest, 4)}`;
+    });
     const svg = draw("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${title}: ${told.join("; ")}` });
     for (const value of ticksOf(span)) {
       draw("path", { class: "grid", d: `M${across(value)} ${top}V${height - bottom}` }, svg);
@@ -417,7 +439,7 @@ class LivePart {
   numbers() {
     const rows = this.content.outputs.map((name) => {
       const curve = this.last.signals[name];
-      const values = [Math.min(...curve), Math.max(...curve), curve.at(-1) ?? NaN];
+      const values = [...endsOf(curve), curve.at(-1) ?? NaN];
       const row = put("tr", "");
       make("th", name, row).scope = "row";
       for (const value of values) put("td", "number", row, digits(value)).dataset.value = value;

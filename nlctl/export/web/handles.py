@@ -131,7 +131,9 @@ class _Reader:
         table = parameters(self.system)
         self.rows: dict[str, Any] = {str(name): row for name, row in table.iterrows()}
         self.states = {f"{name}(0)": i for i, name in enumerate(state_names(self.system))}
-        self.inputs = {label: i for i, label in enumerate(self.system.input_labels or ())}
+        self.inputs: dict[str, int] = {
+            label: i for i, label in enumerate(self.system.input_labels or ())
+        }
         self.faults = [
             name
             for name in dict.fromkeys(n.rpartition(".")[0] for n in self.slots)

@@ -53,6 +53,7 @@ _NO_ZIG = (
 )
 
 
+_STACK = 1 << 20  # bytes
 _SIZE = """
 define internal {i64, i1} @size(i64 %a, i64 %b) alwaysinline nounwind {
   %product = mul i64 %a, %b
@@ -92,7 +93,7 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
         command = [
             sys.executable, "-m", "ziglang", "wasm-ld", *(path.name for path in objects),
             "integrators.o", "-o", "page.wasm", "--no-entry", "--gc-sections", "--strip-all",
-            "--allow-undefined", "--stack-first", *(f"--export={name}" for name in exports),
+            "--allow-undefined", "--stack-first", "-z", f"stack-size={_STACK}", *(f"--export={name}" for name in exports),
         ]  # fmt: skip
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         page = folder / "page.wasm"
