@@ -13,7 +13,7 @@ import pytest
 from extras import needed
 
 import nlctl
-from nlctl import actuators
+from nlctl import actuators, sources
 from nlctl.errors import CompileError, DivergedError, ParameterError, UsageError
 from nlctl.export.web import handles, web_program
 
@@ -179,6 +179,26 @@ def test_whatever_jumps_has_the_same_numbers_to_the_bit(in_node, name):
     assert np.abs(here(program) - response.y).max() < 1e-5 * np.abs(response.y).max()
     if response.events is not None:
         assert len(found["events"]) == len(response.events)
+
+
+def square(period):
+    wave = sources.Square(outputs=("u",), period=period)
+    return nlctl.interconnect({"source": wave, "lag": nlctl.Lag(T=0.1)})
+
+
+@pytest.mark.ci
+def test_switches_of_functions_of_time_are_found_again(in_node):
+    program, other = web_program(square(0.7), TIMES), web_program(square(0.91), TIMES)
+    place = list(program.parameters).index("source.period")
+    as_it_is, found = in_node(program, {}, {"given": {"p": [[place, 0.91]]}})
+    assert np.array_equal(samples(as_it_is, program), here(program))
+    assert np.array_equal(samples(found, program), here(other))
+
+
+def test_switches_that_are_too_close_for_a_page_are_refused():
+    assert [each.name for each in moved(square(2.0), "source.period")] == ["source.period"]
+    with pytest.raises(ParameterError, match="come every 0.0025 s, too close together"):
+        moved(square(0.005), "source.period")
 
 
 @pytest.mark.weekly

@@ -215,7 +215,7 @@ import nlctl
 import control as ct
 
 def make():
-    return nlctl.interconnect({"ball": nlctl.Lag(T=0.5), "source": nlctl.Sine(outputs=("u",))})
+    return nlctl.interconnect({"ball": nlctl.Lag(T=0.5), "source": nlctl.sources.Sine(outputs=("u",))})
 
 def halved(t, x, u, params):
     return [float(str(-0.5 * u[0]))]

@@ -291,7 +291,8 @@ class LivePart {
 
   changed(still = true) {
     this.mark();
-    this.run(still ? undefined : Math.max(COARSE, this.content.facts.rtol));
+    const tolerance = still ? undefined : Math.max(COARSE, this.content.facts.rtol);
+    this.run(tolerance).catch((error) => this.say(error.message, true));
   }
 
   // Run in slices, so that the page answers meanwhile; what is moved in between begins anew.

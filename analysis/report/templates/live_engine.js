@@ -138,7 +138,8 @@ const engineOf = async (bytes, facts) => {
   // Try so many steps; return whether the run is over.
   const advance = (rounds) => {
     const before = whole("accepted") + whole("rejected");
-    code.live_advance(rounds);
+    const told = code.live_advance(rounds);
+    if (told !== 0 && told !== -2) throw new Error("the memory of the page does not suffice");
     return whole("status") !== RUNNING || whole("accepted") + whole("rejected") === before;
   };
   const finish = () => {

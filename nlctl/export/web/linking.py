@@ -93,7 +93,8 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
         command = [
             sys.executable, "-m", "ziglang", "wasm-ld", *(path.name for path in objects),
             "integrators.o", "-o", "page.wasm", "--no-entry", "--gc-sections", "--strip-all",
-            "--allow-undefined", "--stack-first", "-z", f"stack-size={_STACK}", *(f"--export={name}" for name in exports),
+            "--allow-undefined", "--stack-first", "-z", f"stack-size={_STACK}",
+            *(f"--export={name}" for name in exports),
         ]  # fmt: skip
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         page = folder / "page.wasm"
