@@ -197,7 +197,7 @@ def test_switches_of_functions_of_time_are_found_again(in_node):
 
 def test_switches_that_are_too_close_for_a_page_are_refused():
     assert [each.name for each in moved(square(2.0), "source.period")] == ["source.period"]
-    with pytest.raises(ParameterError, match="come every 0.0025 s, too close together"):
+    with pytest.raises(ParameterError, match=r"come every 0\.0025 s, too close together"):
         moved(square(0.005), "source.period")
 
 

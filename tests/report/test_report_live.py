@@ -215,7 +215,8 @@ import nlctl
 import control as ct
 
 def make():
-    return nlctl.interconnect({"ball": nlctl.Lag(T=0.5), "source": nlctl.sources.Sine(outputs=("u",))})
+    source = nlctl.sources.Sine(outputs=("u",))
+    return nlctl.interconnect({"ball": nlctl.Lag(T=0.5), "source": source})
 
 def halved(t, x, u, params):
     return [float(str(-0.5 * u[0]))]
