@@ -27,8 +27,6 @@ from .time_dependence import UNREAD
 from .type_questions import type_question
 from .written import Written
 
-__all__ = ["agreeing", "on_balls", "one_number", "several_numbers"]
-
 _ALL, _EVERY = 400, 16  # calls that are all compared, and then every so many
 _AT_POINTS = 40  # calls that are compared with balls without width, too: wide ones hold a lot
 _GOLDEN = 0.6180339887498949

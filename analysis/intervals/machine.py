@@ -30,15 +30,6 @@ from .arithmetic import Ball, as_ball
 from .box import Box
 from .paths import Undecided
 
-__all__ = [
-    "CodedClaim",
-    "Readable",
-    "code_for",
-    "decided_by_code",
-    "only_balls",
-    "supremum_by_code",
-]  # fmt: skip
-
 TOO_FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls
 _GOLDEN = 0.6180339887498949

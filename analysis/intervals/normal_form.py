@@ -21,8 +21,6 @@ from .arithmetic import Ball, as_ball
 from .numpy_functions import NumPyFunctions
 from .paths import Undecided
 
-__all__ = ["Atom", "Sum", "exact", "indeterminate"]
-
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
 EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum",
               "hypot", "logaddexp", "sinc", "table")  # fmt: skip  # continuous, for all numbers

@@ -21,8 +21,6 @@ from nlctl.expressions.functions import FUNCTIONS
 
 from .pairs import FUNCTIONS_OF_TWO
 
-__all__ = ["NumPyFunctions", "checked_table"]
-
 _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row.count == 1}
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 

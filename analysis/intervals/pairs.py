@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterable
 
 from flint import arb
 
-__all__ = ["FUNCTIONS_OF_TWO", "hull", "real_power"]
-
 Enclosed = tuple[arb, arb, arb]
 _ANY, _ZERO, _ONE = arb(0, "inf"), arb(0), arb(1)
 _UNIT = arb(0, 1)

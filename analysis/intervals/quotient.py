@@ -18,8 +18,6 @@ from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
 from .pairs import FUNCTIONS_OF_TWO
 from .paths import Undecided
 
-__all__ = ["Slope", "slope_in"]
-
 
 class Slope(NumPyFunctions):
     """A quantity q of an equation: q(v), q(0) and (q(v) - q(0)) / v, each a `Ball`."""

@@ -18,8 +18,6 @@ from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
 from .pairs import FUNCTIONS_OF_TWO
 from .paths import undecided
 
-__all__ = ["Rate"]
-
 
 class Rate(NumPyFunctions):
     """A quantity and its rate.

@@ -10,8 +10,6 @@ from flint import arb
 from .arithmetic import Ball
 from .paths import every_way
 
-__all__ = ["UNREAD", "reads_time"]
-
 
 class TimeRead(Exception):  # noqa: N818 (it ends an evaluation; nobody else sees it)
     """The time was read."""

@@ -16,8 +16,6 @@ from .normal_form import exact
 from .numpy_functions import NumPyFunctions
 from .paths import Undecided
 
-__all__ = ["OPERATIONS", "Written", "operations"]
-
 OPERATIONS = (
     "exp",
     "sin",

@@ -8,8 +8,6 @@ from ..intervals.box import Box
 from .loop.signals import Margin, Signals, inequality
 from .premises import Premises
 
-__all__ = ["assumptions"]
-
 
 def assumptions(signals: Signals, given: Premises, box: Box, u_max: float) -> tuple[Margin, ...]:
     """Evaluate what the proof supposes, along a response of an observed loop."""

@@ -37,8 +37,6 @@ from .loop.roles import Parts
 from .loop.simulation import MemberRun
 from .premises import Premises, premises
 
-__all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
-
 FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
 NOT_CLOSED = (

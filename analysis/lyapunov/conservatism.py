@@ -25,8 +25,6 @@ from .premises import Premises, premises
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Conservatism", "DirectBound", "Share", "comparison", "conservatism"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Share:

@@ -18,7 +18,7 @@ from nlctl.plants import coordinate_names
 from nlctl.wording import counted
 
 from ..intervals.arithmetic import as_ball
-from ..intervals.box import Box, visited_box
+from ..intervals.box import Box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove, upper
 from .bounds.decomposition import Decomposition, decompose
 from .bounds.final_bound import KAPPA, alpha_0, alpha_1, final_bound, initial_V, total_error
@@ -26,16 +26,6 @@ from .bounds.sector import Sector, plant_terms, sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
 from .loop.roles import Parts, read_parts
 from .proofs.result import Constant, Provenance, per_second
-
-__all__ = [
-    "Constants",
-    "bound",
-    "constants",
-    "constants_of",
-    "disturbance",
-    "kappa",
-    "visited_box",
-]
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ConeLimit", "at_least", "at_most", "minimizer", "symmetric_basis", "upper_triangle"]
-
 _SOLVED = ("Solved", "AlmostSolved")
 
 

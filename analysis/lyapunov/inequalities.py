@@ -20,8 +20,6 @@ from .bounds.final_bound import KAPPA
 from .loop.signals import INTEGRATED, Margin, Signals, equality, inequality
 from .premises import Premises
 
-__all__ = ["Terms", "inequalities", "terms"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Terms:

@@ -32,8 +32,6 @@ from .premises import premises
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Ledger", "Line", "ledger"]
-
 _SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
 """What `examine` takes by name."""
 

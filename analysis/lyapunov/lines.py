@@ -20,8 +20,6 @@ from .loop.simulation import MemberRun
 from .premises import Premises, forcing_bound, literal, premises
 from .proofs.result import Provenance
 
-__all__ = ["Line", "LineStatus", "assumption_lines", "decay_line", "inequality_lines", "run_line"]
-
 LineStatus = Literal["proved", "computed", "checked", "violated", "not applicable", "undecided"]
 RANK = {"violated": 0, "undecided": 1, "checked": 2, "computed": 3, "proved": 4}
 KNOWN: dict[Provenance, LineStatus] = {

@@ -21,8 +21,6 @@ from .bounds.final_bound import Gains, alpha_0, alpha_1, total_error
 from .constants import Constants, bound
 from .loop.integral import sharpest
 
-__all__ = ["Premises", "forcing_bound", "literal", "premises"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Premises:

@@ -36,8 +36,6 @@ from .loop.simulation import SAMPLING_INTERVAL
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Tightened", "TrialBound", "tighten"]
-
 _BOUNDS = ("C_0", "ultimate")
 _TOLERANCE = 1e-2  # of the branch and bounds in the search
 OVER = 10.0  # weight of log(|u| / limit) in the cost

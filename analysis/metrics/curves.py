@@ -27,8 +27,6 @@ from nlctl.equations import equation
 
 from .integrals import consecutive_differences
 
-__all__ = ["limits_at_breaks", "path", "turning_points"]
-
 _HALF = 4  # neighbours on each side that a curve goes through
 _GUARD = 4.0
 _CLEAR = 64.0

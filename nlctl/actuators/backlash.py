@@ -12,8 +12,6 @@ from ..functions import clip
 from ..params import as_numbers, param, record
 from .memories import RELAXATION
 
-__all__ = ["Backlash"]
-
 
 @equation
 def play_band(u, p):

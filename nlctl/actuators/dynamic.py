@@ -7,8 +7,6 @@ from ..equations import equation
 from ..functions import clip
 from ..params import param, record
 
-__all__ = ["Lag", "RateLimiter", "SecondOrderLag"]
-
 LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, t) u + eps_u of u"
 
 

@@ -10,8 +10,6 @@ from ..errors import ParameterError
 from ..params import param, record
 from .memories import RELAXATION
 
-__all__ = ["BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"]
-
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
 

@@ -12,8 +12,6 @@ from .memories import RELAXATION, checked_start, memory_names, started
 from .prandtl_ishlinskii import check_pairs, check_thresholds
 from .static import BOUNDED_OUTPUT
 
-__all__ = ["GeneralisedPrandtlIshlinskii"]
-
 
 @equation
 def envelope(u, a):

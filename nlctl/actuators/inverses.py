@@ -24,8 +24,6 @@ from .prandtl_ishlinskii import (
 )
 from .relay import check_sides, moving_side
 
-__all__ = ["BacklashInverse", "DeadZoneInverse", "PrandtlIshlinskiiInverse"]
-
 
 @record
 class DeadZoneInverse:

@@ -9,8 +9,6 @@ import numpy as np
 from ..arguments import vector
 from ..errors import ParameterError
 
-__all__ = ["RELAXATION", "checked_start", "memory_names", "started"]
-
 RELAXATION = 1e3
 """Rate (1/s) at which memories relax onto what they become, in plain `control` alone.
 

@@ -15,8 +15,6 @@ from ..wording import counted
 from .memories import RELAXATION, checked_start, memory_names, started
 from .static import BOUNDED_OUTPUT
 
-__all__ = ["OneSidedDeadZones", "PrandtlIshlinskii", "Stop"]
-
 
 @equation
 def unit_play(u, memory, r):

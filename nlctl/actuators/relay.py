@@ -15,8 +15,6 @@ from ..params import param, record
 from .memories import RELAXATION, checked_start, memory_names, started
 from .static import BOUNDED_OUTPUT
 
-__all__ = ["Preisach", "Relay", "relay_grid"]
-
 
 @equation
 def kept_side(side):

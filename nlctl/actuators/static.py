@@ -9,8 +9,6 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 
-__all__ = ["AsymmetricSaturation", "DeadZone", "Gain", "Saturation"]
-
 BOUNDED_OUTPUT = "its output is bounded for all u, so that no k >= k_1 > 0 keeps eps_u bounded"
 
 

@@ -13,8 +13,6 @@ from ..params import param, record
 from .adaptive import Zero, adaptive_neural
 from .nussbaum import control_base
 
-__all__ = ["FixedGainLaw", "ablations", "replaced"]
-
 
 @record
 class FixedGainLaw:

@@ -19,8 +19,6 @@ from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
 from .robust import RobustTerm
 
-__all__ = ["Zero", "adaptive_neural"]
-
 
 @record
 class Zero:

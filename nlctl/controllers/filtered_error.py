@@ -13,8 +13,6 @@ from ..params import param, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 
-__all__ = ["FilteredError", "binomial_lambdas"]
-
 
 def binomial_lambdas(order: int) -> tuple[float, ...]:
     """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3.

@@ -14,8 +14,6 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 
-__all__ = ["PID", "PID2", "standard_pid"]
-
 
 @equation
 def back_calculation(u, w, p):

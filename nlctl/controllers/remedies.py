@@ -16,8 +16,6 @@ from ..params import param, record
 from .known_sign import damped_base
 from .nussbaum import NussbaumLaw, control_base, gained
 
-__all__ = ["DeadZoneNussbaumLaw", "LeakyNussbaumLaw", "MonotoneNussbaumLaw"]
-
 
 @equation
 def beyond(r, r_0):

@@ -7,8 +7,6 @@ import io
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-__all__ = ["Drawing"]
-
 
 class Drawing(Figure):
     """A matplotlib figure that a notebook shows as SVG, whatever backend is active.

@@ -11,8 +11,6 @@ from collections.abc import Collection, Iterable
 
 from .graph import Expr, Graph, needed
 
-__all__ = ["at_integers", "conditions", "switching_function"]
-
 _ORDERS = ("lt", "le", "gt", "ge")
 _OF_DIFFERENCES = (*_ORDERS, "minimum", "maximum")
 _OF_SIGNS = ("absolute", "sign", "heaviside")

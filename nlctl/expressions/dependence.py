@@ -8,8 +8,6 @@ import numpy as np
 
 from .graph import Expr, needed
 
-__all__ = ["structure"]
-
 _WHOLE = ("sum", "call", "solve")  # each element of the result depends on all that goes in
 
 

@@ -15,8 +15,6 @@ from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
 from .stage import Stage
 
-__all__ = ["partials", "tangents"]
-
 
 def tangents(
     graph: Graph,

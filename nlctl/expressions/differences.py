@@ -13,8 +13,6 @@ import numpy as np
 
 from .graph import Expr, Graph
 
-__all__ = ["RELATIVE_STEP", "opaque_difference"]
-
 RELATIVE_STEP = float(
     np.cbrt(np.finfo(float).eps)
 )  # errors of rounding and of the formula are alike

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["SINGULAR", "eliminated", "largest_magnitude", "linear_solution", "substituted"]
-
 SINGULAR = 1e-7  # relative to the largest entry: a solution would have lost half of its digits
 
 

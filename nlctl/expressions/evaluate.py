@@ -8,8 +8,6 @@ import numpy as np
 
 from .graph import Expr, Untraceable, needed, numpy_function
 
-__all__ = ["evaluate_expressions", "value_of"]
-
 
 def evaluate_expressions(
     results: Iterable[Expr],

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FUNCTIONS", "MATH", "RealFunction"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class RealFunction:

@@ -12,8 +12,6 @@ from collections.abc import Mapping
 
 from .graph import Expr
 
-__all__ = ["implied_by"]
-
 _TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le"}
 _OPPOSITE = {"lt": "ge", "le": "gt", "gt": "le", "ge": "lt"}
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from .graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["difference_quotient"]
-
 
 @dataclass(frozen=True)
 class _Quantity:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from ..errors import ParameterError
 
-__all__ = ["Condition", "parse_condition"]
-
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
 TEXT = re.compile(rf"\s*(\|?)\s*({NAME})\s*(\|?)\s*(>=?|<=?)\s*({NUMBER})\s*")

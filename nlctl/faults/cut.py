@@ -19,8 +19,6 @@ from ..names import find_name, unknown
 from ..upstream.systems import System
 from .fault import Fault
 
-__all__ = ["signal_names", "with_faults"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:

@@ -16,19 +16,6 @@ from ..errors import ParameterError
 from ..functions import noise_spectrum, noise_value
 from ..params import param, record
 
-__all__ = [
-    "NEVER",
-    "Bias",
-    "DriftFault",
-    "Latch",
-    "Late",
-    "LockInPlace",
-    "LossOfEffectiveness",
-    "Noise",
-    "Outage",
-    "StuckAt",
-]
-
 NEVER = 1e12
 """A time in s that no run reaches: as an onset, a fault that does not begin."""
 

@@ -27,8 +27,6 @@ from .effects import (
     StuckAt,
 )
 
-__all__ = ["FAULT_KINDS", "Fault"]
-
 FAULT_KINDS: Mapping[str, Any] = MappingProxyType(
     {
         "stuck": StuckAt,

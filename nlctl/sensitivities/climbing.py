@@ -17,8 +17,6 @@ from scipy.optimize import linprog, minimize
 
 from .worth import LOST_MARGIN, Worth
 
-__all__ = ["lower_cost", "raise_least_margin"]
-
 _REACH = 0.5  # of the first step, in widths of the box
 _SHORTEST = 2e-3  # of a reach
 _KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, more doubles it

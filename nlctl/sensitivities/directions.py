@@ -9,8 +9,6 @@ from ..errors import CompileError
 from ..expressions.derivatives import tangents
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["Direction", "from_time", "one_sided", "rows_replaced", "slopes", "taken"]
-
 SomeRows = tuple[Expr, int]  # some rows: one expression, and how many
 Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
 

@@ -15,8 +15,6 @@ from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import COMPARISONS, Expr, Graph, Untraceable, needed
 from ..native.sliding.pieces import replaced_parts
 
-__all__ = ["only_bends"]
-
 _ORDERS = ("lt", "le", "gt", "ge")
 _POINTS = 256
 _TRUTHS = "truths"  # the array of values that say whether other conditions hold

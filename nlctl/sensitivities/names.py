@@ -18,9 +18,6 @@ from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 from ..params import declared_params
 
-__all__ = ["Observed", "VariedQuantity", "declared_bounds", "observed_signals"]
-__all__ += ["varied_quantities"]
-
 _AT_START = "(0)"
 
 

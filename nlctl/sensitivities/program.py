@@ -26,8 +26,6 @@ from .schedule import Extended, extended, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
-__all__ = ["Differentiated", "parameters_with", "with_its_derivatives"]
-
 _LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
 
 

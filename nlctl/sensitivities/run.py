@@ -27,8 +27,6 @@ from .names import Observed, VariedQuantity, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 
-__all__ = ["RunWithDerivatives", "differentiated_run"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class RunWithDerivatives:

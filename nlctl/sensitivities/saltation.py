@@ -24,8 +24,6 @@ from .places import StatePlaces
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
 
-__all__ = ["Saltation"]
-
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _FAR = 1e300

@@ -35,8 +35,6 @@ from .directions import (
 from .kinks import only_bends
 from .schedule import Extended
 
-__all__ = ["EquationParts", "equation_parts"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class EquationParts:

@@ -26,8 +26,6 @@ from .tuned import Tuned
 from .tuning_notes import notes
 from .worth import Runs, TuningProblem, Worth, checked_samples
 
-__all__ = ["tune"]
-
 _SAMPLES = 1001  # of a run for which nobody asks when
 _SAME = 1e-3  # of a margin, or of a cost
 

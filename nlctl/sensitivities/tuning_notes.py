@@ -9,8 +9,6 @@ import numpy as np
 from ..wording import counted
 from .worth import LOST_MARGIN, Runs, Worth
 
-__all__ = ["notes"]
-
 _AT_BOUND = 1e-6  # of the box
 
 

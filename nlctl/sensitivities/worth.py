@@ -16,8 +16,6 @@ from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
 from .response import sensitivity_response
 
-__all__ = ["LOST_MARGIN", "PER_DERIVATIVE", "Runs", "TuningProblem", "Worth", "checked_samples"]
-
 LOST_MARGIN = -1e3
 """The margin of a run that does not reach its end."""
 PER_DERIVATIVE = 0.7

@@ -15,8 +15,6 @@ from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from ...intervals.box import Box
 from .motion import StateRates
 
-__all__ = ["ProvedLevel", "Quadratic", "largest_level"]
-
 _STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
 _FACE = 20_000  # boxes on a face
 _SMALLEST = 2.0**-40  # of the level that fits into the box: an inner set below it is none

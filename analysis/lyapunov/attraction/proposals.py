@@ -10,8 +10,6 @@ from scipy.linalg import solve_continuous_lyapunov
 from ..convex import at_least, at_most, minimizer, symmetric_basis
 from .motion import StateRates
 
-__all__ = ["fitted", "from_linear_part"]
-
 _SAMPLES = 400
 _RATE = 1e-3  # V' <= -1e-3 |x|^2 at samples, for P >= 1
 

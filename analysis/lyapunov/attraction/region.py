@@ -22,8 +22,6 @@ from .level import ProvedLevel, largest_level, quadratic_of
 from .motion import StateRates, motion_of
 from .proposals import fitted, from_linear_part
 
-__all__ = ["ATTRACTION", "AttractionRegion", "region_of_attraction"]
-
 _AT_REST = 1e-9  # of the rates at an equilibrium
 _ROUNDS = 3  # of proposals that grow
 

@@ -17,8 +17,6 @@ from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
 from ...intervals.quotient import slope_in
 from ...intervals.time_dependence import UNREAD, reads_time
 
-__all__ = ["Edge", "clipped_split", "eps_range"]
-
 _UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
 Edge = Callable[[Any, Any], Any]
 """Output at an input and a time."""

@@ -25,8 +25,6 @@ from ...intervals.agreement import on_balls
 from ...intervals.branch_and_bound import Range
 from .clipped import Edge, clipped_split, eps_range
 
-__all__ = ["Decomposable", "Decomposition", "DecompositionError", "decompose"]
-
 _TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 

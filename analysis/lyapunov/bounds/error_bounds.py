@@ -20,8 +20,6 @@ from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
-__all__ = ["error_bounds", "filter_poles", "reference_bounds"]
-
 _ROUNDING = 1e-12  # added to what double precision has summed up
 
 

@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["KAPPA", "Gains", "alpha_0", "alpha_1", "final_bound", "initial_V", "total_error"]
-
 KAPPA = 0.2785
 """Bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it."""
 

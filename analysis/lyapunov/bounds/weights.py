@@ -25,16 +25,6 @@ from ..convex import at_most, minimizer
 from .final_bound import Gains, alpha_0, alpha_1, initial_V
 from .sector import plant_terms
 
-__all__ = [
-    "LARGEST_NORM",
-    "Network",
-    "approximation_error",
-    "least_squares_weights",
-    "minimax_weights",
-    "network_on_grid",
-    "tightest_weights",
-]
-
 LARGEST_NORM = 1e5  # |W|^2 = 1e10 has a rounding error of 1e-6 in double precision
 
 

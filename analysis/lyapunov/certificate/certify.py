@@ -24,8 +24,6 @@ from ..proofs.result import Certificate
 from .known_sign import KNOWN_SIGN
 from .sliding_mode import SLIDING_MODE
 
-__all__ = ["PROOFS", "certify"]
-
 PROOFS = (MODEL_REFERENCE, SLIDING_MODE, KNOWN_SIGN, ATTRACTION, BARRIER)
 """The kinds of proof; a loop is proved by the first of those that it fits."""
 

@@ -22,8 +22,6 @@ from ..proofs.result import Certificate
 from .certify import certify
 from .known_sign import KnownSignLoop, bound_of_r, read_known_sign
 
-__all__ = ["GainCandidate", "GainDesign", "design"]
-
 SLACK = 1.002  # of N_0 over 1 / min k G
 _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 

@@ -43,8 +43,6 @@ from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, witho
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
 
-__all__ = ["KNOWN_SIGN", "KnownSignCertificate", "KnownSignLoop", "bound_of_r", "read_known_sign"]
-
 _PROVED_FOR = {
     "reference": (SumOfSines,),
     "filtered_error": (FilteredError,),

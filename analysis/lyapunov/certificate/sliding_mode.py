@@ -34,8 +34,6 @@ from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
 
-__all__ = ["SLIDING_MODE", "SlidingModeCertificate"]
-
 _PIECES: Pieces = {
     "reference": ("yd", ()),
     "plant": ("y", ()),

@@ -19,8 +19,6 @@ from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
 from .same_loop import check_same, points_around
 
-__all__ = ["CheckedLoop", "read_checked"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedLoop:

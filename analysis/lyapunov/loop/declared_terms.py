@@ -18,8 +18,6 @@ from nlctl.native.diagram.parameters import slots_of
 from nlctl.native.diagram.trace import traced_arguments
 from nlctl.plants import PureFeedback, integrator_chain
 
-__all__ = ["terms_with_parameters", "update_is_declared"]
-
 
 def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
     """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""

@@ -18,8 +18,6 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from .roles import Roles
 
-__all__ = ["ADDED", "bound_of_inputs", "disturbed"]
-
 ADDED = "declared bounds of external inputs, times their gains"
 
 

@@ -24,8 +24,6 @@ from .declared_terms import terms_with_parameters
 from .integral import NussbaumIntegral
 from .roles import Parts, joined_again
 
-__all__ = ["input_gain", "observed"]
-
 NEAR = 1e-5  # |v| below which G is interpolated: F/v would lose its digits
 
 

@@ -27,8 +27,6 @@ from ...intervals.agreement import on_balls
 from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.paths import Undecided, every_way
 
-__all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
-
 
 class Acceleration(Protocol):
     """x_n' of a plant."""

@@ -20,8 +20,6 @@ from nlctl.upstream.control_internals import outputs_now, rates_now
 from .roles import declared
 from .signals import Margin, equality
 
-__all__ = ["reference_margin"]
-
 WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of differences at 1, ..., 4 steps
 _STEPS = (1e-1, 1e-2, 1e-3, 1e-4)  # s
 SAMPLES = 120

@@ -21,8 +21,6 @@ from nlctl.errors import DiagramError, UsageError
 from ...loop_record import array_text, text_key
 from .content import Remembered
 
-__all__ = ["check_same", "points_around"]
-
 _Point = tuple[float, np.ndarray]
 _COUNT, SPREADS = 8, (0.03, 0.3, 1.0)  # points of each spread
 LATEST = 1e4  # s

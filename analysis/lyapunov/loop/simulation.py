@@ -27,8 +27,6 @@ from .roles import Parts, read_parts
 from .same_loop import check_same, points_around
 from .signals import Margin, Signals, signals_of
 
-__all__ = ["SAMPLING_INTERVAL", "Member", "MemberRun", "members_of", "observe", "observed_loop"]
-
 SAMPLING_INTERVAL = 4e-3  # s, sampling interval of a run that is given by its horizon
 _LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
 _MOST = 10_000_000  # samples of a run

@@ -24,8 +24,6 @@ from ...intervals.arithmetic import Ball, as_ball
 from ..loop.same_loop import points_around
 from .matching import Matching
 
-__all__ = ["check_decrease"]
-
 _EQUAL = 1e-7  # relative to the size of the terms
 
 

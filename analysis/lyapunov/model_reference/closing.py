@@ -30,8 +30,6 @@ from .model_loop import ModelReferenceLoop, is_model_reference, read_model_refer
 from .quadratic_form import ball
 from .region import Region, region
 
-__all__ = ["MODEL_REFERENCE"]
-
 _LIMIT = 1e12  # a bound of V beyond which the iteration counts as without end
 _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it falls by more
 

@@ -24,8 +24,6 @@ from ...intervals.normal_form import exact
 from .matching import Matching
 from .quadratic_form import ball
 
-__all__ = ["Decrease", "decrease", "largest_weights", "outside_ball"]
-
 _SQUARE = "the integral of E^T Q E is finite"
 _FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
 

@@ -32,8 +32,6 @@ from ..bounds.decomposition import Decomposition
 from .model_loop import ModelReferenceLoop
 from .quadratic_form import ball
 
-__all__ = ["Matching", "matching"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:

@@ -17,8 +17,6 @@ from ..proofs.saved import Content
 from .matching import Matching
 from .saved import model_attempts
 
-__all__ = ["ModelReferenceCertificate"]
-
 _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigma))"
 
 

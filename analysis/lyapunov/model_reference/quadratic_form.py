@@ -21,8 +21,6 @@ from nlctl.errors import DiagramError
 
 from ...intervals.normal_form import exact
 
-__all__ = ["QuadraticForm", "ball", "quadratic_form"]
-
 _SHRUNK = 1 - 1e-9  # of the least eigenvalue in floating point, to be proved a lower bound
 
 

@@ -22,8 +22,6 @@ from .decrease import largest_weights
 from .matching import Matching
 from .quadratic_form import ball
 
-__all__ = ["Region", "model_reach", "region"]
-
 _BOXES = 2_000
 
 

@@ -21,8 +21,6 @@ from .matching import Matching
 from .quadratic_form import QuadraticForm
 from .region import region
 
-__all__ = ["model_attempts"]
-
 _RAISED = (0.0, 0.01, 0.05, 0.2, 0.5)  # relative: how far C is above the one that closed
 _WIDER, _FINE = 1e-3, 1e-3  # relative: room of bounds of the rest, and how sharply it is bounded
 _STAGES, _LESS = 40, 0.99  # of the bound in the end: each is to be less by that

@@ -14,8 +14,6 @@ from ...response_of_loop import check_response, check_shape, own_outputs, own_pa
 from ..loop.roles import read_parts
 from .property import GainFunction
 
-__all__ = ["law_of_response"]
-
 _SIGNALS = ("zeta", "r", "u")
 
 

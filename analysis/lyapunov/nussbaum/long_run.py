@@ -17,8 +17,6 @@ from .outcome import Outcome, outcome
 from .property import Lobe, lobe_around
 from .slow_drift import SlowDrift, slow_drift
 
-__all__ = ["LOOKS", "LongRun", "long_run"]
-
 # From so many seconds of the run the rest is predicted, from windows of so many: whole periods of
 # the paper's reference, which lasts 4 pi.
 LOOKS = {200.0: 4 * np.pi, 1000.0: 16 * np.pi}

@@ -8,8 +8,6 @@ import numpy as np
 
 from .slow_drift import SlowDrift
 
-__all__ = ["REST_TOLERANCE", "Outcome", "outcome"]
-
 Outcome = Literal["held", "failed", "open"]
 REST_TOLERANCE = 0.01  # how far from the place that was forecast zeta may come to rest
 _STILL = 0.1  # share of it by which zeta may move from one window to the next, at rest

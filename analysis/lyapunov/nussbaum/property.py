@@ -22,17 +22,6 @@ from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
-__all__ = [
-    "Antiderivative",
-    "Lobe",
-    "NussbaumProperty",
-    "antiderivative",
-    "lobe_around",
-    "lobes",
-    "nussbaum_property",
-    "running_means",
-]
-
 GainFunction = Callable[[float], float]
 Antiderivative = Callable[[np.ndarray], np.ndarray]
 DENSE = 4096

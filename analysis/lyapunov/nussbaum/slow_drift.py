@@ -34,8 +34,6 @@ from .energy import Drift, drift
 from .law import law_of_response
 from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
-__all__ = ["Balance", "SlowDrift", "burst_peak", "slow_drift"]
-
 SAMPLED = 0.1  # mismatch beyond which the samples do not show that N is that of the law
 ERRORS, MODEL = 2.0, 0.05  # standard errors, and share of the time left, that the range allows
 BLOCKS = 5  # fits that leave one of so many parts out give the range of a prediction

@@ -28,8 +28,6 @@ from ..loop.content import LoopContent
 from ..loop.plant_form import Acceleration, acceleration
 from ..loop.roles import Roles
 
-__all__ = ["Demand", "FilteredLoop", "as_filtered", "between", "demand", "feedforward"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class FilteredLoop:

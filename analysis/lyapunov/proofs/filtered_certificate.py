@@ -19,8 +19,6 @@ from .filtered import Demand, FilteredLoop, demand
 from .result import Certificate, Row, per_second
 from .saved import Content, split_content, starts_content, texts
 
-__all__ = ["FilteredCertificate"]
-
 _WIDER = ((0.0, 1e-3), (0.0, 1e-5), (0.01, 1e-3), (0.05, 1e-3), (0.2, 1e-3))
 # relative: how far C is raised, and by how much bounds on its box
 _POLE = Fraction(1, 2**40)  # relative: half the width of an irrational pole

@@ -20,8 +20,6 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, only_declared
 from .result import Certificate, ProofResult
 
-__all__ = ["Closed", "ProofKind", "ProofOptions", "Subject", "certified", "wider", "without_end"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ProofOptions:

@@ -17,8 +17,6 @@ from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
 from .saved import Content, save_certificate
 
-__all__ = ["FROM_STARTS", "Certificate", "Constant", "ProofResult", "Provenance", "per_second"]
-
 FROM_STARTS = "all t, from the starts"
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 Row = tuple[str, Any, str, Any, str, str]  # the fields of a Constant in their order

@@ -31,8 +31,6 @@ from nlctl.native.ensemble import cores
 from ..uncertainty.design import Design, rows, seed_number
 from .experiment import Prepared, columns_of, evaluate, typed
 
-__all__ = ["LostChunkError", "chunk_table", "computed_elsewhere", "computed_here"]
-
 _LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
 

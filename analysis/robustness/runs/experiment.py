@@ -28,19 +28,6 @@ from ..stl.spec import Requirement, Spec, unfinished_margin
 from ..uncertainty.binding import diagrams, resolved
 from ..uncertainty.space import Space, arguments, checked_rows
 
-__all__ = [
-    "Columns",
-    "Experiment",
-    "Prepared",
-    "by_diagram",
-    "columns_of",
-    "compile_experiment_ahead",
-    "evaluate",
-    "prepare",
-    "simulate_rows",
-    "typed",
-]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True, eq=False)

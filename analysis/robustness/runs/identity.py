@@ -23,14 +23,6 @@ from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space
 from .experiment import Prepared
 
-__all__ = [
-    "differences_of",
-    "experiment_facts",
-    "identity_of",
-    "labels_text",
-    "versions_of_numbers",
-]
-
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
     Path(errors.__file__).parent: ("**/*.py",),

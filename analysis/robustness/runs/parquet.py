@@ -9,8 +9,6 @@ import pandas as pd
 
 from nlctl.errors import UsageError
 
-__all__ = ["parquet", "read_parquet"]
-
 
 def parquet() -> ModuleType:
     """Return ``pyarrow.parquet``; say what to install where it is missing."""

@@ -38,18 +38,6 @@ if TYPE_CHECKING:
 CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
-__all__ = [
-    "ChunkStore",
-    "StoreError",
-    "claimed",
-    "locked",
-    "opened",
-    "put",
-    "stored",
-    "table_of",
-    "taken_up",
-]
-
 
 class StoreError(UsageError):
     """A folder that a sweep cannot be kept in; the message names it and says what is kept.

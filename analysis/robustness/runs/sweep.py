@@ -28,8 +28,6 @@ from .identity import identity_of
 from .progress import Progress, Tally
 from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
 
-__all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
-
 _LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
 FEWEST = 20  # chunks of a sweep, so that a kill costs little
 _STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy

@@ -17,17 +17,6 @@ from ..uncertainty.lattice import corners
 from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = [
-    "Search",
-    "corner_count",
-    "evolve",
-    "in_batches",
-    "search_worst",
-    "some_corners",
-    "uniform",
-    "unit_places",
-]
-
 _SHARE = 4
 """Corners, and uniform draws, take one part in this many of the runs each."""
 BATCH = 64

@@ -22,8 +22,6 @@ from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import arguments, checked_row
 from .evaluation import as_table
 
-__all__ = ["TIGHTER", "Confirmation", "confirm"]
-
 TIGHTER = 100.0
 """Tolerances are divided by this."""
 _OTHERS = ("tsit5", "rodas5p")

@@ -14,8 +14,6 @@ from ..uncertainty.space import Space, from_unit_cube
 from .candidates import GENERATION, Search, evolve, in_batches, some_corners, uniform, unit_places
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
-__all__ = ["search_with_derivatives", "test_signals"]
-
 _DRAWS = 4
 """Corners, and uniform draws, of each round."""
 _GENERATIONS = 2

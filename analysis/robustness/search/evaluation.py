@@ -14,8 +14,6 @@ from nlctl.errors import ParameterError
 from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space, moved, nominal
 
-__all__ = ["Evaluate", "as_table", "evaluated", "margins_of", "row_text", "towards_nominal"]
-
 Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
 """Takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
 ``functools.partial(evaluate, prepared)``."""

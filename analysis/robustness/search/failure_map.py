@@ -19,8 +19,6 @@ from ..uncertainty.design import affordable, with_row_numbers
 from ..uncertainty.space import Space, ends, from_unit_cube, nominal
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = ["FailureMap", "boundary", "failure_map"]
-
 _Cell = tuple[int, int, int]
 """Lower left corner and side, in steps of the finest grid."""
 CLOSE = 0.5

@@ -20,8 +20,6 @@ from scipy.optimize import linprog
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
 
-__all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
-
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
 _NESTED = 60  # arguments of a largest value of windows that are followed

@@ -19,8 +19,6 @@ from ..uncertainty.space import Space, combinations, nominal, scaled
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
 from .worst_case import worst_case
 
-__all__ = ["Radius", "robustness_radius", "size_of"]
-
 START = 1 / 16
 """Smallest size that is searched first, as a part of the largest; then twice that, and so on."""
 _SMALLEST = 1e-3

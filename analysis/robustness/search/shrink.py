@@ -18,8 +18,6 @@ from nlctl.wording import counted, some_of
 from ..uncertainty.space import Space, checked_row, nominal
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
 
-__all__ = ["Shrunk", "shrink"]
-
 _Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
 

@@ -18,24 +18,6 @@ from nlctl.wording import counted, some_of
 from ..stl.spec import violates
 from ..uncertainty.design import Design
 
-__all__ = [
-    "Margins",
-    "NoGuaranteeError",
-    "Side",
-    "Violation",
-    "check_iid",
-    "checked_confidence",
-    "clopper_pearson",
-    "design_assumptions",
-    "least_count",
-    "rounded_down",
-    "rounded_up",
-    "runs_needed",
-    "series_of",
-    "violation_probability",
-    "violations_of",
-]
-
 Side = Literal["upper", "lower", "both"]
 Margins = Sequence[float] | np.ndarray | pd.Series
 MOST_RUNS = 10**9

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import special, stats
 
-__all__ = ["independence_test"]
-
 MOST_TABLES = 200_000
 """Up to so many tables are enumerated; of more, so many are drawn."""
 PERMUTATIONS = 99_999

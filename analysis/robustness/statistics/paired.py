@@ -20,17 +20,6 @@ from ..stl.spec import violates
 from ..uncertainty.design import Design
 from .guarantee import Margins, check_iid, checked_confidence, series_of
 
-__all__ = [
-    "TRUSTED_ROWS",
-    "Better",
-    "differences",
-    "holm",
-    "mcnemar",
-    "mean_is_trusted",
-    "median_interval",
-    "wins",
-]
-
 Better = Literal["smaller", "larger"]
 BCA_ROWS = 5000
 """Up to so many rows the bootstrap is corrected for bias and acceleration."""

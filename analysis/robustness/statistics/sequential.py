@@ -23,15 +23,6 @@ from .guarantee import (
     violations_of,
 )
 
-__all__ = [
-    "SequentialTest",
-    "confidence_sequence",
-    "decide",
-    "decision",
-    "log_evidence",
-    "sequence_bounds",
-]
-
 PRIOR = 0.5
 """Both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')."""
 

@@ -18,8 +18,6 @@ import numpy as np
 
 from .formula import Always, And, Band, Formula, horizon
 
-__all__ = ["conjunction"]
-
 
 def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
     """Return formulas whose margins have that of `formula` as the least, at the start.

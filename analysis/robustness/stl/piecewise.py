@@ -14,8 +14,6 @@ from nlctl.native.machine.machine_code import kept
 
 from ...metrics.curves import path, turning_points
 
-__all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_vertices"]
-
 
 @dataclass(frozen=True)
 class Trace:

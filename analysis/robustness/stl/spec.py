@@ -20,16 +20,6 @@ from .formula import HOW, Formula, SampledSignals, horizon, margin_trace, signal
 from .limits import limits_of_requirements
 from .parts import conjunction
 
-__all__ = [
-    "FAILED",
-    "Requirement",
-    "Spec",
-    "margin",
-    "margins",
-    "unfinished_margin",
-    "violates",
-]
-
 FAILED = 1e6
 """No margin of a run that reached its end is below -FAILED, and none of another run above it."""
 _PIECES = 16  # of a window, where a requirement is taken apart

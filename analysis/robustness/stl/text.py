@@ -29,8 +29,6 @@ from .formula import (
     looks_ahead,
 )
 
-__all__ = ["parse_formula"]
-
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
 _TOKEN = re.compile(

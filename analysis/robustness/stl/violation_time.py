@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from .formula import Always, And, Formula, SampledSignals, horizon, margin_trace
 from .spec import Requirement, checked_breaks, margin
 
-__all__ = ["ViolationTime", "violation_time"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ViolationTime:

@@ -25,8 +25,6 @@ from nlctl.upstream.control_internals import is_system
 from .quantity import SpaceError, Uncertain
 from .space import Space, combinations
 
-__all__ = ["check_keyword", "diagrams", "owner_of", "resolved"]
-
 
 @as_annotated
 def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:

@@ -17,20 +17,6 @@ from nlctl.names import unknown
 
 from .quantity import Choice, SpaceError, Uncertain
 
-__all__ = [
-    "Space",
-    "arguments",
-    "checked_row",
-    "checked_rows",
-    "combinations",
-    "ends",
-    "from_quantiles",
-    "from_unit_cube",
-    "moved",
-    "nominal",
-    "scaled",
-]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,6 @@ from ..mrac import ModelReferenceLaw
 from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 from .dynamic_surface import DynamicSurface
 
-__all__ = ["dynamic_surface_control"]
-
 
 @as_annotated
 def dynamic_surface_control(

@@ -9,8 +9,6 @@ from ...errors import ParameterError
 from ...params import param, record
 from ...plants import coordinate_names
 
-__all__ = ["DynamicSurface"]
-
 
 @equation
 def surfaces(x, u, p):

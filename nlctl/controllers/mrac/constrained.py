@@ -13,8 +13,6 @@ from ...plants import coordinate_names
 from .model_error import check_error_gains, lyapunov_matrix, seen_error
 from .reference_model import model_state_names
 
-__all__ = ["ConstrainedError", "ConstrainedLaw"]
-
 
 @record
 class ConstrainedLaw:

@@ -14,8 +14,6 @@ from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from .reference_model import model_state_names
 
-__all__ = ["ModelError", "check_error_gains", "lyapunov_matrix", "seen_error"]
-
 
 def lyapunov_matrix(K: tuple[float, ...], Q: tuple[float, ...]) -> np.ndarray:
     """Return P of A^T P + P A = -diag(Q), shape (n, n), where E' = A E is E_n' = -K^T E."""

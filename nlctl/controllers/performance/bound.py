@@ -6,8 +6,6 @@ import numpy as np
 
 from ...equations import equation
 
-__all__ = ["performance_bound"]
-
 
 @equation
 def performance_bound(t, rho_0, rho_inf, decay):

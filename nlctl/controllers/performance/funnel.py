@@ -11,8 +11,6 @@ from ...plants import coordinate_names
 from ...references import derivative_names
 from .bound import performance_bound
 
-__all__ = ["FunnelControl"]
-
 
 @equation
 def barrier_gain(w):

@@ -10,8 +10,6 @@ from ...params import param, record
 from ...plants import coordinate_names
 from .bound import performance_bound
 
-__all__ = ["PrescribedPerformance"]
-
 
 @equation
 def transformed_error(xi):

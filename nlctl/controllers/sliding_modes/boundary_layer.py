@@ -13,8 +13,6 @@ from ...functions import clip
 from ...params import param, record
 from ..filtered_error import FilteredError
 
-__all__ = ["SlidingModeLaw", "sliding_mode"]
-
 
 @record
 class SlidingModeLaw:

@@ -16,8 +16,6 @@ from .reductions import norm_of, prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, of
 
-__all__ = ["enter_scipy"]
-
 
 @functools.cache
 def enter_scipy() -> None:

@@ -30,15 +30,6 @@ from .nodes import Node
 from .tearing import first_loop, tear
 from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
-__all__ = [
-    "AlgebraicLoop",
-    "AlgebraicLoopError",
-    "Combination",
-    "Schedule",
-    "Signal",
-    "schedule",
-]
-
 
 @dataclass(frozen=True, kw_only=True)
 class AlgebraicLoop:

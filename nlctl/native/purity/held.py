@@ -18,8 +18,6 @@ import numpy as np
 
 from .outside import outside_of
 
-__all__ = ["NAMED", "OPAQUE", "held_by", "inherited"]
-
 OPAQUE = "\2"
 """Begins a text that names what nobody can see into."""
 NAMED = "\3"

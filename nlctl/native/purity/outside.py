@@ -12,8 +12,6 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
-__all__ = ["asked_outside", "imports_in", "outside_of"]
-
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named
     "time": ("the time", _EVERYTHING),

@@ -29,8 +29,6 @@ from .sampled import SampledRun
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Stepper", "StepperState", "stepper"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StepperState:
