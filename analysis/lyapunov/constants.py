@@ -332,10 +332,7 @@ def _error_entries(
     d: Range, eps: Range, box: Box, times: tuple[float, float], n: int
 ) -> list[Constant]:
     at = f"{box}, t in [{times[0]:g}, {times[1]:g}] s"
-    rows = (
-        ("d*", d, "sup |d(x, t)|", at),
-        ("eps*", eps, "sup |g - W^T psi|", str(box)),
-    )
+    rows = (("d*", d, "sup |d(x, t)|", at), ("eps*", eps, "sup |g - W^T psi|", str(box)))
     return [
         Constant(
             symbol=symbol,

@@ -9,14 +9,7 @@ from math import ceil, floor, inf
 from statistics import fmean
 
 from .order import LayoutPlan, side
-from .records import (
-    EXTERNAL,
-    GRID,
-    LANE_WIDTH,
-    ROW_GAP,
-    Heights,
-    LayoutNode,
-)
+from .records import EXTERNAL, GRID, LANE_WIDTH, ROW_GAP, Heights, LayoutNode
 
 
 @dataclass(frozen=True)
@@ -137,10 +130,7 @@ def _half_for_inlets(plan: LayoutPlan, n: int) -> float:
 
 
 def _straightened(
-    plan: LayoutPlan,
-    centre: Sequence[float],
-    half: Sequence[float],
-    offset: Heights,
+    plan: LayoutPlan, centre: Sequence[float], half: Sequence[float], offset: Heights
 ) -> list[float]:
     """Centres moved a little where that turns a bent arrow into a straight one."""
     cell = [(place.band, place.column) for place in plan.places]

@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from statistics import fmean
 
-from .records import (
-    EXTERNAL,
-    GridCell,
-    LayoutNode,
-    Links,
-    Wire,
-)
+from .records import EXTERNAL, GridCell, LayoutNode, Links, Wire
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,7 @@ from ..arguments import number
 from ..blocks import Block
 from ..delays.transport import PAST
 from ..diagrams import supplied_blocks
-from ..errors import (
-    CompileError,
-    InexactWarning,
-    ParameterError,
-    UnknownKeywordError,
-    UsageError,
-)
+from ..errors import CompileError, InexactWarning, ParameterError, UnknownKeywordError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed

@@ -59,11 +59,7 @@ def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
 
 
 def _step(
-    at: np.ndarray,
-    here: Worth,
-    others: list[tuple[np.ndarray, Worth]],
-    reach: float,
-    effort: float,
+    at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float, effort: float
 ) -> tuple[np.ndarray, float]:
     """Return the best step within reach if margins were linear, and what it promises.
 

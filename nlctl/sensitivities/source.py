@@ -23,15 +23,7 @@ from ..native.equations.blocks import Equations, equations
 from ..native.sliding.pieces import replaced_parts
 from ..sliding.relay import SLIDING
 from .branches import jumping
-from .directions import (
-    Direction,
-    SomeRows,
-    from_time,
-    one_sided,
-    rows_replaced,
-    slopes,
-    taken,
-)
+from .directions import Direction, SomeRows, from_time, one_sided, rows_replaced, slopes, taken
 from .kinks import only_bends
 from .schedule import Extended
 

@@ -384,8 +384,5 @@ def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
 
 
 BARRIER = ProofKind(
-    name="barrier",
-    about="starts and states that are unsafe",
-    result=Barrier,
-    find="barrier",
+    name="barrier", about="starts and states that are unsafe", result=Barrier, find="barrier"
 )

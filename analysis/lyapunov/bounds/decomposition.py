@@ -137,11 +137,7 @@ def check_gain(who: str, k: Any) -> None:
 
 @as_annotated
 def decompose(
-    actuator: Any,
-    *,
-    k: tuple[float, float] | None = None,
-    u_max: float = 60.0,
-    tol: float = 1e-4,
+    actuator: Any, *, k: tuple[float, float] | None = None, u_max: float = 60.0, tol: float = 1e-4
 ) -> Decomposition:
     """Split an actuator as v = k u + eps_u and bound k and eps_u.
 

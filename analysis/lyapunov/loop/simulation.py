@@ -177,10 +177,7 @@ def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any
 
 
 def _reference(
-    loop: ct.InterconnectedSystem,
-    parts: Parts,
-    response: Any,
-    signals: Signals,
+    loop: ct.InterconnectedSystem, parts: Parts, response: Any, signals: Signals
 ) -> Margin | None:
     """Compare the reference's derivatives with those of its own outputs."""
     states = np.asarray(response.states)[: loop.nstates or 0]

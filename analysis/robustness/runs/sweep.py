@@ -339,9 +339,7 @@ class _Run:
             self.decided = self.stop(self.tally.progress()) or None
 
     def through(
-        self,
-        chunks: Iterator[tuple[range, pd.DataFrame]],
-        keep: Callable[[pd.DataFrame], object],
+        self, chunks: Iterator[tuple[range, pd.DataFrame]], keep: Callable[[pd.DataFrame], object]
     ) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
         self.report()

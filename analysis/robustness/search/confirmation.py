@@ -144,12 +144,7 @@ def confirm(
 
 
 def _replay(
-    engine: str,
-    experiment: Experiment,
-    status: str,
-    time: float,
-    margin: float,
-    method: str = "",
+    engine: str, experiment: Experiment, status: str, time: float, margin: float, method: str = ""
 ) -> dict[str, Any]:
     return {
         "engine": engine,

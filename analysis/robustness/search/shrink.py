@@ -67,12 +67,7 @@ class Shrunk:
 
 @as_annotated
 def shrink(
-    evaluate: Evaluate,
-    space: Space,
-    row: Mapping[str, Any],
-    *,
-    steps: int = 10,
-    most: int = 2000,
+    evaluate: Evaluate, space: Space, row: Mapping[str, Any], *, steps: int = 10, most: int = 2000
 ) -> Shrunk:
     """Set as much of a violating row back to nominal as the violation bears.
 

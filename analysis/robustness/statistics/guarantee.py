@@ -245,10 +245,7 @@ def least_count(
 
 @as_annotated
 def violation_probability(
-    design: Design,
-    margins: Margins,
-    confidence: float = 0.99,
-    side: Side = "upper",
+    design: Design, margins: Margins, confidence: float = 0.99, side: Side = "upper"
 ) -> Violation:
     """Bound the probability of a violation from all runs of a design.
 

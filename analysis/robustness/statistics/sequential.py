@@ -91,10 +91,7 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
 
 
 def _zero(
-    excess: Callable[[float], float],
-    inside: float,
-    outside: float,
-    scale: Callable[[float], float],
+    excess: Callable[[float], float], inside: float, outside: float, scale: Callable[[float], float]
 ) -> float:
     """Return where excess(p) changes sign between two places; p = scale(place)."""
     if excess(scale(outside)) <= 0:  # a confidence next to 1
@@ -131,11 +128,7 @@ class SequentialTest:
 
 
 @as_annotated
-def confidence_sequence(
-    design: Design,
-    margins: Margins,
-    confidence: float = 0.99,
-) -> Violation:
+def confidence_sequence(design: Design, margins: Margins, confidence: float = 0.99) -> Violation:
     """Bound the probability of a violation from the runs that are done, at any time.
 
     Parameters
@@ -191,10 +184,7 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
 
 @as_annotated
 def decide(
-    design: Design,
-    margins: Margins,
-    threshold: float,
-    confidence: float = 0.99,
+    design: Design, margins: Margins, threshold: float, confidence: float = 0.99
 ) -> SequentialTest:
     """Test whether the probability of a violation is below or above a threshold.
 

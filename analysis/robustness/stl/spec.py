@@ -280,11 +280,7 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
 
 @as_annotated
 def margins(
-    spec: Spec,
-    t: np.ndarray,
-    signals: Mapping[str, np.ndarray],
-    *,
-    breaks: ArrayLike | None = None,
+    spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray], *, breaks: ArrayLike | None = None
 ) -> dict[str, float]:
     """Return the margin of every requirement by key, and the least of them as ``"spec"``.
 

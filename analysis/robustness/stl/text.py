@@ -19,15 +19,7 @@ from collections.abc import Callable, Sequence
 
 from nlctl.errors import ParameterError
 
-from .formula import (
-    And,
-    Formula,
-    always,
-    begins_window,
-    eventually,
-    in_band,
-    looks_ahead,
-)
+from .formula import And, Formula, always, begins_window, eventually, in_band, looks_ahead
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"

@@ -6,14 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..codegen.ir.text import Body, Value, constant, llvm_type
-from .rounding import (
-    downwards,
-    larger,
-    product_downwards,
-    product_upwards,
-    smaller,
-    upwards,
-)
+from .rounding import downwards, larger, product_downwards, product_upwards, smaller, upwards
 
 NAN = float("nan")
 

@@ -269,11 +269,7 @@ def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: End
 
 
 def _bound(
-    w: EnclosureWriter,
-    expr: Expr,
-    at_centre: Ends,
-    slopes: Sequence[Ends],
-    steps: Sequence[_Step],
+    w: EnclosureWriter, expr: Expr, at_centre: Ends, slopes: Sequence[Ends], steps: Sequence[_Step]
 ) -> Value:
     """Return the upper bound of a result: by its value and by the mean-value form.
 

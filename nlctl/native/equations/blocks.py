@@ -69,10 +69,7 @@ class _Events(NamedTuple):
 
 
 def equations(
-    schedule: Schedule,
-    layout: Any,
-    p: np.ndarray | None = None,
-    meetings: Sequence[Happening] = (),
+    schedule: Schedule, layout: Any, p: np.ndarray | None = None, meetings: Sequence[Happening] = ()
 ) -> Equations:
     """Write a schedule as expressions."""
     system = schedule.system

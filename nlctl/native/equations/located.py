@@ -139,10 +139,7 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 
 
 def _undeclared(
-    reader: Reader,
-    rates: Sequence[Tracer],
-    guards: Mapping[int, Tracer],
-    watched: Sequence[Expr],
+    reader: Reader, rates: Sequence[Tracer], guards: Mapping[int, Tracer], watched: Sequence[Expr]
 ) -> Iterable[tuple[Expr, Node | None]]:
     """Yield the conditions of blocks that do not declare theirs, each with its block.
 

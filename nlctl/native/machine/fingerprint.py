@@ -41,11 +41,7 @@ _MACHINERY = (
     types.MemberDescriptorType,
     types.GetSetDescriptorType,
     types.WrapperDescriptorType,
-) + (
-    types.ClassMethodDescriptorType,
-    types.MethodDescriptorType,
-    property,
-)
+) + (types.ClassMethodDescriptorType, types.MethodDescriptorType, property)
 RUNNERS = {"eval", "exec", "__import__"}
 FINDERS = {"globals", "vars", *RUNNERS}
 READERS = {"open", "loadtxt", "genfromtxt", "fromfile", "memmap", "loadmat", "read_csv"} | {

@@ -67,11 +67,7 @@ def held_grid(start: float, dt: float, first: int) -> np.ndarray:
 
 
 def first_window(
-    compiled: Compiled,
-    span: tuple[float, float],
-    x0: np.ndarray,
-    p: np.ndarray,
-    settings: Settings,
+    compiled: Compiled, span: tuple[float, float], x0: np.ndarray, p: np.ndarray, settings: Settings
 ) -> Window:
     """Return the window in which a run begins at ``span[0]`` with steps of ``span[1]``."""
     times = held_grid(*span, 0)

@@ -14,13 +14,7 @@ import numpy as np
 
 from ..enclosures.address import call_enclosure
 from ..machine.machine_code import kept
-from .intervals import (
-    AS_NUMPY,
-    down,
-    interval_product,
-    power_of_time,
-    up,
-)
+from .intervals import AS_NUMPY, down, interval_product, power_of_time, up
 
 _TRIES = 2  # of what the rest may be, for one step size
 
