@@ -18,7 +18,7 @@ from flint import arb, fmpq
 from nlctl.expressions.functions import FUNCTIONS
 
 from .arithmetic import Ball, as_ball
-from .numpy_functions import NumPyFunctions
+from .numpy_functions import NumPyFunctions, of_lifted
 from .paths import Undecided
 
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
@@ -142,31 +142,15 @@ class Sum(NumPyFunctions):
     def __neg__(self) -> Sum:
         return Sum({product: -c for product, c in self.terms.items()}, self.partial)
 
-    def __pos__(self) -> Sum:
-        return self
-
+    @of_lifted
     def __add__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         terms = dict(self.terms)
         for product, c in other.terms.items():
             terms[product] = terms.get(product, Fraction(0)) + c
         return Sum(terms, self.partial | other.partial)
 
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Any:
-        other = as_sum(other)
-        return other if other is NotImplemented else self + -other
-
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
-
+    @of_lifted
     def __mul__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         terms: dict[Product, Fraction] = {}
         for one, c in self.terms.items():
             for two, d in other.terms.items():
@@ -174,19 +158,12 @@ class Sum(NumPyFunctions):
                 terms[product] = terms.get(product, Fraction(0)) + c * d
         return Sum(terms, self.partial | other.partial)
 
-    __rmul__ = __mul__
-
+    @of_lifted
     def __truediv__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         constant = other.coefficient(_ONE)
         if other.key() == {(_ONE, constant)} and not other.partial:
             return self * (1 / constant)
         return self * other._function("inverse")
-
-    def __rtruediv__(self, other: object) -> Any:
-        return as_sum(other) / self
 
     def __pow__(self, n: Any) -> Sum:
         if isinstance(n, NumPyFunctions) or n != int(n):
