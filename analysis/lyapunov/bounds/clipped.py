@@ -12,10 +12,10 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import number
 from nlctl.functions import clip
 
+from ...intervals.agreement import UNREAD, reads_time
 from ...intervals.arithmetic import Ball, as_ball, common
 from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
 from ...intervals.quotient import slope_in
-from ...intervals.time_dependence import UNREAD, reads_time
 
 _UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
 Edge = Callable[[Any, Any], Any]

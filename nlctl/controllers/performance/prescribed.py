@@ -8,7 +8,12 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record
 from ...plants import coordinate_names
-from .bound import performance_bound
+
+
+@equation
+def performance_bound(t, rho_0, rho_inf, decay):
+    """Performance function rho(t) = (rho_0 - rho_inf) exp(-decay t) + rho_inf."""
+    return (rho_0 - rho_inf) * np.exp(-decay * t) + rho_inf
 
 
 @equation

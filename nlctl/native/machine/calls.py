@@ -10,6 +10,9 @@ function is not called again for that member.
 from __future__ import annotations
 
 import ctypes
+import linecache
+import sys
+import types
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,9 +24,8 @@ import numpy as np
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
 from ..opaque.calls import Call, Source
-from .fingerprint import module_key
+from .fingerprint import Sourced, module_key, program_key
 from .machine_code import Wanted, machine_code_if_taken
-from .module import loaded
 
 _ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
@@ -165,3 +167,21 @@ def at_{call.name}(c, at, lane):
             table[at + {failed + 1} + i, lane] = given[i]
     for i in range({count}):
         table[at + {given} + i, lane] = y[i]""".splitlines()
+
+
+def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
+    """Return the program as a module, made of its own source.
+
+    It is registered under the program's key, by which machine code that was kept finds it, and its
+    lines are known to tracebacks.
+    """
+    name = f"nlctl_program_{program_key(program)}"
+    file = f"<{name}>"
+    lines = program.source.splitlines(keepends=True)
+    linecache.cache[file] = (len(program.source), None, lines, file)
+    module = types.ModuleType(name)
+    module.__file__ = file
+    module.__dict__.update(program.namespace(native=True) | dict(functions))
+    exec(compile(program.source, file, "exec"), module.__dict__)
+    sys.modules[name] = module  # machine code looks its globals up there
+    return module

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -10,10 +12,59 @@ import numpy as np
 from ..enclosures.writer import LANES
 from ..machine.machine_code import kept
 from .intervals import AS_NUMPY, add_image, add_product, down, interval_product, power_of_time, up
-from .monomials import monomials
 from .series import SeriesCode
 from .sets import box_of_set, next_errors, next_polynomials, renewed, slopes_within
 from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonomialTable:
+    """The monomials of degree 1 to some degree.
+
+    Attributes
+    ----------
+    degrees : ndarray of shape (monomials,)
+        The first ones are the variables themselves.
+    even : ndarray of shape (monomials,)
+        Whether it is never negative.
+    products : ndarray of shape (pairs, 3)
+        Numbers of two monomials and of their product, as far as that is one.
+    has : ndarray of shape (monomials, variables)
+        Whether a variable is in it.
+    """
+
+    degrees: np.ndarray
+    even: np.ndarray
+    products: np.ndarray
+    has: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """All of it."""
+        return self.degrees, self.even, self.products, self.has
+
+
+@functools.lru_cache(maxsize=16)
+def monomials(variables: int, degree: int) -> MonomialTable:
+    """Return all monomials of so many variables."""
+    powers = [
+        tuple(chosen.count(v) for v in range(variables))
+        for total in range(1, degree + 1)
+        for chosen in itertools.combinations_with_replacement(range(variables), total)
+    ]
+    numbers = {power: i for i, power in enumerate(powers)}
+    sums = (
+        (i, j, numbers.get(tuple(a + b for a, b in zip(p, q, strict=True))))
+        for (p, i), (q, j) in itertools.product(numbers.items(), repeat=2)
+        if sum(p) + sum(q) <= degree
+    )
+    return MonomialTable(
+        degrees=np.array([sum(p) for p in powers], dtype=np.int64),
+        even=np.array([all(a % 2 == 0 for a in p) for p in powers]),
+        products=np.array([*sums], dtype=np.int64).reshape(-1, 3),
+        has=np.array(powers) > 0,
+    )
+
 
 REACHED, LEAVES, MUST_LEAVE, STUCK = range(4)
 FIRST_ORDER, SET_DEGREE, TOLERANCE = 6, 4, 1e-8
