@@ -154,7 +154,10 @@ class Sum(NumPyFunctions):
         terms: dict[Product, Fraction] = {}
         for one, c in self.terms.items():
             for two, d in other.terms.items():
-                product = _times(one, two)
+                powers = dict(one)
+                for atom, n in two:
+                    powers[atom] = powers.get(atom, 0) + n
+                product = frozenset(powers.items())
                 terms[product] = terms.get(product, Fraction(0)) + c * d
         return Sum(terms, self.partial | other.partial)
 
@@ -211,13 +214,6 @@ class Sum(NumPyFunctions):
         undefined = frozenset([] if name in EVERYWHERE else [atom])
         partial = undefined.union(self.partial, *(argument.partial for argument in others))
         return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)
-
-
-def _times(one: Product, two: Product) -> Product:
-    powers = dict(one)
-    for atom, n in two:
-        powers[atom] = powers.get(atom, 0) + n
-    return frozenset(powers.items())
 
 
 def exact(number: Any) -> Fraction:

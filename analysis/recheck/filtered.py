@@ -44,7 +44,8 @@ class Filtered:
                 continue
             slowest = Fraction(0)
             for _, w, _ in sines:
-                slowest = _common_divisor(slowest, w)
+                low = math.gcd(slowest.numerator * w.denominator, w.numerator * slowest.denominator)
+                slowest = Fraction(low, slowest.denominator * w.denominator)
             need(slowest > 0, f"|yd^({k})| <= {float(most):.6g}")
             period = (PI_ENCLOSED * TWO / Interval.of(slowest)).top
             box = {"t": Interval.of(0, period)}
@@ -137,11 +138,6 @@ def _horner(coefficients: Sequence[Fraction], s: Fraction) -> Fraction:
     for c in coefficients:
         total = total * s + c
     return total
-
-
-def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
-    low = math.gcd(a.numerator * b.denominator, b.numerator * a.denominator)
-    return Fraction(low, a.denominator * b.denominator)
 
 
 def _derivative(sines: Iterable[tuple[Fraction, Fraction, Fraction]], k: int) -> WrittenEquation:

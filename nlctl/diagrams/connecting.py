@@ -350,7 +350,10 @@ def connected_by_lists(
     def connected(systems: Any, inputs: Any, outputs: Any, name: str | None) -> Any:
         given = outlist
         if outlist is None and outputs is None:
-            given, outputs = _every_output(systems)
+            every = [(s, label) for s in systems for label in s.output_labels]
+            count = Counter(label for _, label in every)
+            names = [label if count[label] == 1 else f"{s.name}_{label}" for s, label in every]
+            given, outputs = [(s.name, label) for s, label in every], names
         try:
             diagram = ct.interconnect(
                 systems, connections, inplist, given, inputs=inputs or None, outputs=outputs,
@@ -393,14 +396,6 @@ def _is_there(signal: str, labels: Any) -> bool:
     """Whether there is a signal of that name, or several by ``"y[0:2]"`` or ``"y"``."""
     base = signal.partition("[")[0]
     return signal in labels or any(label.partition("[")[0] == base for label in labels)
-
-
-def _every_output(systems: Sequence[Any]) -> tuple[list[Any], list[str]]:
-    """Return every output of every block, and names that are different."""
-    every = [(s, label) for s in systems for label in s.output_labels]
-    count = Counter(label for _, label in every)
-    names = [label if count[label] == 1 else f"{s.name}_{label}" for s, label in every]
-    return [(s.name, label) for s, label in every], names
 
 
 def _check_fed(diagram: Any) -> None:

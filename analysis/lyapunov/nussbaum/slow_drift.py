@@ -408,7 +408,13 @@ def _forecast(
     p = max(slope, 0.0) ** 3 / (slope**2 + of_slope**2) if slope else 0.0
 
     def lasts(rate: float, slope: float) -> float:
-        return _duration(Balance(p=slope, q=slope * centre - rate, residual=0.0), zeta, N, lobe)
+        balance = Balance(p=slope, q=slope * centre - rate, residual=0.0)
+        if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
+            return np.inf
+        slowest = balance.rate(N(zeta) if zeta > lobe.place else lobe.extremum)
+        if not slowest > 0:
+            return np.inf
+        return quad(lambda z: abs(N(z)) / balance.rate(N(z)), zeta, lobe.high, limit=200)[0]
 
     slopes = {max(p - ERRORS * of_slope, 0.0), p, max(slope + ERRORS * of_slope, 0.0)}
     moved = [lasts(mean + s * of_mean, q) for s in (-ERRORS, ERRORS) for q in slopes]
@@ -422,13 +428,3 @@ def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]
     of_slope = np.sqrt((BLOCKS - 1) * np.var(slopes))
     freedom = max(rates.size - 2, 1)
     return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))
-
-
-def _duration(balance: Balance, zeta: float, N: GainFunction, lobe: Lobe) -> float:
-    """Time until the budget is spent by the balance: int |N| dzeta / A'."""
-    if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
-        return np.inf
-    slowest = balance.rate(N(zeta) if zeta > lobe.place else lobe.extremum)
-    if not slowest > 0:
-        return np.inf
-    return quad(lambda z: abs(N(z)) / balance.rate(N(z)), zeta, lobe.high, limit=200)[0]

@@ -287,10 +287,6 @@ def _check(
         integer("a sweep", "threads", threads, at_least=1)
     if nothing_kept:
         raise ParameterError("a sweep needs a folder to resume, got none")
-    _check_space(prepared, design)
-
-
-def _check_space(prepared: Prepared, design: Design) -> None:
     names, given = prepared.experiment.space.names, design.space.names
     for name in given:
         if name not in names:

@@ -130,19 +130,14 @@ _FORMULAS = {
 def _whole(name: str) -> Any:
     def written(graph: Graph, x: Any) -> Any:
         value = traced(graph, x)
-        _finite(graph, value)
+        if value.shape:
+            raise Untraceable("a function of math of an array")
+        finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
+        if finite.op != "const":
+            graph.guards.append(finite)
         return whole_numbers(graph, elementwise(graph, name, value))
 
     return written
-
-
-def _finite(graph: Graph, value: Tracer) -> None:
-    """Note that Python raises an error where a number is none."""
-    if value.shape:
-        raise Untraceable("a function of math of an array")
-    finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
-    if finite.op != "const":
-        graph.guards.append(finite)
 
 
 of(math.floor)(_whole("floor"))

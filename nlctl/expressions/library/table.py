@@ -135,16 +135,12 @@ def of_ufunc(
     if where is not True:
         if out is None:
             raise Untraceable("where= without out=: what is not computed is arbitrary")
-        return _where(graph, written, arguments, out, where)
+        out[...] = elementwise(graph, "select", where, written(*arguments), out)
+        return out
     result = written(*arguments)
     if out is None:
         return result
     out[...] = result
-    return out
-
-
-def _where(graph: Graph, written: Any, arguments: Any, out: Any, where: Any) -> Any:
-    out[...] = elementwise(graph, "select", where, written(*arguments), out)
     return out
 
 

@@ -110,7 +110,14 @@ def until(window: Window, k: int) -> Run:
     """Return the run of a window that ends where step `k` does."""
     run = _ending_at(window, window.place(k) + 2)
     if window.reach.size:
-        _move_cells(window, run.task.timed.reach[0], window.place(k) + 2)
+        reach = run.task.timed.reach[0]
+        last = window.place(k) + 2
+        times, count = window.times, reach.size
+        part = (times[last - 1] - times[0]) / (times[-1] - times[0])
+        begin = (times[last - 2] - times[0]) / (times[last - 1] - times[0])
+        cells = np.arange(int(begin * count), count)
+        old = ((cells + 1) * part).astype(np.int64)  # at their ends, where a step leads farthest
+        reach[cells] = window.reach[np.minimum(old, count - 1)]
     return run
 
 
@@ -128,16 +135,6 @@ def _ending_at(window: Window, last: int) -> Run:
     if not is_jit_disabled():
         return window.run
     return replace(window.run, task=task._replace(times=window.times[:last]))
-
-
-def _move_cells(window: Window, reach: np.ndarray, last: int) -> None:
-    """Have the cells that a step begins in be those of the times up to where it ends."""
-    times, count = window.times, reach.size
-    part = (times[last - 1] - times[0]) / (times[-1] - times[0])
-    begin = (times[last - 2] - times[0]) / (times[last - 1] - times[0])
-    cells = np.arange(int(begin * count), count)
-    old = ((cells + 1) * part).astype(np.int64)  # at their ends, where a step leads farthest
-    reach[cells] = window.reach[np.minimum(old, count - 1)]
 
 
 def following(

@@ -78,7 +78,10 @@ def series_code(rates: Sequence[Expr]) -> SeriesCode:
         found = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
     except NoSeriesError as error:
         raise Untraceable(str(error)) from None
-    _refuse_cases(graph)
+    for node in graph.nodes:
+        row = FUNCTIONS.get(node.op)
+        if node.op in _CHOICES or (row is not None and row.series == "steady"):
+            raise Untraceable("they have cases, kinks or jumps")
     rows = found.rows
     sizes = {"b": rows["k"], **{name: rows[name] for name in ("a", "q", "o", "w")}, "x": 4 * n}
     at, end = {}, 0
@@ -110,14 +113,6 @@ def _with_derivatives(graph: Graph, rates: Sequence[Expr]) -> list[Expr]:
 
     first = along(rates, {0: 1}.get)
     return [*rates, *first, *along(rates, {0: 2}.get), *along(first, {0: 2, 1: 3}.get)]
-
-
-def _refuse_cases(graph: Graph) -> None:
-    """Refuse what has no derivatives of every order somewhere."""
-    for node in graph.nodes:
-        row = FUNCTIONS.get(node.op)
-        if node.op in _CHOICES or (row is not None and row.series == "steady"):
-            raise Untraceable("they have cases, kinks or jumps")
 
 
 def _code(
