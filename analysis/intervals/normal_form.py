@@ -79,14 +79,6 @@ def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
 class Sum(NumPyFunctions):
     """A sum of products of atoms, as equations compute with it.
 
-    Attributes
-    ----------
-    terms : dict
-        Rational coefficient of every product, a set of pairs (atom, power); none is 0.
-    partial : frozenset of Atom
-        Atoms without a value somewhere, or with a jump, which took part even if they have
-        cancelled: the sum is what the equation is only where they have a value.
-
     Examples
     --------
     A difference that is 0 whatever x is:
@@ -105,7 +97,10 @@ class Sum(NumPyFunctions):
     def __init__(
         self, terms: Mapping[Product, Fraction], partial: frozenset[Atom] = frozenset()
     ) -> None:
+        # rational coefficient of every product, a set of pairs (atom, power); none is 0
         self.terms = {product: c for product, c in terms.items() if c}
+        # atoms without a value somewhere, or with a jump, which took part even if they have
+        # cancelled: the sum is what the equation is only where they have a value
         self.partial = partial
 
     def __repr__(self) -> str:

@@ -20,12 +20,7 @@ from .paths import undecided
 
 
 class Rate(NumPyFunctions):
-    """A quantity and its rate.
-
-    Attributes
-    ----------
-    here, rate : Ball
-    """
+    """A quantity and its rate."""
 
     __slots__ = ("here", "rate")
     rank = 1

@@ -39,20 +39,13 @@ _MOST = 64  # power
 
 
 class Written(NumPyFunctions):
-    """A quantity of an equation, as its place in a list of operations.
-
-    Attributes
-    ----------
-    nodes : list
-        Operations, each a name with numbers, symbols, or places before it.
-    place : int
-    """
+    """A quantity of an equation, as its place in a list of operations."""
 
     __slots__ = ("nodes", "place")
     rank = 2
 
     def __init__(self, nodes: list[list[Any]], place: int) -> None:
-        self.nodes = nodes
+        self.nodes = nodes  # operations, each a name with numbers, symbols, or places before it
         self.place = place
 
     def _node(self, *node: Any) -> Written:

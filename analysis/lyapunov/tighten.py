@@ -43,22 +43,13 @@ OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 @dataclass(frozen=True, kw_only=True)
 class TrialBound:
-    """One set of gains that the search tried.
+    """One set of gains that the search tried."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name.
-    C_0, ultimate : float
-        Bounds of the proof with the tightest W on the set that the run visits, eps* on a grid.
-    u : float
-        max |u| along the run; infinite if it diverged.
-    """
-
-    gains: dict[str, float]
+    gains: dict[str, float]  # values by qualified name
+    # bounds of the proof with the tightest W on the set that the run visits, eps* on a grid
     C_0: float
     ultimate: float
-    u: float
+    u: float  # max |u| along the run; infinite if it diverged
 
 
 @dataclass(frozen=True, kw_only=True)

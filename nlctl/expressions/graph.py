@@ -90,32 +90,19 @@ class OpenCondition(BaseException):  # (what is traced may catch exceptions)
 
 
 class Graph:
-    """All expressions of a diagram.
-
-    Attributes
-    ----------
-    nodes : list of Expr
-    limit : int
-        Largest number of expressions for now.
-    decisions : dict
-        What is taken to hold on the path through a function that is being traced.
-    implied : dict
-        What follows from that.
-    assumptions : dict
-        Integer parameters that steer what is computed: place in `p`, and value.
-    lengths : dict
-        Sizes of the arrays that are read, as far as known: nothing is read beyond.
-    guards : list of Expr
-        Conditions without which Python would have raised an error on this path.
-    """
+    """All expressions of a diagram."""
 
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
-        self.limit = UNLIMITED
+        self.limit = UNLIMITED  # largest number of expressions for now
+        # sizes of the arrays that are read, as far as known: nothing is read beyond
         self.lengths = dict(lengths or {})
+        # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
+        # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
-        self.implied: dict[Expr, bool] = {}
+        self.implied: dict[Expr, bool] = {}  # what follows from that
+        # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
 

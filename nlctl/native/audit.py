@@ -64,34 +64,19 @@ class AuditError(UsageError):
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """A run that is to be compared.
+    """A run that is to be compared."""
 
-    Attributes
-    ----------
-    time : ndarray of shape (m,)
-    states, inputs : ndarray of shape (nstates, m), (ninputs, m)
-    p : ndarray
-        The program's parameter vector.
-    params : mapping or None
-        The same parameters as python-control takes them.
-    width : int
-        Members that the machine code of the run takes.
-    meetings : tuple of frozenset
-        What may happen to sampled blocks in that machine code.
-    relays : mapping
-        What ideal relays output at a point, by the number of their blocks.
-    apart : Apart or None
-        The diagram that python-control evaluates, with the parameters of this run.
-    """
-
-    time: np.ndarray
+    time: np.ndarray  # shape (m,)
+    # shape (nstates, m)
     states: np.ndarray
     inputs: np.ndarray
-    p: np.ndarray
-    params: Mapping[str, Any] | None
-    width: int
-    meetings: tuple[Happening, ...] = ()
+    p: np.ndarray  # the program's parameter vector
+    params: Mapping[str, Any] | None  # the same parameters as python-control takes them
+    width: int  # members that the machine code of the run takes
+    meetings: tuple[Happening, ...] = ()  # what may happen to sampled blocks in that machine code
+    # what ideal relays output at a point, by the number of their blocks
     relays: Mapping[int, float] = field(default_factory=dict)
+    # the diagram that python-control evaluates, with the parameters of this run
     apart: Apart | None = None
 
     def of(self, thing: object) -> Any:

@@ -42,18 +42,12 @@ _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 @dataclass(frozen=True, kw_only=True)
 class Tangent:
-    """The derivatives of a diagram's equations along a direction.
+    """The derivatives of a diagram's equations along a direction."""
 
-    Attributes
-    ----------
-    rows : mapping
-        For ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
-        pairs of an expression, None where it is 0, and its length.
-    assumed : mapping
-        Integer parameters for whose values this holds: place in the parameter vector, and value.
-    """
-
+    # for ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
+    # pairs of an expression, None where it is 0, and its length
     rows: Mapping[str, Sequence[tuple[Expr | None, int]]]
+    # integer parameters for whose values this holds: place in the parameter vector, and value
     assumed: Mapping[int, int]
 
 

@@ -37,43 +37,24 @@ ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "
 
 @dataclass(frozen=True, kw_only=True)
 class Lowered:
-    """A program over batched members ("lanes").
+    """A program over batched members ("lanes")."""
 
-    Attributes
-    ----------
-    functions : mapping
-        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``,
-        ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
-        sampled blocks, or ``point(t, x, u, c)`` and then, as often as there are directions,
-        ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
-        column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
-        parameters `p` alone; the rest of `c` is room that the others write to, so members that
-        run at the same time need a `c` each.
-    exact : frozenset of Expr
-        Operations that are rounded one by one.
-    calls : mapping
-        Functions that are called as they stand, by name.
-    solvers : mapping
-        Searches for the signals of algebraic loops, by name.
-    rows : mapping
-        Rows of every array.
-    lanes : int
-        Number of members.
-    conditions : Conditions
-        What it switches at.
-    assumed : mapping
-        Integer parameters that steer what is computed: for places in `p` the values for which the
-        program holds.
-    """
-
+    # plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``, ``out(t,
+    # x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of sampled
+    # blocks, or ``point(t, x, u, c)`` and then, as often as there are directions, ``along(t, x, u,
+    # c, v, dx)``.  All arrays have a row per number and a column per member, `t` is one row.
+    # `prepare` fills `c` with all that depends on the parameters `p` alone; the rest of `c` is room
+    # that the others write to, so members that run at the same time need a `c` each
     functions: Mapping[str, Function]
-    exact: frozenset[Expr]
-    calls: Mapping[str, Call]
-    solvers: Mapping[str, Solver]
-    rows: Mapping[str, int]
-    lanes: int
+    exact: frozenset[Expr]  # operations that are rounded one by one
+    calls: Mapping[str, Call]  # functions that are called as they stand, by name
+    solvers: Mapping[str, Solver]  # searches for the signals of algebraic loops, by name
+    rows: Mapping[str, int]  # rows of every array
+    lanes: int  # number of members
+    # integer parameters that steer what is computed: for places in `p` the values for which the
+    # program holds
     assumed: Mapping[int, int]
-    conditions: Conditions = field(default_factory=Conditions)
+    conditions: Conditions = field(default_factory=Conditions)  # what it switches at
 
     @property
     def size(self) -> int:

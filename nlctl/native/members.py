@@ -25,21 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Members:
-    """What differs between the runs of an ensemble.
-
-    Attributes
-    ----------
-    compiled : Compiled
-    params, states : mapping
-        Values by name, each one number or an array with an entry per member.
-    size : int
-        Number of members.
-    """
+    """What differs between the runs of an ensemble."""
 
     compiled: Compiled
+    # values by name, each one number or an array with an entry per member
     params: Mapping[str, np.ndarray]
     states: Mapping[str, np.ndarray]
-    size: int
+    size: int  # number of members
 
     def batch(self, numbers: range, width: int) -> tuple[np.ndarray, np.ndarray]:
         """Return initial states (states, width) and parameter vectors (parameters, width).

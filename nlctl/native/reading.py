@@ -27,26 +27,13 @@ _RESOLVING = threading.Lock()
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reading:
-    """A diagram as it was read.
+    """A diagram as it was read."""
 
-    Attributes
-    ----------
-    schedule : Schedule
-        What was read from the diagram.
-    program : Program
-        The arrays that machine code takes and fills.
-    original : control.InputOutputSystem or None
-        The diagram itself; none in another process.
-    apart : Apart or None
-        The copy of it that was read, in which runs write their parameters.
-    cache : Cache
-        What has been made of it, such as machine code.
-    """
-
-    schedule: Schedule
-    program: Program
-    original: Any = None
-    apart: Apart | None = None
+    schedule: Schedule  # what was read from the diagram
+    program: Program  # the arrays that machine code takes and fills
+    original: Any = None  # the diagram itself; none in another process
+    apart: Apart | None = None  # the copy of it that was read, in which runs write their parameters
+    # what has been made of it, such as machine code
     cache: Cache = field(init=False, repr=False, default_factory=Cache)
 
     @property

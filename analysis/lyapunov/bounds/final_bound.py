@@ -16,34 +16,22 @@ KAPPA = 0.2785
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """Gains of the controller (23)-(25), and where it starts.
+    """Gains of the controller (23)-(25), and where it starts."""
 
-    Attributes
-    ----------
-    beta : float
-        Gain of r, (23).
-    Gamma, sigma_1 : float
-        Adaptation gain and sigma-modification of W_hat, (25).
-    gamma, sigma_2, tau : float
-        Adaptation gain, sigma-modification and width of the robust term, (25).
-    r_0, delta_hat_0 : float
-        r(0) and delta_hat(0).
-    W_hat_0 : tuple of float
-        W_hat(0); empty where there is no network.
-    b : float
-        Width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta +
-        0.2785 b; 0 for eta of (23).
-    """
-
-    beta: float
+    beta: float  # gain of r, (23)
+    # adaptation gain and sigma-modification of W_hat, (25)
     Gamma: float
     sigma_1: float
+    # adaptation gain, sigma-modification and width of the robust term, (25)
     gamma: float
     sigma_2: float
     tau: float
+    # r(0) and delta_hat(0)
     r_0: float
     delta_hat_0: float
-    W_hat_0: tuple[float, ...]
+    W_hat_0: tuple[float, ...]  # w_hat(0); empty where there is no network
+    # width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta + 0.2785
+    # b; 0 for eta of (23)
     b: float = 0.0
 
 

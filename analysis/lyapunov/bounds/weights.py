@@ -30,20 +30,11 @@ LARGEST_NORM = 1e5  # |W|^2 = 1e10 has a rounding error of 1e-6 in double precis
 
 @dataclass(frozen=True, kw_only=True)
 class Network:
-    """The network and the function that it approximates, on a grid.
+    """The network and the function that it approximates, on a grid."""
 
-    Attributes
-    ----------
-    psi : ndarray of shape (m, l)
-        Basis functions at the m grid points.
-    g : ndarray of shape (m,)
-        g(x) = f(x, 0).
-    points : ndarray of shape (m, n)
-    """
-
-    psi: np.ndarray
-    g: np.ndarray
-    points: np.ndarray
+    psi: np.ndarray  # shape (m, l); basis functions at the m grid points
+    g: np.ndarray  # shape (m,); g(x) = f(x, 0)
+    points: np.ndarray  # shape (m, n)
 
     def error(self, W: np.ndarray) -> float:
         """Return max |g - W^T psi| over the grid: a lower bound of eps*."""

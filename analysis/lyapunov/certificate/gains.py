@@ -28,21 +28,11 @@ _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 
 @dataclass(frozen=True, kw_only=True)
 class GainCandidate:
-    """One set of gains that the search tried.
+    """One set of gains that the search tried."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name.
-    C_0 : float
-        Bound of |r|, from a table of delta* over C: close to what `certify` proves.
-    u : float
-        max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made.
-    """
-
-    gains: dict[str, float]
-    C_0: float
-    u: float
+    gains: dict[str, float]  # values by qualified name
+    C_0: float  # bound of |r|, from a table of delta* over C: close to what `certify` proves
+    u: float  # max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,20 +45,12 @@ _AGREE = 1e-3  # relative distance beyond which a response is not one of the loo
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """Where a run starts, and its parameters, both by qualified name.
-
-    Attributes
-    ----------
-    start, params : mapping
-    times : ndarray of shape (m,)
-    expected : control.TimeResponseData or None
-        A response that the run must reproduce.
-    """
+    """Where a run starts, and its parameters, both by qualified name."""
 
     start: Mapping[str, float]
     params: Mapping[str, Any]
-    times: np.ndarray
-    expected: Any = None
+    times: np.ndarray  # shape (m,)
+    expected: Any = None  # a response that the run must reproduce
 
     @property
     def options(self) -> str:

@@ -31,21 +31,13 @@ GROWTH = 1.5  # what a quantity must gain from the middle of the range to its en
 
 @dataclass(frozen=True, kw_only=True)
 class Lobe:
-    """The stretch between two neighbouring zeros of N.
+    """The stretch between two neighbouring zeros of N."""
 
-    Attributes
-    ----------
-    low, high : float
-        Its ends: zeros of N, or ends of the range that was searched.
-    integral : float
-        Integral of N from `low` to `high`.
-    place, extremum : float
-        Where |N| is largest, and the value of N there.
-    """
-
+    # its ends: zeros of N, or ends of the range that was searched
     low: float
     high: float
-    integral: float
+    integral: float  # integral of N from `low` to `high`
+    # where |N| is largest, and the value of N there
     place: float
     extremum: float
 

@@ -75,19 +75,12 @@ BLOCKS = 5  # fits that leave one of so many parts out give the range of a predi
 
 @dataclass(frozen=True, kw_only=True)
 class Balance:
-    """The fitted law of the drift, A' = p / |N| - q.
+    """The fitted law of the drift, A' = p / |N| - q."""
 
-    Attributes
-    ----------
-    p, q : float
-        Fitted to the mean rates over the windows, by least squares.
-    residual : float
-        Root mean square of what the fit leaves, in the unit of the rate (1/s).
-    """
-
+    # fitted to the mean rates over the windows, by least squares
     p: float
     q: float
-    residual: float
+    residual: float  # root mean square of what the fit leaves, in the unit of the rate (1/s)
 
     def rate(self, N: float) -> float:
         """Rate A' (1/s) at a value of N."""

@@ -32,33 +32,16 @@ class Store:
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionPlan:
-    """What is computed when.
+    """What is computed when."""
 
-    Attributes
-    ----------
-    known : mapping
-        Expressions that lie in memory when the function begins, and where: (array, row).
-    nodes : tuple of Expr
-        Everything that is needed, in an order in which it can be computed.
-    level : dict
-        When each is known.
-    stored : dict
-        Vectors that lie in memory, and where: (array, row).
-    loops : dict
-        For every loop its vectors and sums, in order.
-    stores : tuple of Store
-        Everything to be written, the vectors in memory included.
-    rows : int
-        Rows of memory that are taken, those before included.
-    """
-
+    # expressions that lie in memory when the function begins, and where: (array, row)
     known: Mapping[Expr, tuple[str, int]]
-    nodes: tuple[Expr, ...]
-    level: dict[Expr, int]
-    stored: dict[Expr, tuple[str, int]]
-    loops: dict[_Loop, list[Expr]]
-    stores: tuple[Store, ...]
-    rows: int
+    nodes: tuple[Expr, ...]  # everything that is needed, in an order in which it can be computed
+    level: dict[Expr, int]  # when each is known
+    stored: dict[Expr, tuple[str, int]]  # vectors that lie in memory, and where: (array, row)
+    loops: dict[_Loop, list[Expr]]  # for every loop its vectors and sums, in order
+    stores: tuple[Store, ...]  # everything to be written, the vectors in memory included
+    rows: int  # rows of memory that are taken, those before included
 
     @cached_property
     def levels(self) -> tuple[Level, ...]:
@@ -136,20 +119,11 @@ class Level:
 
 @dataclass(frozen=True, kw_only=True)
 class Function:
-    """One function of a program.
+    """One function of a program."""
 
-    Attributes
-    ----------
-    arguments : tuple of str
-        The arrays that it reads and writes.
-    plan : Plan
-    copied : int
-        So many rows of the first array are copied to the second before anything else.
-    """
-
-    arguments: tuple[str, ...]
+    arguments: tuple[str, ...]  # the arrays that it reads and writes
     plan: FunctionPlan
-    copied: int = 0
+    copied: int = 0  # so many rows of the first array are copied to the second before anything else
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:

@@ -20,23 +20,12 @@ from .nodes import Node
 
 @dataclass(frozen=True, kw_only=True)
 class Slot:
-    """One number, vector or matrix in the parameter vector.
+    """One number, vector or matrix in the parameter vector."""
 
-    Attributes
-    ----------
-    name : str
-        Qualified name for nlctl's blocks; path and key for third-party ones.
-    offset : int
-        Where it begins.
-    shape : tuple of int
-    kind : str
-        ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean.
-    """
-
-    name: str
-    offset: int
+    name: str  # qualified name for nlctl's blocks; path and key for third-party ones
+    offset: int  # where it begins
     shape: tuple[int, ...]
-    kind: str
+    kind: str  # ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean
 
     @property
     def size(self) -> int:

@@ -27,35 +27,18 @@ _MOST = 40  # ways in which clocks meet
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """The arrays of a program.
+    """The arrays of a program."""
 
-    Attributes
-    ----------
-    layout : mapping
-        For every block the places of its parameters in the flat vector `p`.
-    fixed : mapping
-        For every block its parameters that are no numbers.
-    switching : int
-        Number of switching functions.
-    memory : tuple of int
-        Indices of the memory states.
-    guards : tuple of int
-        Of each guard, in their order, the block that it belongs to.
-    jumping : tuple of tuple
-        Of each block with guards its number, and where its states begin and end.
-    sampled : tuple of int
-        Indices of the states of sampled blocks.
-    clocks : mapping
-        Of these blocks, as they were when the diagram was compiled, by their owners.
-    """
-
+    # for every block the places of its parameters in the flat vector `p`
     layout: Mapping[int, Mapping[str, Slot]]
-    fixed: Mapping[int, Mapping[str, Any]]
-    switching: int
-    memory: tuple[int, ...]
-    guards: tuple[int, ...] = ()
+    fixed: Mapping[int, Mapping[str, Any]]  # for every block its parameters that are no numbers
+    switching: int  # number of switching functions
+    memory: tuple[int, ...]  # indices of the memory states
+    guards: tuple[int, ...] = ()  # of each guard, in their order, the block that it belongs to
+    # of each block with guards its number, and where its states begin and end
     jumping: tuple[tuple[int, int, int], ...] = ()
-    sampled: tuple[int, ...] = ()
+    sampled: tuple[int, ...] = ()  # indices of the states of sampled blocks
+    # of these blocks, as they were when the diagram was compiled, by their owners
     clocks: Mapping[Any, Clock] = field(default_factory=dict)
 
     @cached_property

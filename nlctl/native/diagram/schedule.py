@@ -34,63 +34,36 @@ from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
 
 @dataclass(frozen=True, kw_only=True)
 class AlgebraicLoop:
-    """Signals that depend on each other at the same instant and are solved for together.
+    """Signals that depend on each other at the same instant and are solved for together."""
 
-    Attributes
-    ----------
-    start, stop : int
-        The part of the order that is repeated until the signals fit.
-    torn : tuple of Signal
-        Signals that are guessed: with these, all others of the loop follow.
-    """
-
+    # the part of the order that is repeated until the signals fit
     start: int
     stop: int
-    torn: tuple[Signal, ...]
+    torn: tuple[Signal, ...]  # signals that are guessed: with these, all others of the loop follow
 
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """A flattened diagram.
+    """A flattened diagram."""
 
-    Attributes
-    ----------
-    system : control.InputOutputSystem
-        The diagram that was read.
-    nodes : tuple of Node
-        Blocks in the order of the state vector.
-    order : tuple of int
-        Indices of the blocks in the order of their evaluation.  A block comes more than once if
-        some of its outputs are needed before all of its inputs are known.
-    unknown : tuple of frozenset of int
-        For every entry of `order` the inputs of the block that are not known yet.
-    outputs : tuple of mappings
-        Linear combination of signals that makes each output of the diagram, and then of what
-        arrives at each line.
-    lines : tuple of Signal
-        Outputs of transport delays.  A run gives them as further inputs.
-    loops : tuple of Loop
-        Parts of the order that are solved for; empty unless that was asked for.
-    captured : tuple of Captured
-        What the blocks' functions read from around them.
-    samplings : tuple of Node
-        What says how blocks are sampled: without signals, but with parameters.
-    watched : tuple of Watched
-        Functions of the run whose changes of sign are events.
-    overrides : mapping
-        Parameters that they get.
-    """
-
-    system: Any
-    nodes: tuple[Node, ...]
+    system: Any  # the diagram that was read
+    nodes: tuple[Node, ...]  # blocks in the order of the state vector
+    # indices of the blocks in the order of their evaluation.  A block comes more than once if some
+    # of its outputs are needed before all of its inputs are known
     order: tuple[int, ...]
+    # for every entry of `order` the inputs of the block that are not known yet
     unknown: tuple[frozenset[int], ...]
+    # linear combination of signals that makes each output of the diagram, and then of what arrives
+    # at each line
     outputs: tuple[Combination, ...]
+    # parts of the order that are solved for; empty unless that was asked for
     loops: tuple[AlgebraicLoop, ...]
-    captured: tuple[Captured, ...]
+    captured: tuple[Captured, ...]  # what the blocks' functions read from around them
+    # what says how blocks are sampled: without signals, but with parameters
     samplings: tuple[Node, ...] = ()
-    watched: tuple[Watched, ...] = ()
-    overrides: Mapping[str, Any] = field(default_factory=dict)
+    watched: tuple[Watched, ...] = ()  # functions of the run whose changes of sign are events
+    overrides: Mapping[str, Any] = field(default_factory=dict)  # parameters that they get
+    # outputs of transport delays.  A run gives them as further inputs
     lines: tuple[Signal, ...] = ()
 
     @property

@@ -13,22 +13,13 @@ NAN = float("nan")
 
 @dataclass(frozen=True, kw_only=True)
 class Ends:
-    """An interval in every lane; or what is known of a truth value.
+    """An interval in every lane; or what is known of a truth value."""
 
-    Attributes
-    ----------
-    low, high : Value
-        Its ends.  Of a truth value: whether it surely holds, and whether it possibly does.
-    point : float or None
-        Of a constant, what it is.
-    not_negative : bool
-        Whether no lane has a lower end below 0, whatever the box is.
-    """
-
+    # its ends.  Of a truth value: whether it surely holds, and whether it possibly does
     low: Value
     high: Value
-    point: float | None = None
-    not_negative: bool = False
+    point: float | None = None  # of a constant, what it is
+    not_negative: bool = False  # whether no lane has a lower end below 0, whatever the box is
 
     @property
     def values(self) -> tuple[Value, Value]:

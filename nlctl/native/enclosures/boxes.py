@@ -25,29 +25,14 @@ from .writer import LANES, JudgedRows, enclosure_text
 
 @dataclass(frozen=True, kw_only=True)
 class BoxCode:
-    """Machine code for functions of a box.
+    """Machine code for functions of a box."""
 
-    Attributes
-    ----------
-    sides : int
-        Of the box.
-    expressions : tuple of Expr
-        Numbers, each a function of the sides.
-    rows : JudgedRows
-        Of what `judge` writes.
-    loaded : Loaded
-    lanes : int
-        Boxes at a time.
-    fixed : int
-        So many of the last sides are numbers, and have no width.
-    """
-
-    sides: int
-    expressions: tuple[Expr, ...]
-    rows: JudgedRows
+    sides: int  # of the box
+    expressions: tuple[Expr, ...]  # numbers, each a function of the sides
+    rows: JudgedRows  # of what `judge` writes
     loaded: Loaded
-    lanes: int = LANES
-    fixed: int = 0
+    lanes: int = LANES  # boxes at a time
+    fixed: int = 0  # so many of the last sides are numbers, and have no width
 
     @property
     def judge(self) -> int:

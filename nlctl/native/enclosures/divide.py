@@ -17,44 +17,25 @@ _PARTS = 16  # into which it is divided, whatever their number
 
 @dataclass(frozen=True, kw_only=True)
 class BoxVerdict:
-    """What became of the claim that the least of some functions is at most a bound on a box.
+    """What became of the claim that the least of some functions is at most a bound on a box."""
 
-    Attributes
-    ----------
-    holds : bool or None
-        None: undecided.
-    boxes, undecided : int
-        Boxes judged, and those that stayed undecided.
-    point : ndarray
-        Where it is refuted, or the centre of an undecided box; not a number along sides without
-        an end.
-    value : float
-        The least of the functions at a point that refutes it, rounded down.
-    """
-
-    holds: bool | None
+    holds: bool | None  # none: undecided
+    # boxes judged, and those that stayed undecided
     boxes: int
     undecided: int
+    # where it is refuted, or the centre of an undecided box; not a number along sides without an
+    # end
     point: np.ndarray
-    value: float
+    value: float  # the least of the functions at a point that refutes it, rounded down
 
 
 @dataclass(frozen=True, kw_only=True)
 class Supremum:
-    """A supremum between two numbers.
+    """A supremum between two numbers."""
 
-    Attributes
-    ----------
-    high : float
-        No value is above it: infinite where that has no proof.
-    attained : float
-        A lower bound of a value at a point; see `supremum` for sides without an end.
-    boxes, unbounded : int
-        Boxes judged, and those left without a bound.
-    """
-
-    high: float
-    attained: float
+    high: float  # no value is above it: infinite where that has no proof
+    attained: float  # a lower bound of a value at a point; see `supremum` for sides without an end
+    # boxes judged, and those left without a bound
     boxes: int
     unbounded: int
 

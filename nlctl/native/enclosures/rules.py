@@ -39,21 +39,13 @@ _PI_UP = math.nextafter(math.pi, 4.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Monotone:
-    """A function that rises or falls.
-
-    Attributes
-    ----------
-    rises : bool
-    domain, values : tuple of float
-        Where it is defined, and bounds of what it gives.
-    odd : bool
-        Whether its value has the sign of its argument.
-    """
+    """A function that rises or falls."""
 
     rises: bool = True
+    # where it is defined, and bounds of what it gives
     domain: tuple[float, float] = (-_INF, _INF)
     values: tuple[float, float] = (-_INF, _INF)
-    odd: bool = False
+    odd: bool = False  # whether its value has the sign of its argument
 
 
 MONOTONE = {

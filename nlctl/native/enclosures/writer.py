@@ -52,14 +52,9 @@ _INF = float("inf")
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedRows:
-    """Where `judge` writes what it finds, in rows of one number per lane.
+    """Where `judge` writes what it finds, in rows of one number per lane."""
 
-    Attributes
-    ----------
-    sides, results : int
-        Of the box, and of the function.
-    """
-
+    # of the box, and of the function
     sides: int
     results: int
 
@@ -111,21 +106,12 @@ def values_text(results: Sequence[Expr], lanes: int = LANES) -> str:
 
 
 class EnclosureWriter:
-    """Writes enclosures of expressions; `names` says what each is called so far.
-
-    Attributes
-    ----------
-    b : Body
-    lanes : int
-    names : dict
-    jumps : dict
-        Where an expression may jump for a reason of its own.
-    """
+    """Writes enclosures of expressions; `names` says what each is called so far."""
 
     def __init__(self, b: Body, lanes: int) -> None:
         self.b, self.lanes = b, lanes
         self.names: dict[Expr, Ends] = {}
-        self.jumps: dict[Expr, Value] = {}
+        self.jumps: dict[Expr, Value] = {}  # where an expression may jump for a reason of its own
 
     def write(self, exprs: Sequence[Expr]) -> None:
         """Compute expressions, and all that they are made of."""

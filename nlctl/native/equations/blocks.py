@@ -27,31 +27,19 @@ from .watched import watched_conditions
 
 @dataclass(frozen=True, kw_only=True)
 class Equations:
-    """What a diagram computes.
-
-    Attributes
-    ----------
-    graph : Graph
-    results : dict
-        For ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be
-        written there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each
-        meeting, and for ``"reset"`` the states after jumps of all blocks with guards, if any.
-    calls : dict
-        Opaque functions by name.
-    solvers : dict
-        Searches for the signals of algebraic loops, by name.
-    fixed_points : dict
-        By the same names: what the blocks of a loop make of the signals found, in their
-        expressions; they are equal to these.
-    conditions : Conditions
-        What the equations switch at, and no block declares.
-    """
+    """What a diagram computes."""
 
     graph: Graph
+    # for ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be written
+    # there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting, and
+    # for ``"reset"`` the states after jumps of all blocks with guards, if any
     results: dict[str, list[tuple[int, Tracer]]]
-    calls: dict[str, Call]
-    solvers: dict[str, Solver]
+    calls: dict[str, Call]  # opaque functions by name
+    solvers: dict[str, Solver]  # searches for the signals of algebraic loops, by name
+    # by the same names: what the blocks of a loop make of the signals found, in their expressions;
+    # they are equal to these
     fixed_points: dict[str, list[Expr]]
+    # what the equations switch at, and no block declares
     conditions: Conditions = field(default_factory=Conditions)
 
     def pieces(self, name: str) -> list[tuple[Expr, int]]:

@@ -23,24 +23,12 @@ _BENDS = ("absolute", "minimum", "maximum")
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
-    """One condition of the equations that is located.
+    """One condition of the equations that is located."""
 
-    Attributes
-    ----------
-    function : Expr
-        Its switching function: a change of sign is an event.
-    block : str
-        The block in whose equations it stands.
-    what : str
-        The operation.
-    bends : bool
-        Whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`.
-    """
-
-    function: Expr
-    block: str
-    what: str
-    bends: bool
+    function: Expr  # its switching function: a change of sign is an event
+    block: str  # the block in whose equations it stands
+    what: str  # the operation
+    bends: bool  # whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`
 
     @property
     def rows(self) -> int:
@@ -50,27 +38,15 @@ class Located:
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """What the right-hand side of a diagram switches at, beyond what its blocks declare.
+    """What the right-hand side of a diagram switches at, beyond what its blocks declare."""
 
-    Attributes
-    ----------
-    located : tuple of Located
-        First those that only bend, then those at which something may jump.
-    of_time : tuple of Expr
-        Conditions of t alone, which are solved before a run.
-    waves : tuple of tuple
-        Of products of sines of t the angular frequencies of the factors.
-    pulses : tuple of Expr
-        Other functions of t alone that drive the equations.
-    beyond : int
-        Conditions that are too many to be located.
-    """
-
+    # first those that only bend, then those at which something may jump
     located: tuple[Located, ...] = ()
-    of_time: tuple[Expr, ...] = ()
+    of_time: tuple[Expr, ...] = ()  # conditions of t alone, which are solved before a run
+    # of products of sines of t the angular frequencies of the factors
     waves: tuple[tuple[Expr, ...], ...] = ()
-    pulses: tuple[Expr, ...] = ()
-    beyond: int = 0
+    pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
+    beyond: int = 0  # conditions that are too many to be located
 
     @property
     def rows(self) -> int:

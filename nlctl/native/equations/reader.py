@@ -39,47 +39,29 @@ def _labels(blocks: Sequence[Node]) -> list[str]:
 
 @dataclass(kw_only=True)
 class Reader:
-    """Reads blocks one after the other.
-
-    Attributes
-    ----------
-    graph : Graph
-    layout : mapping
-    blocks : sequence of Node
-    p : ndarray or None
-        Values of integer parameters; None for those that the blocks have now.
-    signals : dict
-        Outputs of the blocks that have been read.
-    guesses : dict
-        What stands for signals that are being solved for.
-    solved : list of Tracer
-        Signals that have been.
-    calls, solvers, fixed_points : dict
-        By name.
-    what : frozenset of Moment
-        What happens to sampled blocks.
-    samplings : mapping
-        Where in the layout the parameters of a sampling are, by its identity.
-    supplied : mapping
-        Outputs of blocks that these alone cannot compute: of transport delays, further inputs of
-        the program; of ideal relays, what follows from the rates of the diagram.
-    moving : mapping
-        a and b of the rates u' = a + b v of the inputs of ideal relays.
-    """
+    """Reads blocks one after the other."""
 
     graph: Graph
     layout: Any
     blocks: Sequence[Node]
+    # values of integer parameters; None for those that the blocks have now
     p: np.ndarray | None = None
+    # outputs of the blocks that have been read
     signals: dict[int, Tracer] = field(default_factory=dict)
+    # what stands for signals that are being solved for
     guesses: dict[Signal, Tracer] = field(default_factory=dict)
-    solved: list[Tracer] = field(default_factory=list)
+    solved: list[Tracer] = field(default_factory=list)  # signals that have been
+    # by name
     calls: dict[str, Call] = field(default_factory=dict)
     solvers: dict[str, Solver] = field(default_factory=dict)
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
-    what: Happening = frozenset()
+    what: Happening = frozenset()  # what happens to sampled blocks
+    # where in the layout the parameters of a sampling are, by its identity
     samplings: Mapping[int, int] = field(default_factory=dict)
+    # outputs of blocks that these alone cannot compute: of transport delays, further inputs of the
+    # program; of ideal relays, what follows from the rates of the diagram
     supplied: Mapping[int, Tracer] = field(default_factory=dict)
+    # a and b of the rates u' = a + b v of the inputs of ideal relays
     moving: Mapping[int, Tracer] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:

@@ -35,23 +35,12 @@ CALL_FAILED = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Native:
-    """C functions of opaque functions.
+    """C functions of opaque functions."""
 
-    Attributes
-    ----------
-    symbols : mapping
-        Addresses by name.
-    owners : tuple
-        What these belong to.
-    called_back : tuple of str
-        Names of those that call back into Python.
-    raised : dict
-        What functions in Python have raised, by the place of their rows and the member.
-    """
-
-    symbols: Mapping[str, int] = field(default_factory=dict)
-    owners: tuple[Any, ...] = ()
-    called_back: tuple[str, ...] = ()
+    symbols: Mapping[str, int] = field(default_factory=dict)  # addresses by name
+    owners: tuple[Any, ...] = ()  # what these belong to
+    called_back: tuple[str, ...] = ()  # names of those that call back into Python
+    # what functions in Python have raised, by the place of their rows and the member
     raised: dict[tuple[int, int], BaseException] = field(default_factory=dict)
 
     def error(self, call: Call, c: np.ndarray, row: int, lane: int) -> BaseException:

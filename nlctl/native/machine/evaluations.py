@@ -21,33 +21,20 @@ ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
-    """Functions over `width` members, with the member as the last index of every array.
-
-    Attributes
-    ----------
-    width : int
-    lowered : Lowered
-        The plan that they are made from.
-    prepare : callable
-        ``prepare(p, c)`` fills these from the program's parameter vectors.
-    rhs, out : callable
-        ``rhs(t, x, u, c, dx, g, m)`` and ``out(t, x, u, c, y)``.
-    samples : tuple of callable
-        ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
-    resets : callable or None
-        ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump.
-    meetings : tuple of frozenset
-        What happens to them there.
-    """
+    """Functions over `width` members, with the member as the last index of every array."""
 
     width: int
-    lowered: Lowered
+    lowered: Lowered  # the plan that they are made from
+    # ``prepare(p, c)`` fills these from the program's parameter vectors
     prepare: Callable[[np.ndarray, np.ndarray], None]
+    # ``rhs(t, x, u, c, dx, g, m)`` and ``out(t, x, u, c, y)``
     rhs: Any
     out: Any
+    # ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks
     samples: tuple[Any, ...] = ()
+    # ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump
     resets: Any = None
-    meetings: tuple[Happening, ...] = ()
+    meetings: tuple[Happening, ...] = ()  # what happens to them there
 
     @property
     def rows(self) -> int:

@@ -35,20 +35,11 @@ from .fingerprint import function_key
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A function that is to be machine code.
+    """A function that is to be machine code."""
 
-    Attributes
-    ----------
-    function : callable
-        Plain Python.
-    signature : numba signature
-    options : mapping
-        Of `numba.njit`.
-    """
-
-    function: Callable[..., Any]
+    function: Callable[..., Any]  # plain Python
     signature: Any
-    options: Mapping[str, Any]
+    options: Mapping[str, Any]  # of `numba.njit`
 
 
 def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:

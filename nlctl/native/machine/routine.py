@@ -21,18 +21,10 @@ from .finish import Loaded, finished
 
 @dataclass(frozen=True, kw_only=True)
 class Opaque:
-    """A call of an opaque function within a program.
-
-    Attributes
-    ----------
-    call : Call
-    row : int
-        Where it begins in `c`.
-    native : Native
-    """
+    """A call of an opaque function within a program."""
 
     call: Call
-    row: int
+    row: int  # where it begins in `c`
     native: Native
 
     def check(self, c: np.ndarray) -> None:
@@ -44,23 +36,12 @@ class Opaque:
 
 @dataclass(frozen=True, kw_only=True)
 class Routine:
-    """A C function of arrays of floats.
-
-    Attributes
-    ----------
-    address : int
-    shapes : tuple
-        Shapes of its arrays: nothing else may be given to it.
-    loaded : Loaded
-        What the address belongs to.
-    opaque : tuple of Opaque
-        What it calls.
-    """
+    """A C function of arrays of floats."""
 
     address: int
-    shapes: tuple[tuple[int, ...], ...]
-    loaded: Loaded
-    opaque: tuple[Opaque, ...]
+    shapes: tuple[tuple[int, ...], ...]  # shapes of its arrays: nothing else may be given to it
+    loaded: Loaded  # what the address belongs to
+    opaque: tuple[Opaque, ...]  # what it calls
 
     def __call__(self, *arrays: np.ndarray) -> None:
         self.bound(*arrays)()

@@ -25,21 +25,11 @@ _OF_PARTIALS = ("func", "args", "keywords")
 
 @dataclass(frozen=True)
 class Captured:
-    """One value.
+    """One value."""
 
-    Attributes
-    ----------
-    holder : cell, dict or object
-        What it is read from: a closure's cell, a module's names, an object.
-    name : str
-        Name in the holder.
-    then : object
-        What it was: a copy, where it can change in place.
-    """
-
-    holder: Any
-    name: str
-    then: Any
+    holder: Any  # what it is read from: a closure's cell, a module's names, an object
+    name: str  # name in the holder
+    then: Any  # what it was: a copy, where it can change in place
 
     @property
     def now(self) -> Any:

@@ -46,18 +46,12 @@ _BUDGET = 400  # bodies that are walked for one function, before it is too much 
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionReading:
-    """What was found in a function and in all that it calls.
+    """What was found in a function and in all that it calls."""
 
-    Attributes
-    ----------
-    captured : tuple of Captured
-        What it reads from around it: constants, as long as they stay what they are.
-    unbound : tuple of str
-        Names that it reads and that have no value on one of the ways there: Python raises an
-        error then, numba takes 0.
-    """
-
+    # what it reads from around it: constants, as long as they stay what they are
     captured: tuple[Captured, ...]
+    # names that it reads and that have no value on one of the ways there: Python raises an error
+    # then, numba takes 0
     unbound: tuple[str, ...]
 
 

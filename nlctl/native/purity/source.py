@@ -27,17 +27,11 @@ _FUTURES = functools.reduce(
 
 
 class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
-    """The source of a function cannot be had.
-
-    Attributes
-    ----------
-    advice : str
-        What to do, beside the message, which says why.
-    """
+    """The source of a function cannot be had."""
 
     def __init__(self, reason: str, advice: str) -> None:
         super().__init__(reason)
-        self.advice = advice
+        self.advice = advice  # what to do, beside the message, which says why
 
 
 def definition(function: FunctionType) -> Definition:

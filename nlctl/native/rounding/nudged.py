@@ -25,15 +25,9 @@ def unit() -> float:
 
 
 class Shaken(np.ndarray):
-    """An array of which NumPy's functions make arrays with other last digits.
+    """An array of which NumPy's functions make arrays with other last digits."""
 
-    Attributes
-    ----------
-    drawn : numpy.random.Generator or None
-        Where the directions are from; None for no change.
-    """
-
-    drawn: np.random.Generator | None
+    drawn: np.random.Generator | None  # where the directions are from; None for no change
 
     @classmethod
     def of(cls, values: Any, drawn: np.random.Generator | None) -> Shaken:

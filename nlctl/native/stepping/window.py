@@ -27,28 +27,14 @@ _TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
 
 @dataclass(frozen=True, kw_only=True)
 class Window:
-    """Steps that are laid out, and the run that makes them.
-
-    Attributes
-    ----------
-    run : Run
-    memory : ndarray of uint8
-        All that the run knows but for its inputs.
-    ending : tuple of Task and Work
-        For the outputs at the end of a step.
-    first : int
-        Number of the first of these steps.
-    times : ndarray of shape (2 HELD_STEPS,) or (2 HELD_STEPS + 1,)
-        What the task's times are in full (s).
-    reach : ndarray of shape (cells,)
-        What the task has of the cells of these times: until when a step may lead (s).
-    """
+    """Steps that are laid out, and the run that makes them."""
 
     run: Run
-    memory: np.ndarray
-    ending: tuple[Any, Any]
-    first: int
-    times: np.ndarray
+    memory: np.ndarray  # all that the run knows but for its inputs
+    ending: tuple[Any, Any]  # for the outputs at the end of a step
+    first: int  # number of the first of these steps
+    times: np.ndarray  # shape (2 HELD_STEPS,); what the task's times are in full (s)
+    # shape (cells,); what the task has of the cells of these times: until when a step may lead (s)
     reach: np.ndarray
 
     def place(self, k: int) -> int:

@@ -29,32 +29,18 @@ _CHOICES = {*COMPARISONS, *LOGIC, "select", "minimum", "maximum", "absolute"}
 
 @dataclass(frozen=True, kw_only=True)
 class SeriesCode:
-    """Machine code of enclosed coefficients.
+    """Machine code of enclosed coefficients."""
 
-    Attributes
-    ----------
-    order : int
-        Number n of states.
-    rows : int
-        Of the coefficients of an order: the first 4 n are those of x, d, e and q.
-    at : mapping
-        Where what an order reads begins: ``"b"`` the order before, ``"a"`` and ``"q"`` sums,
-        ``"o"`` values at order 0, ``"w"`` weights, ``"x"`` the box.
-    folds : ndarray of shape (sums, 3)
-        Rows of both factors, and where the sum is read.
-    first, following : Loaded
-        ``values(x, v)`` at order 0, of the box, and at an order, of what it reads.
-    kept : int
-        Rows that are written at order 0 behind the coefficients, for ``"o"``.
-    """
-
-    order: int
-    rows: int
+    order: int  # number n of states
+    rows: int  # of the coefficients of an order: the first 4 n are those of x, d, e and q
+    # where what an order reads begins: ``"b"`` the order before, ``"a"`` and ``"q"`` sums, ``"o"``
+    # values at order 0, ``"w"`` weights, ``"x"`` the box
     at: Mapping[str, int]
-    folds: np.ndarray
+    folds: np.ndarray  # shape (sums, 3); rows of both factors, and where the sum is read
+    # ``values(x, v)`` at order 0, of the box, and at an order, of what it reads
     first: Loaded
     following: Loaded
-    kept: int
+    kept: int  # rows that are written at order 0 behind the coefficients, for ``"o"``
 
     @property
     def addresses(self) -> tuple[int, int]:

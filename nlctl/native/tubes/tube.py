@@ -19,24 +19,13 @@ from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_s
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MonomialTable:
-    """The monomials of degree 1 to some degree.
+    """The monomials of degree 1 to some degree."""
 
-    Attributes
-    ----------
-    degrees : ndarray of shape (monomials,)
-        The first ones are the variables themselves.
-    even : ndarray of shape (monomials,)
-        Whether it is never negative.
-    products : ndarray of shape (pairs, 3)
-        Numbers of two monomials and of their product, as far as that is one.
-    has : ndarray of shape (monomials, variables)
-        Whether a variable is in it.
-    """
-
-    degrees: np.ndarray
-    even: np.ndarray
+    degrees: np.ndarray  # shape (monomials,); the first ones are the variables themselves
+    even: np.ndarray  # shape (monomials,); whether it is never negative
+    # shape (pairs, 3); numbers of two monomials and of their product, as far as that is one
     products: np.ndarray
-    has: np.ndarray
+    has: np.ndarray  # shape (monomials, variables); whether a variable is in it
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -76,29 +65,17 @@ _MOST = 100_000  # steps
 
 @dataclass(frozen=True, kw_only=True)
 class Tube:
-    """What encloses all solutions from a box.
+    """What encloses all solutions from a box."""
 
-    Attributes
-    ----------
-    status : int
-        `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are
-        outside of them at one time; `STUCK`: no step is found.
-    time : float
-        Up to which it is known.
-    low, high : ndarray of shape (cells, n)
-        Over each of as many parts of the time.
-    end : ndarray of shape (n, 2)
-        At the end.
-    weight : ndarray of shape (n,)
-        How much each side of the box has to do with what is not linear in it.
-    steps : int
-    """
-
+    # `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are
+    # outside of them at one time; `STUCK`: no step is found
     status: int
-    time: float
+    time: float  # up to which it is known
+    # shape (cells, n); over each of as many parts of the time
     low: np.ndarray
     high: np.ndarray
-    end: np.ndarray
+    end: np.ndarray  # shape (n, 2); at the end
+    # shape (n,); how much each side of the box has to do with what is not linear in it
     weight: np.ndarray
     steps: int
 

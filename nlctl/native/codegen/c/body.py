@@ -29,15 +29,10 @@ static double nlctl_real(uint64_t x) { double y; memcpy(&y, &x, sizeof y); retur
 
 
 class CModule:
-    """Functions that are compiled together.
-
-    Attributes
-    ----------
-    functions, tables : dict
-        Text of functions by name, and names of constants, in the order in which they were needed.
-    """
+    """Functions that are compiled together."""
 
     def __init__(self) -> None:
+        # text of functions by name, and names of constants, in the order in which they were needed
         self.functions: dict[str, str] = {}
         self.tables: dict[tuple[float, ...], str] = {}
 

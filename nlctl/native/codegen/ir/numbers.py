@@ -16,30 +16,19 @@ PACKED = 4  # numbers of one member whose sines, powers, ... are computed togeth
 
 
 class Writer:
-    """Writes one function; `names` says what each expression is called so far.
-
-    Attributes
-    ----------
-    b : Body
-    plan : Plan
-    lanes : int
-        Number of members.
-    exact : set of Expr
-        Operations that are rounded one by one.
-    both : set of Expr
-        Angles of which sine and cosine are needed.
-    pairs : dict
-        Sines and cosines of those that have been computed, by the angle's name.
-    """
+    """Writes one function; `names` says what each expression is called so far."""
 
     def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Any) -> None:
-        self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
+        # operations that are rounded one by one
+        self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact  # number of members
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
+        # sines and cosines of those that have been computed, by the angle's name
         self.pairs: dict[str, dict[str, Value]] = {}
         kinds = Counter(
             a for n in plan.nodes for a in n.args if n.op in ("sin", "cos") and n not in plan.known
         )
+        # angles of which sine and cosine are needed
         self.both = {angle for angle, count in kinds.items() if count == 2 and not b.portable}
 
     def number(self, node: Expr) -> None:

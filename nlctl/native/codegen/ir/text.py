@@ -18,21 +18,11 @@ RARELY = "!prof !0"  # the first way of a branch is all but never taken
 
 @dataclass(frozen=True)
 class Value:
-    """A value of a function.
+    """A value of a function."""
 
-    Attributes
-    ----------
-    text : str
-        Its name, or a constant.
-    width : int
-        Number of elements, 0 for what is not a vector.
-    kind : str
-        ``"f"`` float, ``"b"`` truth value, ``"i"`` integer.
-    """
-
-    text: str
-    width: int
-    kind: str = "f"
+    text: str  # its name, or a constant
+    width: int  # number of elements, 0 for what is not a vector
+    kind: str = "f"  # ``"f"`` float, ``"b"`` truth value, ``"i"`` integer
 
     @property
     def type(self) -> str:
@@ -62,18 +52,11 @@ def constant(x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
 
 @dataclass(kw_only=True)
 class Module:
-    """Functions that are compiled together.
+    """Functions that are compiled together."""
 
-    Attributes
-    ----------
-    inlined : bool
-        Whether small functions become part of those that call them.
-    declared, tables, functions : dict
-        Text of what is declared, constants by name, and text of functions by name, in the order
-        in which they were needed.
-    """
-
-    inlined: bool
+    inlined: bool  # whether small functions become part of those that call them
+    # text of what is declared, constants by name, and text of functions by name, in the order in
+    # which they were needed
     declared: dict[str, None] = field(default_factory=dict)
     tables: dict[tuple[float, ...], str] = field(default_factory=dict)
     functions: dict[str, str] = field(default_factory=dict)
