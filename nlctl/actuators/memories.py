@@ -9,12 +9,10 @@ import numpy as np
 from ..arguments import vector
 from ..errors import ParameterError
 
+# rate (1/s) at which memories relax onto what they become, in plain `control` alone.
+# `control.input_output_response` has no hook for accepted steps. Both engines of
+# `nlctl.input_output_response` update memories between steps instead, and integrate no such rate
 RELAXATION = 1e3
-"""Rate (1/s) at which memories relax onto what they become, in plain `control` alone.
-
-`control.input_output_response` has no hook for accepted steps.  Both engines of
-`nlctl.input_output_response` update memories between steps instead, and integrate no such rate.
-"""
 
 
 def memory_names(name: str, count: int) -> tuple[str, ...]:

@@ -19,16 +19,13 @@ from ..upstream.control_internals import rates_and_outputs_now
 from ..upstream.systems import System
 from .parameters import overridden
 
-SAME_FUNCTIONS = 1e-10
-"""Relative difference that rounding explains without a closer look."""
+SAME_FUNCTIONS = 1e-10  # relative difference that rounding explains without a closer look
+# what a response may differ by, relative to the largest sample: engines interpolate
 OF_RESPONSES = 1e-6
-"""What a response may differ by, relative to the largest sample: engines interpolate."""
+# what processors and versions of libraries may differ by, relative and absolute
 OTHER_VERSIONS = 1e-6, 1e-9
-"""What processors and versions of libraries may differ by, relative and absolute."""
-SHAKEN = 1e-13
-"""Relative change of states and inputs that shows what rounding does to a value."""
+SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _TIMES = 100  # as many times as far as states and inputs are shaken
-
 Point = tuple[float, np.ndarray, np.ndarray]  # time (s), states, inputs
 PointValues = tuple[np.ndarray, ...]  # rates, outputs, and more where there are more
 PointFunction = Callable[[float, np.ndarray, np.ndarray], PointValues]

@@ -196,7 +196,7 @@ _ROWS = (
          series=lambda x, y: x - y * np.trunc(x / y)),
 )  # fmt: skip
 
+# every function that expressions know, by NumPy's name
 FUNCTIONS = {row.name: row for row in _ROWS}
-"""Every function that expressions know, by NumPy's name."""
+# NumPy's names of the functions of Python's `math`
 MATH = {name: row.name for row in _ROWS for name in row.math}
-"""NumPy's names of the functions of Python's `math`."""

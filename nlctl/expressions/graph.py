@@ -24,11 +24,10 @@ _ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_
 NUMPY = COMPARISONS | LOGIC | _ARITHMETIC
 BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
            "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
+# operations that make integers of integers
 INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remainder")
-"""Operations that make integers of integers."""
 
-SPECIAL = ("erf", "erfc")
-"""Functions of `scipy.special` that are in the table of functions."""
+SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)

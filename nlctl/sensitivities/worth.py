@@ -16,10 +16,9 @@ from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
 from .response import sensitivity_response
 
-LOST_MARGIN = -1e3
-"""The margin of a run that does not reach its end."""
+LOST_MARGIN = -1e3  # the margin of a run that does not reach its end
+# of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`
 PER_DERIVATIVE = 0.7
-"""Of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`."""
 _STEP = 1e-3  # of differences, in the unit cube
 _NEAREST = 6  # parts of a requirement that count: the lowest
 

@@ -18,8 +18,7 @@ from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
 from ...intervals.quotient import slope_in
 
 _UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
-Edge = Callable[[Any, Any], Any]
-"""Output at an input and a time."""
+Edge = Callable[[Any, Any], Any]  # output at an input and a time
 
 
 @as_annotated

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-KAPPA = 0.2785
-"""Bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it."""
+KAPPA = 0.2785  # bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -334,8 +334,8 @@ def _fast(metric: Metric) -> Metric:
     return replace(metric, function=in_machine_code(metric.function))
 
 
+# for each column the name of its type, or the labels that it may hold
 Columns = Mapping[str, str | Sequence[str]]
-"""For each column the name of its type, or the labels that it may hold."""
 
 
 def columns_of(prepared: Prepared) -> Columns:

@@ -67,8 +67,8 @@ class FirstOrder:
     reason: str = ""
 
 
+# takes a row; for a loop ``functools.partial(first_order, prepared)``
 FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
-"""Takes a row; for a loop ``functools.partial(first_order, prepared)``."""
 
 
 def lowest_nearby(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:

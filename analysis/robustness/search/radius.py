@@ -19,12 +19,10 @@ from ..uncertainty.space import Space, combinations, nominal, scaled
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
 from .worst_case import worst_case
 
+# smallest size that is searched first, as a part of the largest; then twice that, and so on
 START = 1 / 16
-"""Smallest size that is searched first, as a part of the largest; then twice that, and so on."""
-_SMALLEST = 1e-3
-"""Smaller sizes are not searched, as a part of the largest."""
-RAY = 12
-"""Bisections along the ray to a witness."""
+_SMALLEST = 1e-3  # smaller sizes are not searched, as a part of the largest
+RAY = 12  # bisections along the ray to a witness
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,8 +20,8 @@ from ..uncertainty.design import Design
 
 Side = Literal["upper", "lower", "both"]
 Margins = Sequence[float] | np.ndarray | pd.Series
+# up to so many runs the beta quantiles are good to four digits; beyond, SciPy's are not always
 MOST_RUNS = 10**9
-"""Up to so many runs the beta quantiles are good to four digits; beyond, SciPy's are not always."""
 
 
 class NoGuaranteeError(UsageError):

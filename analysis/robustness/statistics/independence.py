@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import special, stats
 
-MOST_TABLES = 200_000
-"""Up to so many tables are enumerated; of more, so many are drawn."""
+MOST_TABLES = 200_000  # up to so many tables are enumerated; of more, so many are drawn
 PERMUTATIONS = 99_999
-LARGE = 20.0
-"""From this expected number on in every field the chi-square law is as good as exact."""
+LARGE = 20.0  # from this expected number on in every field the chi-square law is as good as exact
 _ROUNDING = 1e-9
 
 

@@ -21,8 +21,7 @@ from ..uncertainty.design import Design
 from .guarantee import Margins, check_iid, checked_confidence, series_of
 
 Better = Literal["smaller", "larger"]
-BCA_ROWS = 5000
-"""Up to so many rows the bootstrap is corrected for bias and acceleration."""
+BCA_ROWS = 5000  # up to so many rows the bootstrap is corrected for bias and acceleration
 TRUSTED_ROWS = 300
 LARGEST_SHARE = 0.1
 

@@ -23,8 +23,7 @@ from .guarantee import (
     violations_of,
 )
 
-PRIOR = 0.5
-"""Both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')."""
+PRIOR = 0.5  # both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')
 
 
 def log_evidence(violations: Any, runs: Any, p: float) -> Any:

@@ -89,8 +89,8 @@ def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula
             yield (formula,)
 
 
+# no margin of a run that reached its end is below -FAILED, and none of another run above it
 FAILED = 1e6
-"""No margin of a run that reached its end is below -FAILED, and none of another run above it."""
 _PIECES = 16  # of a window, where a requirement is taken apart
 
 

@@ -18,6 +18,7 @@ from .table import ARRAY_METHODS, enter, of
 
 __all__: list[str] = []
 
+# functions that move elements
 _MOVING = (
     np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
@@ -26,7 +27,7 @@ _MOVING = (
     np.repeat, np.take, np.insert, np.delete, np.tril, np.triu, np.resize,
     np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
 )  # fmt: skip
-"""Functions that move elements."""
+# functions that add and multiply
 _COMPUTING = (
     np.convolve, np.correlate, np.kron, np.cross, np.einsum, np.trace,
     np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
@@ -34,7 +35,6 @@ _COMPUTING = (
     np.polysub, np.ediff1d, np.linalg.cross, np.linalg.outer, np.linalg.trace,
     np.linalg.vecdot, np.linalg.tensordot,
 )  # fmt: skip
-"""Functions that add and multiply."""
 
 
 def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -308,5 +308,5 @@ RULES: dict[str, Callable[..., _Result]] = {
     "heaviside": _heaviside,
     "logaddexp": _logaddexp,
 }
+# those that never jump
 _SMOOTH = ("sqrt", "cosh", "sin", "cos", "tan", "hypot", "power", "logaddexp")
-"""Those that never jump."""

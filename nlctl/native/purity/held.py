@@ -18,12 +18,10 @@ import numpy as np
 
 from .outside import outside_of
 
-OPAQUE = "\2"
-"""Begins a text that names what nobody can see into."""
-NAMED = "\3"
-"""Begins a text that tells all of an object."""
+OPAQUE = "\2"  # begins a text that names what nobody can see into
+NAMED = "\3"  # begins a text that tells all of an object
+# where pandas keeps content: how it is laid out in memory may change
 LAID_OUT = ("_mgr", "_item_cache", "_flags", "_cache")
-"""Where pandas keeps content: how it is laid out in memory may change."""
 _TOLD_BY_TEXT = {"numba", "llvmlite", "pydantic", "pydantic_core", "annotated_types"} | {
     *("typing", "typing_extensions", "matplotlib", "jinja2", "rich", "abc", "inspect", "ast"),
     "enum",  # machinery: what it is made of computes nothing, or is gone through
