@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
 
     Shapes: `A` (k, n), `b` (k,).
     """
-    return ConeLimit(A, b, partial(_nonnegative, len(b)))
+    return ConeLimit(A, b, lambda clarabel: clarabel.NonnegativeConeT(len(b)))
 
 
 def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
@@ -38,7 +37,7 @@ def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
     Shapes: `parts` n of (m, m), `low` (m, m).
     """
     A = np.column_stack([-upper_triangle(part) for part in parts])
-    return ConeLimit(A, -upper_triangle(low), partial(_semidefinite, len(low)))
+    return ConeLimit(A, -upper_triangle(low), lambda clarabel: clarabel.PSDTriangleConeT(len(low)))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:
@@ -80,11 +79,3 @@ def minimizer(
     solution = clarabel.DefaultSolver(upper, q, A, b, cones, settings).solve()
     status = str(solution.status)
     return (np.array(solution.x) if status in _SOLVED else None), status
-
-
-def _nonnegative(size: int, clarabel: Any) -> Any:
-    return clarabel.NonnegativeConeT(size)
-
-
-def _semidefinite(size: int, clarabel: Any) -> Any:
-    return clarabel.PSDTriangleConeT(size)

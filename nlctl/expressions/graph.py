@@ -149,6 +149,13 @@ class Graph:
             self.nodes.append(self._known[key])
         return self._known[key]
 
+    def like(self, node: Expr, *args: Expr) -> Expr:
+        """Return the operation of an expression, of other arguments."""
+        return self.node(
+            node.op, *args, data=node.data, size=node.size, kind=node.kind,
+            varies=node.varies, value=node.value,
+        )  # fmt: skip
+
     def _check_lengths(self, op: str, args: tuple[Expr, ...], data: Any, size: int | None) -> None:
         """Check that nothing is read beyond the end of what it is read from."""
         if op == "concat":

@@ -112,10 +112,7 @@ def one_sided(graph: Graph, exprs: Sequence[Expr], direction: Direction) -> list
         if node.op in ("maximum", "minimum", "absolute") and node.varies:
             new[node] = _leading(graph, node.op, args, direction)
         elif args != node.args:
-            new[node] = graph.node(
-                node.op, *args, data=node.data, size=node.size, kind=node.kind,
-                varies=node.varies, value=node.value,
-            )  # fmt: skip
+            new[node] = graph.like(node, *args)
     return [new.get(e, e) for e in exprs]
 
 

@@ -12,7 +12,7 @@ from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.wording import counted
 
 from ..loop.external_inputs import ADDED
-from ..proofs.result import FROM_STARTS, Certificate, Row, per_second
+from ..proofs.result import FROM_STARTS, Certificate, Row, per_second, rows_of_split
 from ..proofs.saved import Content
 from .matching import Matching
 from .saved import model_attempts
@@ -87,7 +87,7 @@ class ModelReferenceCertificate(Certificate):
     def _of_loop(self) -> Iterator[Row]:
         match, n = self.matching, self.matching.loop.order
         form, over = match.loop.form, "all t"
-        yield from self._of_split()
+        yield from rows_of_split(self.split)
         yield "beta", match.beta, per_second(n), "computed", "coefficient of v in x_n'", "all x"
         yield "lambda", match.lam, "1", "computed", "beta k / gain of the law, must be > 0", "all x"
         size = match.W_squared**0.5

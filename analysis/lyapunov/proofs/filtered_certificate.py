@@ -16,7 +16,7 @@ from ...intervals.written import operations
 from ..bounds.error_bounds import filter_poles, reference_bounds
 from ..loop.external_inputs import ADDED
 from .filtered import Demand, FilteredLoop, demand
-from .result import Certificate, Row, per_second
+from .result import Certificate, Row, per_second, rows_of_split
 from .saved import Content, split_content, starts_content, texts
 
 _WIDER = ((0.0, 1e-3), (0.0, 1e-5), (0.01, 1e-3), (0.05, 1e-3), (0.2, 1e-3))
@@ -38,7 +38,7 @@ class FilteredCertificate(Certificate):
         unit = per_second(len(self.loop.e0))
         yield "G_min", need.G_min, unit, "proved", "F/v", f"all v, {over}"
         yield "G_max", need.G_max, unit, "proved", "F/v", f"all v, {over}"
-        yield from self._of_split()
+        yield from rows_of_split(self.split)
         if self.disturbance:
             yield "sup |w|", self.disturbance, "1", "given", ADDED, "all t"
         yield "sup |g + d|", need.matched, unit, "proved", need.how, f"all t, {over}"

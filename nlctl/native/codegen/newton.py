@@ -84,10 +84,7 @@ def _within(
             where = ("w", places[node], 1 if node.size else 0)
             new[node] = graph.node("leaf", data=where, size=node.size, varies=True)
         elif all(arg in new for arg in node.args):
-            new[node] = graph.node(
-                node.op, *(new[a] for a in node.args), data=node.data, size=node.size,
-                kind=node.kind, varies=node.varies, value=node.value,
-            )  # fmt: skip
+            new[node] = graph.like(node, *(new[a] for a in node.args))
     return graph, new
 
 

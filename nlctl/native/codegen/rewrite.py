@@ -29,10 +29,7 @@ def rewritten(
     for node in nodes:
         args = tuple(new[a] for a in node.args)
         other = None if node in decisive else _reworded(fresh, node, args)
-        new[node] = other or fresh.node(
-            node.op, *args, data=node.data, size=node.size, kind=node.kind,
-            varies=node.varies, value=node.value,
-        )  # fmt: skip
+        new[node] = other or fresh.like(node, *args)
     made = {
         name: [Store(array=s.array, row=s.row, expr=new[s.expr], size=s.size) for s in part]
         for name, part in stores.items()

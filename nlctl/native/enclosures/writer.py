@@ -42,10 +42,9 @@ from .rounding import larger, smaller
 from .rules import interval_of
 
 LANES = 8
-INLINED = (
-    400  # operations up to which rules become part of what calls them: beyond, code of a third
-)
-# more speed would take three times as long to make
+# operations up to which rules become part of what calls them: beyond, code of a third more speed
+# would take three times as long to make
+INLINED = 400
 _ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
 _INF = float("inf")
 

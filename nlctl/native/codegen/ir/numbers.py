@@ -19,8 +19,8 @@ class Writer:
     """Writes one function; `names` says what each expression is called so far."""
 
     def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Any) -> None:
-        # operations that are rounded one by one
-        self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact  # number of members
+        # `lanes` members, and operations that are `exact`: rounded one by one
+        self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
         # sines and cosines of those that have been computed, by the angle's name
