@@ -10,7 +10,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import as_numbers, param, record
-from .memories import RELAXATION
+from .memories import relaxation
 
 
 @equation
@@ -104,14 +104,6 @@ class Backlash:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the play."""
-        (memory,) = x
-        (u1,) = u
-        return (RELAXATION * (play(u1, memory, p) - memory),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The memory clipped into the gap."""
         (memory,) = x
@@ -119,6 +111,8 @@ class Backlash:
         return (play(u1, memory, p),)
 
     commit = output  # the memory v(t-) becomes the output
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

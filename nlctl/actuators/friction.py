@@ -8,7 +8,7 @@ from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import RELAXATION
+from .memories import relaxation
 
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
@@ -187,13 +187,6 @@ class StickSlip:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the mode."""
-        (mode,) = x
-        return (RELAXATION * (stick_mode(u[0], u[1], mode, p) - mode),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The force that holds, or slips."""
         (mode,) = x
@@ -208,6 +201,8 @@ class StickSlip:
         """The mode."""
         (mode,) = x
         return (stick_mode(u[0], u[1], mode, p),)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

@@ -8,7 +8,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .prandtl_ishlinskii import check_pairs, check_thresholds
 from .static import BOUNDED_OUTPUT
 
@@ -120,12 +120,6 @@ class GeneralisedPrandtlIshlinskii:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the plays."""
-        return RELAXATION * (generalised_plays(u[0], x, p) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (np.sum(p.w * generalised_plays(u[0], x, p)),)
@@ -135,6 +129,8 @@ class GeneralisedPrandtlIshlinskii:
     def commit(t, x, u, p):
         """The plays."""
         return generalised_plays(u[0], x, p)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

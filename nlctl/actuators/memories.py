@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..arguments import vector
+from ..equations import equation
 from ..errors import ParameterError
 
 # rate (1/s) at which memories relax onto what they become, in plain `control` alone.
 # `control.input_output_response` has no hook for accepted steps. Both engines of
 # `nlctl.input_output_response` update memories between steps instead, and integrate no such rate
 RELAXATION = 1e3
+
+
+def relaxation(commit: Any) -> Any:
+    """Return the `update` of memories that relax onto what `commit` says that they become."""
+    become: Callable[..., Any] = getattr(commit, "__func__", commit)
+
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memories."""
+        after = become(t, x, u, p)
+        return tuple([RELAXATION * (after[i] - x[i]) for i in range(len(x))])
+
+    return staticmethod(update)
 
 
 def memory_names(name: str, count: int) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from ..arguments import number, vector
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .static import BOUNDED_OUTPUT
 
 
@@ -108,13 +108,6 @@ class Relay:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the side."""
-        (side,) = x
-        return (RELAXATION * (relay_side(u[0], side, p.on, p.off) - side),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The side, with its height."""
         (side,) = x
@@ -126,6 +119,8 @@ class Relay:
         """The side."""
         (side,) = x
         return (relay_side(u[0], side, p.on, p.off),)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation
@@ -240,12 +235,6 @@ class Preisach:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the sides."""
-        return RELAXATION * (relay_side(u[0], x, p.alpha, p.beta) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum of the sides."""
         return (np.sum(p.w * held_side(x)),)
@@ -255,6 +244,8 @@ class Preisach:
     def commit(t, x, u, p):
         """The sides."""
         return relay_side(u[0], x, p.alpha, p.beta)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation
