@@ -1,4 +1,4 @@
-"""Several memories in one block: their names, and where they start."""
+"""States of actuators: memories, their names and where they start; states that are the output."""
 
 from __future__ import annotations
 
@@ -28,6 +28,12 @@ def relaxation(commit: Any) -> Any:
         return tuple([RELAXATION * (after[i] - x[i]) for i in range(len(x))])
 
     return staticmethod(update)
+
+
+@equation
+def output_of_state(t, x, u, p):
+    """The output of a block whose first state it is."""
+    return (x[0],)
 
 
 def memory_names(name: str, count: int) -> tuple[str, ...]:
