@@ -22,7 +22,7 @@ from .robust import RobustTerm
 
 @record
 class Zero:
-    """A block whose output is 0: put it in the place of a piece that is to be left out.
+    """A block whose output is 0: put it instead of a piece that is to be left out.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def adaptive_neural(
     Returns
     -------
     control.InterconnectedSystem
-        The controller, in the place of one block.
+        The controller, as one block.
 
     Raises
     ------

@@ -47,7 +47,7 @@ def dynamic_surface_control(
     Returns
     -------
     control.InterconnectedSystem
-        The controller, in the place of one block.
+        The controller, as one block.
 
     Raises
     ------

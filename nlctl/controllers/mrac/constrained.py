@@ -39,9 +39,9 @@ class ConstrainedLaw:
     @equation
     def output(t, x, u, p):
         """The law, and its deficit."""
-        wanted = -u[0]
-        allowed = clip(wanted, -p.u_max, p.u_max)
-        return allowed, allowed - wanted
+        desired = -u[0]
+        allowed = clip(desired, -p.u_max, p.u_max)
+        return allowed, allowed - desired
 
     @staticmethod
     @equation

@@ -76,7 +76,7 @@ def sliding_mode(
     Returns
     -------
     control.InterconnectedSystem
-        The controller, in the place of one block.
+        The controller, as one block.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from ...params import param, record
 
 @record
 class SuperTwistingLaw:
-    """Super-twisting law with a boundary layer, in the place of `SlidingModeLaw`.
+    """Super-twisting law with a boundary layer, instead of `SlidingModeLaw`.
 
         u = -k_1 |r|^(1/2) sign(r) + w,   w' = -k_2 sign(r)          |r| >= phi
         u = -k_1 r / phi^(1/2) + w,       w' = -k_2 r / phi          |r| <= phi

@@ -68,17 +68,17 @@ def is_numeric(value: object) -> bool:
 
 def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     """Lay out the numeric parameters of all blocks."""
-    found: dict[int, dict[str, Slot]] = {}
+    places: dict[int, dict[str, Slot]] = {}
     offset = 0
     for i, node in enumerate(nodes):
-        found[i] = slots_of(node.system, node.path, offset)
-        offset += sum(slot.size for slot in found[i].values())
-    return found
+        places[i] = slots_of(node.system, node.path, offset)
+        offset += sum(slot.size for slot in places[i].values())
+    return places
 
 
 def slots_of(system: System, path: str = "", offset: int = 0) -> dict[str, Slot]:
     """Lay out the numeric parameters of one block from `offset` on, as `slots` does."""
-    found: dict[str, Slot] = {}
+    by_name: dict[str, Slot] = {}
     path = path or system.name
     for name, value in current_values(system).items():
         if not isinstance(name, str):
@@ -87,11 +87,11 @@ def slots_of(system: System, path: str = "", offset: int = 0) -> dict[str, Slot]
             )
         if is_numeric(value):
             array = np.asarray(value)
-            found[name] = Slot(
+            by_name[name] = Slot(
                 name=f"{path}.{name}", offset=offset, shape=array.shape, kind=array.dtype.kind
             )
-            offset += found[name].size
-    return found
+            offset += by_name[name].size
+    return by_name
 
 
 def length(layout: Mapping[int, Mapping[str, Slot]]) -> int:

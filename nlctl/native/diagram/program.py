@@ -47,13 +47,13 @@ class Program:
 
         Where parameters of clocks are overridden, more may; see `machine.evaluations`.
         """
-        found = tuple(meetings(self.clocks))
-        if len(found) > _MOST:
+        every = tuple(meetings(self.clocks))
+        if len(every) > _MOST:
             raise CompileError(
-                f"{len(self.clocks)} clocks of sampled blocks may meet in {len(found)} ways, at "
+                f"{len(self.clocks)} clocks of sampled blocks may meet in {len(every)} ways, at "
                 f"most {_MOST} can be compiled: give blocks of one rate the same offset and delay"
             )
-        return found
+        return every
 
     @property
     def events(self) -> int:
@@ -103,14 +103,14 @@ def instants_of(
     first = len(schedule.nodes)
     places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
     known: dict[tuple[Clock, ...], Instants] = {}
-    found = []
+    every = []
     for column in p.T:
         clocks = {owner: _clock(slots, column) for owner, slots in places}
         key = tuple(clocks.values())
         if key not in known:
             known[key] = instants(clocks, begin, behind_end, program.meetings)
-        found.append(known[key])
-    return found
+        every.append(known[key])
+    return every
 
 
 def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:

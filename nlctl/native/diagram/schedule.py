@@ -132,9 +132,9 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
 
 
 def _samplings(system: System) -> Iterator[Node]:
-    for path, made in samplings(system):
+    for path, sampling in samplings(system):
         none = np.zeros((0, 0), dtype=bool)
-        yield Node(path=path, system=made, state_offset=0, inputs=(), direct=none)
+        yield Node(path=path, system=sampling, state_offset=0, inputs=(), direct=none)
 
 
 def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
@@ -223,13 +223,13 @@ class _Ordering:
             self.loops.append(AlgebraicLoop(start=start, stop=len(self.order), torn=torn))
             self._evaluate(every, ())
 
-    def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:
+    def _evaluate(self, needed_signals: set[Signal], guessed: Iterable[Signal]) -> None:
         """Order blocks until no more of the wanted signals can be had."""
         while True:
             given, offers = self.known.union(guessed), []
-            for i in sorted({s.block for s in wanted - self.known if s.block is not None}):
+            for i in sorted({s.block for s in needed_signals - self.known if s.block is not None}):
                 unknown, ready = _available(i, self.nodes[i], given)
-                if wanted & ready - self.known:
+                if needed_signals & ready - self.known:
                     offers.append((len(ready) < len(self.nodes[i].direct), i, unknown, ready))
             if not offers:
                 return

@@ -65,14 +65,14 @@ def dependence(
 
     returns (noutputs, ninputs).
     """
-    found = np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)
+    passes = np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)
     graph = Graph()
 
     try:
         with np.errstate(all="ignore"):
             result = trace(graph, function, lambda: traced_arguments(graph, system, slots))
     except Untraceable:
-        return found
+        return passes
     if result.size != system.noutputs or graph.assumptions:
-        return found
+        return passes
     return structure(list(result.pieces()), "u", system.ninputs or 0)

@@ -59,8 +59,8 @@ def routine(b: Body, name: str, make: Callable[..., Ends], *args: Ends) -> Ends:
             f"{signed}define internal {pair} {full}({taken}) {_how(b)} nounwind {{\n"
             f"entry:\n{inner.text()}}}\n"
         )
-    found = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
-    low, high = (b.new(f"extractvalue {pair} {found.text}, {i}", width) for i in (0, 1))
+    call = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
+    low, high = (b.new(f"extractvalue {pair} {call.text}, {i}", width) for i in (0, 1))
     signed = b.module.functions[full].startswith("; not negative")
     return Ends(low=low, high=high, not_negative=signed)
 
@@ -125,8 +125,8 @@ def mul(b: Body, x: Ends, y: Ends) -> Ends:
     low, high = _ends_of_product(b, x, y)
     low, high = product_downwards(b, low), product_upwards(b, high)
     if x.not_negative and y.not_negative:
-        found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-        return found if x.point is not None else defined(b, b.compare("ord", low, high), found)
+        product = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+        return product if x.point is not None else defined(b, b.compare("ord", low, high), product)
     if x.point is not None:
         return Ends(low=low, high=high)
     if x.not_negative:
@@ -161,8 +161,8 @@ def absolute_of(b: Body, x: Ends) -> Ends:
     """Return the absolute value."""
     if x.not_negative:
         return x
-    turned = b.neg(x.high)
-    low = larger(b, 0.0, larger(b, x.low, turned))
+    mirrored = b.neg(x.high)
+    low = larger(b, 0.0, larger(b, x.low, mirrored))
     return Ends(low=low, high=larger(b, b.neg(x.low), x.high), not_negative=True)
 
 
@@ -177,10 +177,10 @@ def div(b: Body, x: Ends, y: Ends) -> Ends:
     """Return the quotient; not a number where the divisor may be 0."""
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     x, y = finite(x), finite(y)
-    turned = [neg(b, v) for v in (x, y)]
+    mirrored = [neg(b, v) for v in (x, y)]
     above, below = (
         [b.select(negative, t, o) for t, o in zip(t.values, o.values, strict=True)]
-        for t, o in zip(turned, (x, y), strict=True)
+        for t, o in zip(mirrored, (x, y), strict=True)
     )
     under = b.select(b.compare("oge", above[0], 0.0), below[1], below[0])
     over = b.select(b.compare("oge", above[1], 0.0), below[0], below[1])
@@ -202,8 +202,8 @@ def root_of(b: Body, x: Ends) -> Ends:
     low = downwards(b, b.intrinsic("sqrt", x.low))
     high = upwards(b, b.intrinsic("sqrt", x.high))
     low = b.select(b.compare("olt", low, 0.0), 0.0, low)
-    found = Ends(low=low, high=high, not_negative=True)
-    return defined(b, b.compare("oge", x.low, 0.0), found)
+    root = Ends(low=low, high=high, not_negative=True)
+    return defined(b, b.compare("oge", x.low, 0.0), root)
 
 
 # -- choices ---------------------------------------------------------------------------------------
@@ -273,8 +273,8 @@ def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
         return Ends(low=low, high=b.compare(f"u{op}", x.low, y.high))
     same = b.logic("and", b.compare("ole", x.high, y.low), b.compare("ole", y.high, x.low))
     meet = b.logic("and", b.compare("uge", x.high, y.low), b.compare("uge", y.high, x.low))
-    found = Ends(low=same, high=meet)
-    return found if op == "eq" else logic_not(b, found)
+    equal = Ends(low=same, high=meet)
+    return equal if op == "eq" else logic_not(b, equal)
 
 
 def logic_not(b: Body, x: Ends) -> Ends:

@@ -56,10 +56,10 @@ class BoxCode:
             ends = np.concatenate([ends, np.repeat(ends[:1], missing, axis=0)])
         batches = ends.reshape(-1, lanes, self.sides, 2).transpose(0, 2, 3, 1)
         batches = np.ascontiguousarray(batches)
-        found = np.empty((len(batches), self.rows.results, 2, lanes))
-        for given, result in zip(batches, found, strict=True):
+        results = np.empty((len(batches), self.rows.results, 2, lanes))
+        for given, result in zip(batches, results, strict=True):
             self._values(given.ctypes.data, result.ctypes.data)
-        flat = found.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
+        flat = results.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
         return flat[..., 0], flat[..., 1]
 
 
@@ -89,10 +89,10 @@ def traced_numbers(
     """Return the numbers that a pure function computes."""
     try:
         with np.errstate(all="ignore"):
-            found = trace(graph, function, arguments)
+            numbers = trace(graph, function, arguments)
     except Ambiguous as error:
         raise Untraceable(str(error)) from None
-    return [found[i].only for i in range(found.size)]
+    return [numbers[i].only for i in range(numbers.size)]
 
 
 def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
@@ -119,7 +119,7 @@ def _gradient(graph: Graph, expr: Expr, sides: int, fixed: int) -> list[Expr]:
     zero, one = graph.const(0.0), graph.const(1.0)
 
     def along(i: int) -> Expr:
-        (found,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
-        return zero if found is None else found
+        (derivative,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
+        return zero if derivative is None else derivative
 
     return [along(i) if i < sides - fixed else zero for i in range(sides)]

@@ -1,4 +1,4 @@
-"""What becomes of a claim, or of a supremum, when boxes are divided in machine code."""
+"""Claims and suprema when boxes are divided in machine code."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PARTS = 16  # into which it is divided, whatever their number
 
 @dataclass(frozen=True, kw_only=True)
 class BoxVerdict:
-    """What became of the claim that the least of some functions is at most a bound on a box."""
+    """The verdict on the claim that the least of some functions is at most a bound on a box."""
 
     holds: bool | None  # none: undecided
     # boxes judged, and those that stayed undecided
@@ -60,14 +60,14 @@ def decide_claim(
         return begun.verdict([])
     rest = begun.stack[: begun.counts[0]]
     begun.counts[0] = 0
-    each = -(-(max_boxes - begun.boxes) // _PARTS)
+    share = -(-(max_boxes - begun.boxes) // _PARTS)
     parts = [_Search(code, rest[k::_PARTS], bound, begun.whole) for k in range(_PARTS)]
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda part: part.run(each), parts))
+            list(pool.map(lambda part: part.run(share), parts))
     else:
         for part in parts:
-            if part.run(each) == REFUTED:
+            if part.run(share) == REFUTED:
                 break
     return begun.verdict(parts)
 
@@ -153,13 +153,13 @@ def enclose_supremum(
     box = np.stack([low, high], axis=1).reshape(-1)
     nodes, index, keys = np.empty((_ROOM, box.size)), np.zeros((3, _ROOM), dtype=np.int64), None
     nodes[0], keys = box, np.empty(_ROOM)
-    counts, found = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
+    counts, bounds = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
     rows, room, whole = code.rows, _room(code), _widths(box)
     limits = (float(tol), float(relative), int(max_boxes), int(hopeless))
     while True:
         status = supremum(
             code.judge, (rows.centre, rows.weight), *room, nodes, index, keys, whole, limits,
-            counts, found,
+            counts, bounds,
         )  # fmt: skip
         if status == ALL_PROVED:
             break
@@ -167,7 +167,7 @@ def enclose_supremum(
         index = np.concatenate([index, np.zeros_like(index)], axis=1)
         keys = np.concatenate([keys, np.empty_like(keys)])
     return Supremum(
-        high=float(found[0]), attained=float(found[1]), boxes=int(counts[3]),
+        high=float(bounds[0]), attained=float(bounds[1]), boxes=int(counts[3]),
         unbounded=int(counts[4]),
     )  # fmt: skip
 

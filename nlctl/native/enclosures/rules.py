@@ -102,11 +102,11 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
         falls = b.logic("and", b.compare("ole", x.high, 0.0), b.compare("ogt", high, 0.0))
         high = b.select(falls, 0.0, high)
     signed = known.values[0] >= 0 or (known.odd and x.not_negative)
-    found = Ends(low=low, high=high, not_negative=signed)
+    ends = Ends(low=low, high=high, not_negative=signed)
     if known.domain == (-_INF, _INF):
-        return found
+        return ends
     inside = b.compare("oge", x.low, known.domain[0])
-    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), found)
+    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends)
 
 
 def _at_least(b: Body, v: Value) -> Value:
@@ -119,8 +119,8 @@ def _below(b: Body, v: Value) -> Value:
 
 def _steps(b: Body, name: str, x: Ends) -> _Result:
     low, high = (applied(b, name, v) for v in x.values)
-    found = Ends(low=low, high=high, not_negative=x.not_negative)
-    return found, b.compare("one", low, high)
+    ends = Ends(low=low, high=high, not_negative=x.not_negative)
+    return ends, b.compare("one", low, high)
 
 
 def _absolute(b: Body, x: Ends) -> _Result:
@@ -186,18 +186,18 @@ def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
     low = function_downwards(b, applied(b, "hypot", x.low, y.low))
     high = function_upwards(b, applied(b, "hypot", x.high, y.high))
     is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
-    found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-    return defined(b, is_number, found), None
+    size = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+    return defined(b, is_number, size), None
 
 
 def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
     """Return the least and the greatest value at the corners of a rectangle."""
     ends = [(v, w) for v in set(x.values) for w in set(y.values)]
     ends = sorted(ends, key=lambda pair: (pair[0].text, pair[1].text))
-    found = [applied(b, name, v, w) for v, w in ends]
-    low = high = found[0]
+    values = [applied(b, name, v, w) for v, w in ends]
+    low = high = values[0]
     numbers = b.compare("ord", low, high)
-    for value in found[1:]:
+    for value in values[1:]:
         low, high = smaller(b, value, low), larger(b, value, high)
         numbers = b.logic("and", numbers, b.compare("ord", value, value))
     bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
@@ -208,17 +208,17 @@ def _power(b: Body, x: Ends, y: Ends) -> _Result:
     """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
     at_zero = b.logic("and", _at_least(b, x.low), b.compare("ogt", y.low, 0.0))
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
-    found = _corners(b, "power", x, y)
-    found = Ends(low=larger(b, 0.0, found.low), high=found.high, not_negative=True)
-    return defined(b, exists, found), None
+    result = _corners(b, "power", x, y)
+    result = Ends(low=larger(b, 0.0, result.low), high=result.high, not_negative=True)
+    return defined(b, exists, result), None
 
 
 def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
     """Off its cut the angle is largest and least at corners."""
     level = b.logic("and", b.compare("ole", y.low, 0.0), b.compare("oge", y.high, 0.0))
     cut = b.logic("and", level, b.compare("ole", x.low, 0.0))
-    found = _corners(b, "arctan2", y, x)
-    low, high = b.select(cut, -_PI_UP, found.low), b.select(cut, _PI_UP, found.high)
+    angle = _corners(b, "arctan2", y, x)
+    low, high = b.select(cut, -_PI_UP, angle.low), b.select(cut, _PI_UP, angle.high)
     return Ends(low=low, high=high), cut
 
 
@@ -257,10 +257,10 @@ def _rest(name: str) -> Callable[..., _Result]:
 
 def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
     a = absolute_of(b, x)
-    turned = neg(b, a)
+    mirrored = neg(b, a)
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
-    low = b.select(positive, a.low, turned.low)
-    high = b.select(negative, turned.high, a.high)
+    low = b.select(positive, a.low, mirrored.low)
+    high = b.select(negative, mirrored.high, a.high)
     open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
     return defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
@@ -275,8 +275,8 @@ def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
     known = b.logic("or", b.logic("or", after, before), here)
     jumps = b.logic("xor", known, constant(True, known.width, "b"))
-    found = Ends(low=ends[0], high=ends[1])
-    return defined(b, b.compare("ord", x.low, x.high), found), jumps
+    step = Ends(low=ends[0], high=ends[1])
+    return defined(b, b.compare("ord", x.low, x.high), step), jumps
 
 
 def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:

@@ -13,20 +13,20 @@ MOST_NUMBERS = 3_000  # numbers, beyond which code would take too long to make
 
 def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
     """Return expressions in a graph of their own, in which everything is a number."""
-    graph, made = UnroundedGraph(), {}
+    graph, new = UnroundedGraph(), {}
     for node in needed(results):
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no enclosure")
-        made[node] = _elements(graph, node, made)
+        new[node] = _elements(graph, node, new)
         if len(graph.nodes) > MOST_NUMBERS:
             raise Untraceable(f"more than {MOST_NUMBERS} numbers are computed")
-    return graph, [made[expr][0] for expr in results]
+    return graph, [new[expr][0] for expr in results]
 
 
-def _elements(graph: Graph, node: Expr, made: Mapping[Expr, list[Expr]]) -> list[Expr]:
+def _elements(graph: Graph, node: Expr, elements: Mapping[Expr, list[Expr]]) -> list[Expr]:
     """Return the elements of a vector, or a number as the only one."""
     size = node.size or 1
-    parts = [made[arg] for arg in node.args]
+    parts = [elements[arg] for arg in node.args]
     if node.op == "const":
         return [graph.const(bool(node.data) if node.kind == "b" else float(node.data))]
     if node.op == "table":

@@ -144,10 +144,10 @@ class EnclosureWriter:
             return logic(b, node.op, *args)
         if node.op == "select":
             return self._choice(node, *args)
-        found, jumps = interval_of(b, node.op, *args)
+        result, jumps = interval_of(b, node.op, *args)
         if jumps is not None:
             self.jumps[node] = jumps
-        return found
+        return result
 
     def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
         if node.kind == "b":
@@ -175,12 +175,12 @@ class EnclosureWriter:
 
     def may_jump(self, expr: Expr) -> Value | None:
         """Return where an expression may jump; None if nowhere."""
-        found: Value | None = None
+        jump: Value | None = None
         for node in needed([expr]):
             if node in self.jumps:
                 here = self.jumps[node]
-                found = here if found is None else self.b.logic("or", found, here)
-        return found
+                jump = here if jump is None else self.b.logic("or", jump, here)
+        return jump
 
 
 def _function(b: Body, name: str, *arguments: str) -> str:
@@ -211,14 +211,14 @@ def _judge(
     box = [w.side("x", i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
-    inner, found = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
-    b.write(f"call void @values(ptr {inner}, ptr {found})")
+    inner, written = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
+    b.write(f"call void @values(ptr {inner}, ptr {written})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
         value = _read(w, rows.values + 2 * k)
         at_centre.append(value)
         bounds.append(_bound(w, expr, value, slopes[k], steps))
-    _kept(w, rows, bounds, at_centre, [_weights(b, box, each) for each in slopes])
+    _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes])
     b.write("ret void")
     return _function(b, "judge", "x", "o")
 
@@ -277,11 +277,11 @@ def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value
     """Return how much a result changes along each side; not a number if one is not known."""
     widths = [b.sub(side.high, side.low, exact=True) for side in box]
     steep = [absolute_of(b, slope).high for slope in slopes]
-    found = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
+    weights = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
     known = b.wide(0.0, box[0].low.width)
     for s in steep:
         known = b.add(known, b.mul(s, 0.0, exact=True), exact=True)
-    return [b.add(v, known, exact=True) for v in found]
+    return [b.add(v, known, exact=True) for v in weights]
 
 
 def _kept(

@@ -74,12 +74,12 @@ def equations(
         rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
         y = reader.wired(schedule.outputs)
         events = _events(reader, schedule)
-        found = _conditions(schedule.system, reader, rates, y, events)
-        found = replace(found, located=(*found.located, *events.watched))
-        falls = [(row + found.rows, guard) for row, guard in events.guards.values()]
+        switches = _conditions(schedule.system, reader, rates, y, events)
+        switches = replace(switches, located=(*switches.located, *events.watched))
+        falls = [(row + switches.rows, guard) for row, guard in events.guards.values()]
         results = {
             "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
-            "g": events.declared + _located(reader, found) + falls,
+            "g": events.declared + _located(reader, switches) + falls,
             "m": list(events.committed.values()),
             "y": [(0, y)],
         }
@@ -93,19 +93,19 @@ def equations(
             results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
-        fixed_points=reader.fixed_points, conditions=found,
+        fixed_points=reader.fixed_points, conditions=switches,
     )  # fmt: skip
 
 
 def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
     """Return what leaves transport delays, by block: inputs behind those of the diagram."""
-    first, found = schedule.system.ninputs or 0, {}
+    first, signals = schedule.system.ninputs or 0, {}
     for k, line in enumerate(schedule.lines):
         i = line.block or 0
         if line.index == 0:
             shape = (schedule.nodes[i].system.noutputs,)
-            found[i] = leaf_vector(graph, "u", first + k, shape)
-    return found
+            signals[i] = leaf_vector(graph, "u", first + k, shape)
+    return signals
 
 
 def _conditions(
@@ -121,67 +121,67 @@ def _conditions(
     signs = [array for _, array in events.declared]
     kept = [array for _, array in events.committed.values()]
     others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
-    given = [each.function for each in events.watched if not watches_nan(each.what)]
+    given = [watch.function for watch in events.watched if not watches_nan(watch.what)]
     return found_conditions(reader, rates, signs, falls, others, given)
 
 
-def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
+def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     """Return the switching functions of conditions with their rows, behind those declared."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    made = []
-    for function in (each.function for each in found.located):
+    functions = []
+    for function in (condition.function for condition in switches.located):
         size = function.size or 1
         array = (
             Tracer(reader.graph, as_array(function), 0, size)
             if function.size
             else scalar(reader.graph, function).reshape(1)
         )
-        made.append((row, array))
+        functions.append((row, array))
         row += size
-    return made
+    return functions
 
 
 def _guards(reader: Reader) -> dict[int, tuple[int, Tracer]]:
     """Return the guards of blocks, by their places, with their rows but for those of conditions."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    made = {}
+    guards = {}
     for i, node in enumerate(reader.blocks):
         if count_guards(node):
-            made[i] = (row, reader.guards(i))
+            guards[i] = (row, reader.guards(i))
             row += count_guards(node)
-    return made
+    return guards
 
 
 def _resets(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return the states after jumps of all blocks with guards, with their rows."""
-    found, row = [], 0
+    resets, row = [], 0
     for i, node in enumerate(reader.blocks):
         if count_guards(node):
-            found.append((row, reader.resets(i)))
+            resets.append((row, reader.resets(i)))
             row += node.size
-    return found
+    return resets
 
 
 def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return the next states of sampled blocks to which something happens, with their rows."""
-    found, row = [], 0
+    states, row = [], 0
     for i, node in enumerate(reader.blocks):
         if node.sampled:
             if node.sampled.acts(reader.what):
-                found.append((row, reader.next_states(i)))
+                states.append((row, reader.next_states(i)))
             row += node.size
-    return found
+    return states
 
 
 def _events(reader: Reader, schedule: Schedule) -> _Events:
     """Return what blocks and the run declare."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
     at, behind, declared, committed = 0, 0, [], {}
-    for i, (own, kept) in enumerate(counts):
-        if own or kept:
+    for i, (count, kept) in enumerate(counts):
+        if count or kept:
             events = reader.events(i)
-            declared.append((at, events[:own]))
-            committed[i] = (behind, events[own:])
-            at, behind = at + own, behind + kept
+            declared.append((at, events[:count]))
+            committed[i] = (behind, events[count:])
+            at, behind = at + count, behind + kept
     watched = watched_conditions(reader, schedule)
     return _Events(declared=declared, guards=_guards(reader), committed=committed, watched=watched)

@@ -3,7 +3,7 @@
 A call has its arguments in memory, in rows of `c`; its results follow.  Machine code calls a C
 function: one that numba makes, or, where numba refuses, one that calls back into Python, which is
 slow and right.  An exception cannot pass through machine code: it is noted in the row behind the
-results, with the arguments behind it, and raised by whoever ends the evaluation.  Until then the
+results, with the arguments behind it, and raised by what ends the evaluation.  Until then the
 function is not called again for that member.
 """
 
@@ -120,18 +120,18 @@ def _by_numba(call: Call, lanes: int) -> Any:
         known = call.source()
     except (UsageError, TypeError, ValueError):
         return None
-    own = Source(
+    source = Source(
         source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
         names=known.names,
         taught=known.taught,
     )
-    module = loaded(own, {})
-    wanted = Wanted(
+    module = loaded(source, {})
+    request = Wanted(
         function=getattr(module, f"at_{call.name}"), signature=_ADDRESS, options=OPTIONS
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
-        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", wanted)
+        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", request)
 
 
 def _of_member(call: Call, lanes: int) -> list[str]:

@@ -77,9 +77,9 @@ class Machine:
 
 
 def _entries(functions: tuple[Any, ...]) -> np.ndarray:
-    found = [entry(function) for function in functions]
-    plain = any(callable(each) for each in found)
-    return np.array(found, dtype=object if plain else np.int64)
+    entries = [entry(function) for function in functions]
+    plain = any(callable(address) for address in entries)
+    return np.array(entries, dtype=object if plain else np.int64)
 
 
 def machine(
@@ -88,22 +88,22 @@ def machine(
     """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
 
     It has functions for all that happens to sampled blocks; where clocks with other parameters
-    meet as they do not in the diagram as it stands, these are made.
+    meet as they do not in the unchanged diagram, these are made.
 
     Where an integer that steers an equation has another value, the blocks' functions are read
     once more.  The first member's values decide: `fitting` says for which members they hold.
     """
     known = reading.cache.of(Machine)
     asked = set(happening)
-    for made in known:
-        if made.width == width and asked <= set(made.meetings) and made.lowered.holds_for(p):
-            return made
-    found, schedule, program = reading.equations, reading.schedule, reading.program
+    for code in known:
+        if code.width == width and asked <= set(code.meetings) and code.lowered.holds_for(p):
+            return code
+    traced, schedule, program = reading.equations, reading.schedule, reading.program
     extra = [what for what in happening if what not in program.meetings]
     meetings = (*program.meetings, *dict.fromkeys(extra))
-    if extra or not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(schedule, program.layout, p[:, 0], meetings)
-    lowered = lower(schedule, program, width, found)
+    if extra or not all(p[i, 0] == value for i, value in traced.graph.assumptions.items()):
+        traced = equations(schedule, program.layout, p[:, 0], meetings)
+    lowered = lower(schedule, program, width, traced)
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
@@ -125,9 +125,9 @@ def machine(
     return known[-1]
 
 
-def _hint(reading: Reading, made: Machine) -> None:
+def _hint(reading: Reading, code: Machine) -> None:
     """Say which functions take the time of Python, and at which line that is decided."""
-    for name in made.called_back:
+    for name in code.called_back:
         call = reading.equations.calls[name]
         _LOG.warning(
             "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
@@ -138,8 +138,8 @@ def _hint(reading: Reading, made: Machine) -> None:
 
 def fitting(reading: Reading, p: np.ndarray, width: int) -> np.ndarray:
     """Return for which members the machine code of the first one holds."""
-    made = machine(reading, np.repeat(p[:, :1], width, axis=1), width)
-    return np.array([made.lowered.holds_for(column) for column in p.T], dtype=bool)
+    code = machine(reading, np.repeat(p[:, :1], width, axis=1), width)
+    return np.array([code.lowered.holds_for(column) for column in p.T], dtype=bool)
 
 
 def evaluations(reading: Reading) -> tuple[Callable[..., None], Callable[..., None]]:
@@ -163,10 +163,10 @@ def prepared_parameters(
     reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> tuple[Machine, np.ndarray]:
     """Return machine code for a parameter vector, and what its functions take of that."""
-    each = np.repeat(p[:, None], width, axis=1)
-    code = machine(reading, each, width, happening)
+    members = np.repeat(p[:, None], width, axis=1)
+    code = machine(reading, members, width, happening)
     c = np.zeros((code.rows, width))
-    code.prepare(each, c)
+    code.prepare(members, c)
     return code, c
 
 

@@ -54,7 +54,7 @@ STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 class _Seen(dict[int, Any]):
     """Things that have been gone through, kept so that no other one takes their places.
 
-    `deep` says whether objects of libraries are looked into.
+    `deep` says whether objects of libraries are read.
     """
 
     def __init__(self, *, deep: bool) -> None:
@@ -93,7 +93,7 @@ def function_key(*things: Any) -> str:
 def content_key(*things: Any) -> str:
     """Return a key of what functions compute: the same wherever their files are.
 
-    Unlike `function_key` it does not tell functions of the same content in different modules.
+    Unlike `function_key` it is the same for functions of the same content in different modules.
     """
     return content_of(*things)[0]
 
@@ -229,20 +229,20 @@ def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> I
     """Yield text for what a function finds by texts, ``globals()["K"]``, and what it reads then."""
     where = f" in '{function.__qualname__}'"
     calls = _globals_of(function.__code__) - set(function.__globals__)
-    texts, found = _all_texts(function.__code__), list[str]()
+    texts, named = _all_texts(function.__code__), list[str]()
     if calls & FINDERS:
-        found = [text for text in texts if text in function.__globals__ and text not in names]
-        for text in found:
+        named = [text for text in texts if text in function.__globals__ and text not in names]
+        for text in named:
             yield text
             yield from _fingerprint(function.__globals__[text], seen, names)
     if {"environ", "getenv"} & set(names):
         yield from (f"environment {text} {os.environ.get(text)}" for text in texts)
-    unknown = calls & RUNNERS | (set() if found else calls & {"globals", "vars"})
+    unknown = calls & RUNNERS | (set() if named else calls & {"globals", "vars"})
     unknown |= {"import_module"} & set(names)
     for name in sorted(unknown):
         yield f"{OPAQUE}what '{name}' finds{where}"
-    for told in dict.fromkeys(asked_outside(function)):
-        yield f"{OPAQUE}{told}{where})"
+    for answer in dict.fromkeys(asked_outside(function)):
+        yield f"{OPAQUE}{answer}{where})"
     for name in imports_in(function, _is_named):
         yield f"{OPAQUE}what it imports when it is called ('{name}'{where})"
     for name in sorted((set(names) - {"open"}) & READERS | calls & {"open"}):
@@ -263,8 +263,8 @@ def _all_texts(code: types.CodeType) -> list[str]:
 def _globals_of(code: types.CodeType) -> set[str]:
     """Return the names that a code object, and those nested in it, read by themselves."""
     inner = [part for part in code.co_consts if isinstance(part, types.CodeType)]
-    found = {i.argval for i in dis.get_instructions(code) if "GLOBAL" in i.opname}
-    return found.union(*map(_globals_of, inner))
+    names = {i.argval for i in dis.get_instructions(code) if "GLOBAL" in i.opname}
+    return names.union(*map(_globals_of, inner))
 
 
 def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
@@ -296,7 +296,7 @@ def _is_note(name: str) -> bool:
 
 
 def _is_controls(thing: object) -> bool:
-    """Whether a function or a class is python-control's, whose version stands beside every key."""
+    """Whether a function or a class is python-control's, whose version stands next to every key."""
     return str(thing.__module__).partition(".")[0] == "control"
 
 
@@ -408,7 +408,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
 
 
 def _is_named(module: str) -> bool:
-    """Whether the version of a module stands beside every key."""
+    """Whether the version of a module stands next to every key."""
     return module.partition(".")[0] in ("nlctl", "control") or _is_library(module)
 
 

@@ -47,7 +47,7 @@ class Routine:
         self.bound(*arrays)()
 
     def bound(self, *arrays: np.ndarray) -> Callable[[], None]:
-        """Return a call with these arrays, which are looked at once; their values may change."""
+        """Return a call with these arrays, which are checked once; their values may change."""
         for array, shape in zip(arrays, self.shapes, strict=True):
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
@@ -67,8 +67,8 @@ class Routine:
 
     def check(self, c: np.ndarray) -> None:
         """Raise what a function that it has called has raised."""
-        for each in self.opaque:
-            each.check(c)
+        for call in self.opaque:
+            call.check(c)
 
 
 Runnable = Callable[..., None]
@@ -122,6 +122,6 @@ def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
 
 def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
     """Return the names of opaque functions that these call back in Python."""
-    found = [each for f in functions if isinstance(f, Routine) for each in f.opaque]
-    names = [each.call.name for each in found if each.call.name in each.native.called_back]
+    calls = [call for f in functions if isinstance(f, Routine) for call in f.opaque]
+    names = [call.call.name for call in calls if call.call.name in call.native.called_back]
     return tuple(dict.fromkeys(names))

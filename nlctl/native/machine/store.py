@@ -3,7 +3,7 @@
 An entry is one file: a mark, the SHA-256 of key and content, the content.  It is written in one
 step.  One that is damaged, cut short, or another key's is as good as none.
 
-The digest tells damage and not intent, so the files must be this user's alone: entries are machine
+The digest shows damage and not intent, so the files must be this user's alone: entries are machine
 code.  The file that was opened is asked who owns it and who may write to it, and so is the folder.
 What stands above the folder needs no such question: who can rename it can put another folder in
 its place, but its files belong to somebody else.
@@ -39,12 +39,12 @@ class CacheWarning(UserWarning):
     >>> with (
     ...     tempfile.TemporaryDirectory() as folder,
     ...     mock.patch.dict(os.environ, NLCTL_CACHE_DIR=folder),
-    ...     warnings.catch_warnings(record=True) as told,
+    ...     warnings.catch_warnings(record=True) as warned,
     ... ):
     ...     warnings.simplefilter("always")
     ...     os.chmod(folder, 0o777)
     ...     outputs = nlctl.compile(nlctl.block(nlctl.Gain(), "gain")).output(0, [], [1.0])
-    >>> {warning.category.__name__ for warning in told}
+    >>> {warning.category.__name__ for warning in warned}
     {'CacheWarning'}
     """
 
@@ -72,8 +72,8 @@ def read(key: str) -> bytes | None:
 def _content(descriptor: int, path: Path) -> bytes:
     """Return what is in an open file, nothing if it is not safe; close it."""
     try:
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode) or not _is_safe(found, path):
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode) or not _is_safe(status, path):
             return b""
         with open(descriptor, "rb", closefd=False) as file:
             return file.read()
@@ -100,13 +100,13 @@ def _entry(key: str, body: bytes) -> bytes:
     return MARK + hashlib.sha256(key.encode() + b"\0" + body).digest() + body
 
 
-def _is_safe(found: os.stat_result, path: Path) -> bool:
+def _is_safe(status: os.stat_result, path: Path) -> bool:
     """Whether a file or folder is this user's and nobody else may write to it; warn if not."""
     if sys.platform == "win32":  # no such owners and modes; a profile's folders are the user's own
         return True
-    if found.st_uid != os.geteuid():
+    if status.st_uid != os.geteuid():
         why, remedy = "belongs to another user", ""
-    elif found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    elif status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         why, remedy = "can be written to by others", f"run chmod go-w '{path}', or "
     else:
         return True

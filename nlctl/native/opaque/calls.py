@@ -1,4 +1,4 @@
-"""Functions of blocks that are called as they stand: what a program knows of each."""
+"""Functions of blocks that are called unchanged: what a program knows of each."""
 
 from __future__ import annotations
 

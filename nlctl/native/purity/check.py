@@ -153,16 +153,16 @@ def _bound(
     """Return the names of a call's arguments with their values."""
     places = [a.arg for a in arguments.posonlyargs + arguments.args]
     names = [*places, *(a.arg for a in arguments.kwonlyargs)]
-    found = dict.fromkeys(names, OUTSIDE)
+    bound = dict.fromkeys(names, OUTSIDE)
     if parent is None:  # a function's own defaults are objects that outlive the call
         defaults = function.__defaults__ or ()
         ends = places[len(places) - len(defaults) :]
-        found |= {k: captured(v) for k, v in zip(ends, defaults, strict=True)}
-        found |= {k: captured(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    found |= dict(zip(places, given, strict=False))
-    found |= {k: v for k, v in named.items() if k in names}
+        bound |= {k: captured(v) for k, v in zip(ends, defaults, strict=True)}
+        bound |= {k: captured(v) for k, v in (function.__kwdefaults__ or {}).items()}
+    bound |= dict(zip(places, given, strict=False))
+    bound |= {k: v for k, v in named.items() if k in names}
     if arguments.vararg:
-        found[arguments.vararg.arg] = holder(given[len(places) :])
+        bound[arguments.vararg.arg] = holder(given[len(places) :])
     if arguments.kwarg:
-        found[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
-    return found
+        bound[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
+    return bound

@@ -1,4 +1,4 @@
-"""Other people's functions, as they stand: dict parameters and unpacked arguments.
+"""Other people's functions, unchanged: dict parameters and unpacked arguments.
 
 A function of python-control takes ``params``, a dict, and ``x`` and ``u``, arrays of a size that
 is only known when it runs.  In machine code the parameters become a type of their own, made of a
@@ -112,7 +112,7 @@ class Params(types.Type):
 
     @property
     def key(self) -> Any:
-        """What tells it from other types: names may be alike."""
+        """What distinguishes it from other types: names may be alike."""
         return self.values
 
     def field(self, key: object) -> int | None:
@@ -133,10 +133,10 @@ def read_by_keys(typing_context, values):
     """Return a named tuple as a parameter dict."""
 
     def generate(context, builder, sig, args):
-        made = context.make_helper(builder, sig.return_type)
-        made.values = args[0]
+        params = context.make_helper(builder, sig.return_type)
+        params.values = args[0]
         context.nrt.incref(builder, sig.args[0], args[0])
-        return made._getvalue()
+        return params._getvalue()
 
     return Params(values)(values), generate
 
@@ -163,8 +163,8 @@ def _getitem(params, key):
 def _contains(params, key):
     if not (isinstance(params, Params) and isinstance(key, types.StringLiteral)):
         return None
-    found = params.field(key) is not None
-    return lambda params, key: found
+    is_there = params.field(key) is not None
+    return lambda params, key: is_there
 
 
 @overload_method(Params, "get", prefer_literal=True)

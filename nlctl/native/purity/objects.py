@@ -28,7 +28,7 @@ UNDERSTOOD = (
 
 
 def frozen(function: Any) -> Any:
-    """Return a function with constants in the place of the objects that it reads.
+    """Return a function with constants instead of the objects that it reads.
 
     Methods, `functools.partial` and objects that can be called become functions as well.  What
     cannot be replaced stays as it is, and numba will say so.
@@ -64,12 +64,12 @@ def frozen(function: Any) -> Any:
 
 
 def _with(function: FunctionType, names: dict[str, Any], cells: list[CellType]) -> FunctionType:
-    made = FunctionType(
+    copied = FunctionType(
         function.__code__, names, function.__name__, function.__defaults__, tuple(cells)
     )
-    made.__kwdefaults__ = function.__kwdefaults__
-    made.__module__, made.__qualname__ = function.__module__, function.__qualname__
-    return made
+    copied.__kwdefaults__ = function.__kwdefaults__
+    copied.__module__, copied.__qualname__ = function.__module__, function.__qualname__
+    return copied
 
 
 def _cell(name: str, cell: CellType, node: Definition) -> CellType:
@@ -159,22 +159,22 @@ def without_imports(function: FunctionType) -> FunctionType:
     One whose source cannot be read stays as it is.
     """
     try:
-        found = definition(function)
+        tree = definition(function)
     except Unreadable:
         return function
-    if not any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(found)):
+    if not any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(tree)):
         return function
     hoisted = _Hoist()
-    body = hoisted.visit(copy.deepcopy(found))
+    body = hoisted.visit(copy.deepcopy(tree))
     if not isinstance(body, ast.FunctionDef):
         return function
     body.decorator_list = []
     names = dict(function.__globals__)
     exec(compile(ast.Module(hoisted.found, []), "imports", "exec"), names)
-    made = _moved(body, function)
+    code = _moved(body, function)
     result = FunctionType(
-        made, names, function.__name__, function.__defaults__,
-        tuple(_cells_of(function)[name] for name in made.co_freevars),
+        code, names, function.__name__, function.__defaults__,
+        tuple(_cells_of(function)[name] for name in code.co_freevars),
     )  # fmt: skip
     result.__module__, result.__qualname__ = function.__module__, function.__qualname__
     return result

@@ -1,6 +1,6 @@
 """What a function asks of the world outside when it is called: files, clocks, chance, its frame.
 
-No key of the function changes with the answer, so that whoever keeps results by a key names it.
+No key of the function changes with the answer, so that what keeps results by a key names it.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def asked_outside(function: types.FunctionType) -> Iterator[str]:
             thing = cells[word] if word in cells else names.get(word)
             if not isinstance(thing, types.ModuleType):
                 continue
-            if told := outside_of(thing.__name__, follower):
-                yield f"{told} when it is called ('{word}.{follower}'"
+            if answer := outside_of(thing.__name__, follower):
+                yield f"{answer} when it is called ('{word}.{follower}'"
         for name in sorted(_FRAMES.intersection(code.co_names)):
             yield f"what '{name}' finds ('{name}'"
 
@@ -49,9 +49,9 @@ def asked_outside(function: types.FunctionType) -> Iterator[str]:
 def outside_of(module: str, name: str) -> str:
     """Return what a function of a module asks of the world; nothing if it asks nothing."""
     for place in (module, f"{module}.{name}", module.partition(".")[0]):
-        told, names = _MODULES.get(place, ("", _EVERYTHING))
-        if told and (not names or name in names):
-            return told
+        answer, names = _MODULES.get(place, ("", _EVERYTHING))
+        if answer and (not names or name in names):
+            return answer
     return ""
 
 
@@ -60,19 +60,19 @@ def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) 
 
     Whether one is imported already, and under which name, changes while a loop is used.
     """
-    found = {
+    modules = {
         word
         for code in _codes(function.__code__)
         for what, word in _words(code)
         if what == "IMPORT_NAME" and not is_library(word)
     }
-    return sorted(found)
+    return sorted(modules)
 
 
 @functools.lru_cache(maxsize=4096)  # code never changes
 def _words(code: types.CodeType) -> tuple[tuple[str, Any], ...]:
     """Return the instructions of a code object, each with what it is about."""
-    return tuple((each.opname, each.argval) for each in dis.get_instructions(code))
+    return tuple((step.opname, step.argval) for step in dis.get_instructions(code))
 
 
 @functools.lru_cache(maxsize=4096)
@@ -92,10 +92,10 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
 
 def _cells(function: types.FunctionType) -> dict[str, Any]:
     """Return what a function closes over, by name."""
-    found = {}
+    contents = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
-            found[name] = cell.cell_contents
+            contents[name] = cell.cell_contents
         except ValueError:  # not yet filled
             continue
-    return found
+    return contents

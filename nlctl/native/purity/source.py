@@ -31,7 +31,7 @@ class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a so
 
     def __init__(self, reason: str, advice: str) -> None:
         super().__init__(reason)
-        self.advice = advice  # what to do, beside the message, which says why
+        self.advice = advice  # what to do; the message says why
 
 
 def definition(function: FunctionType) -> Definition:
@@ -48,11 +48,11 @@ def definition(function: FunctionType) -> Definition:
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
         advice = "import its module again: was the file edited since?"
         raise Unreadable("its source is not what it was made of", advice)
-    found = [node for node in _candidates(places, code) if _contains(node, code)]
-    if not found or len({ast.dump(node) for node in found}) > 1:
+    nodes = [node for node in _candidates(places, code) if _contains(node, code)]
+    if not nodes or len({ast.dump(node) for node in nodes}) > 1:
         advice = "give each function a line of its own"
-        raise Unreadable("its source cannot be told from others on the same line", advice)
-    return found[0]
+        raise Unreadable("its source cannot be distinguished from others on the same line", advice)
+    return nodes[0]
 
 
 def source_file(function: FunctionType) -> str:
@@ -98,14 +98,14 @@ def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         body = ast.parse(text, file).body
-        found: set[CodeType] = set()
+        codes: set[CodeType] = set()
         for place, statement in enumerate(body):
             if _first_line(statement) <= line <= (statement.end_lineno or line):
                 for neighbours in _runs(body[:place], body[place + 1 :]):
                     cell = ast.Module([*neighbours, statement], type_ignores=[])
-                    made = compile(cell, file, "exec", flags=flags, dont_inherit=True)
-                    found |= set(_inside(made))
-    return frozenset(found)
+                    code = compile(cell, file, "exec", flags=flags, dont_inherit=True)
+                    codes |= set(_inside(code))
+    return frozenset(codes)
 
 
 def _runs(before: list[ast.stmt], after: list[ast.stmt]) -> Iterator[list[ast.stmt]]:

@@ -127,7 +127,7 @@ class KnownValue:
 
 
 def _marks(known: Any) -> Any:
-    """Return what tells one object that is known from another."""
+    """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)
     if isinstance(known, Local):

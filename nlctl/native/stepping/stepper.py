@@ -76,10 +76,10 @@ class SampledRun:
         with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
             self.code.rhs(*self._given, self.c, *self._made)
             self.code.check(self.c)
-            found = self._made[0][:, 0].copy()
-            if not np.isfinite(found).all():
+            states = self._made[0][:, 0].copy()
+            if not np.isfinite(states).all():
                 return None
-            self.states, self.inputs, self.k = found, u, self.k + 1
+            self.states, self.inputs, self.k = states, u, self.k + 1
             outputs = self.shown(u)
         return outputs if np.isfinite(outputs).all() else None
 
@@ -153,7 +153,7 @@ class StepperState:
 
 
 class Stepper:
-    """A run that goes on whenever it is given inputs for another step; made by `stepper`.
+    """A run that continues whenever it is given inputs for another step; made by `stepper`.
 
     Attributes
     ----------
@@ -320,14 +320,14 @@ class Stepper:
                 f"{'no numbers' if given is None else given.shape}"
             )
         here = self.snapshot()
-        found = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
+        rows = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
         for k, u in enumerate(np.ascontiguousarray(given.T, dtype=float)):
             outputs = None if self._failed is not None else self._run.advance(u)
             if outputs is None:
                 break
-            found[:, k] = outputs
+            rows[:, k] = outputs
         self.restore(here)
-        return found
+        return rows
 
     def snapshot(self) -> StepperState:
         """Return all that the stepper knows, to come back to.
@@ -335,7 +335,7 @@ class Stepper:
         Returns
         -------
         StepperState
-            It does not change when the run goes on.
+            It does not change when the run continues.
         """
         run, states = self._run, self._run.states.copy()
         states.flags.writeable = False
@@ -390,19 +390,19 @@ class Stepper:
 
     def _fail(self) -> np.ndarray:
         """Note why the run has ended; raise it, or return NaN."""
-        made, p = self._run.ended(), self._run.p
+        result, p = self._run.ended(), self._run.p
         name, t = self.compiled.system.name, self._run.time
-        self._failed = failure(self.compiled, made, p, self._params) or DivergedError(
+        self._failed = failure(self.compiled, result, p, self._params) or DivergedError(
             f"'{name}' diverged: no finite outputs at t = {t:.6g} s", t
         )
         if self._ignores:
             return self._ended()
-        raise own_error(self.compiled, made, self._params) or self._failed
+        raise own_error(self.compiled, result, self._params) or self._failed
 
     def _ended(self) -> np.ndarray:
         """Return the outputs of a run that has ended."""
         if not self._ignores:
-            raise UsageError(f"{self.message}: call reset() or restore(state) to go on")
+            raise UsageError(f"{self.message}: call reset() or restore(state) to continue")
         return np.full(self.compiled.system.noutputs or 0, np.nan)
 
 
@@ -458,7 +458,7 @@ def stepper(
     Notes
     -----
     n steps are one run over n `dt` with ``hold="zoh"``, with the same numbers: memories, clocks,
-    delays, events and the steps of the integrator go on as if nobody had looked.  Where it matters
+    delays, events and the steps of the integrator continue unchanged.  Where it matters
     to the integrator how long the whole run is, they are the same to the tolerances: with functions
     of t alone, with event functions in steps below 1e-7 of the run, and without any input.
 
@@ -479,11 +479,11 @@ def stepper(
         rtol=rtol, atol=atol, method="auto" if method is None else method,
         **{name: value for name, value in given.items() if value is not None},
     )  # fmt: skip
-    made = as_compiled(system)
-    own = made.system.dt
-    if not ct.isctime(made.system) and own is not True and not np.isclose(own, dt):
+    compiled = as_compiled(system)
+    period = compiled.system.dt
+    if not ct.isctime(compiled.system) and period is not True and not np.isclose(period, dt):
         raise ParameterError(
-            f"stepper needs dt={own:g} for '{made.system.name}', which is in discrete time, got "
-            f"{dt:g}"
+            f"stepper needs dt={period:g} for '{compiled.system.name}', which is in discrete time, "
+            f"got {dt:g}"
         )
-    return Stepper(made, dt, settings, (audit, ignore_errors))
+    return Stepper(compiled, dt, settings, (audit, ignore_errors))

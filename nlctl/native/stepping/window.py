@@ -1,7 +1,7 @@
 """The times of a run with held inputs that is not over: a window of steps, laid out like a run.
 
 A run with held inputs has each value until the float before the next time.  A step ends there,
-before anything that is due at the next time; with the next inputs it goes on, as the run does.
+before anything that is due at the next time; with the next inputs it continues, as the run does.
 """
 
 from __future__ import annotations
@@ -141,9 +141,9 @@ def following(
         y=np.full((times.size, *work.y.shape[1:]), np.nan),
     )  # fmt: skip
     run = replace(window.run, machine=fresh.machine, task=task, work=work)
-    made = packed_window(run, first, times)
-    _begin(made.run)
-    return made
+    moved = packed_window(run, first, times)
+    _begin(moved.run)
+    return moved
 
 
 def _begin(run: Run) -> None:
@@ -170,10 +170,10 @@ _SHOWN = {  # what a step fills and nothing reads later
 
 def in_one_piece(work: Any) -> tuple[Any, np.ndarray]:
     """Return a workspace with its arrays in one piece of memory, and that memory."""
-    found = {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
+    arrays = {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
     places: dict[int, int] = {}  # arrays that are the same memory stay so
     size = 0
-    for array in found.values():
+    for array in arrays.values():
         if data_address(array) not in places:
             places[data_address(array)] = size
             size += -(-array.nbytes // _LINE) * _LINE
@@ -181,7 +181,7 @@ def in_one_piece(work: Any) -> tuple[Any, np.ndarray]:
     first = -whole.ctypes.data % _LINE
     memory = whole[first : first + size]
     views = {}
-    for path, array in found.items():
+    for path, array in arrays.items():
         begin = places[data_address(array)]
         views[path] = memory[begin : begin + array.nbytes].view(array.dtype).reshape(array.shape)
         views[path][:] = array
@@ -200,8 +200,8 @@ def _arrays(record: Any, path: tuple[str, ...] = ()) -> Any:
 
 def _with_arrays(record: Any, views: dict[tuple[str, ...], np.ndarray]) -> Any:
     """Return a record with other arrays."""
-    own = {path[0]: view for path, view in views.items() if len(path) == 1}
+    whole = {path[0]: view for path, view in views.items() if len(path) == 1}
     for name in {path[0] for path in views if len(path) > 1}:
         inside = {path[1:]: view for path, view in views.items() if path[0] == name}
-        own[name] = _with_arrays(getattr(record, name), inside)
-    return with_fields(record, **own)
+        whole[name] = _with_arrays(getattr(record, name), inside)
+    return with_fields(record, **whole)

@@ -57,27 +57,27 @@ class SeriesCode:
 def series_code(rates: Sequence[Expr]) -> SeriesCode:
     """Make the code for rates of the leaves ``x[0], x[1], ...``."""
     n = len(rates)
-    graph, own = with_leaves(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
-    every = _with_derivatives(graph, own)
+    graph, motion = with_leaves(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
+    every = _with_derivatives(graph, motion)
     stores = [Store(array="dx", row=i, expr=graph.number(e), size=1) for i, e in enumerate(every)]
     try:
-        found = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
+        series = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
     except NoSeriesError as error:
         raise Untraceable(str(error)) from None
     for node in graph.nodes:
         row = FUNCTIONS.get(node.op)
         if node.op in _CHOICES or (row is not None and row.series == "steady"):
             raise Untraceable("they have cases, kinks or jumps")
-    rows = found.rows
+    rows = series.rows
     sizes = {"b": rows["k"], **{name: rows[name] for name in ("a", "q", "o", "w")}, "x": 4 * n}
     at, end = {}, 0
     for name in _READ:
         at[name], end = end, end + sizes[name]
-    first = _code(graph, found.first, {"k": (0, rows["k"]), "o": (rows["k"], rows["o"])}, {"x": 0})
-    following = _code(graph, found.following, {"k": (0, rows["k"])}, at)
+    first = _code(graph, series.first, {"k": (0, rows["k"]), "o": (rows["k"], rows["o"])}, {"x": 0})
+    following = _code(graph, series.following, {"k": (0, rows["k"])}, at)
     return SeriesCode(
         order=n, rows=rows["k"], at={**at, "end": end}, first=first, following=following,
-        folds=np.array([*_sums(found.folds, at)], dtype=np.int64).reshape(-1, 3), kept=rows["o"],
+        folds=np.array([*_sums(series.folds, at)], dtype=np.int64).reshape(-1, 3), kept=rows["o"],
     )  # fmt: skip
 
 

@@ -100,19 +100,19 @@ def flow_derivatives(lanes, at, J, H):
 
 
 @kept(**AS_NUMPY)
-def add_up(k, orders, time, rest, found):
+def add_up(k, orders, time, rest, sums):
     """Write the polynomial at a time, an interval of shape (2,), with a rest of one more order.
 
-    Shapes: `k` (orders + 2, rows, 2, lanes), `rest, found` (4n, 2, lanes).
+    Shapes: `k` (orders + 2, rows, 2, lanes), `rest, sums` (4n, 2, lanes).
     """
-    for i in range(found.shape[0]):
-        for lane in range(found.shape[2]):
+    for i in range(sums.shape[0]):
+        for lane in range(sums.shape[2]):
             low, high = rest[i, 0, lane], rest[i, 1, lane]
             for order in range(orders, -1, -1):
                 low, high = interval_product(low, high, time[0], time[1])
                 low = down(low + k[order, i, 0, lane])
                 high = up(high + k[order, i, 1, lane])
-            found[i, 0, lane], found[i, 1, lane] = low, high
+            sums[i, 0, lane], sums[i, 1, lane] = low, high
 
 
 @kept(**AS_NUMPY)

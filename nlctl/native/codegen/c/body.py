@@ -46,9 +46,9 @@ class CModule:
         for values, name in self.tables.items():
             numbers = ", ".join(map(c_number, values))
             tables.append(f"static const double {name}[{len(values)}] = {{{numbers}}};")
-        found = "\n".join([*tables, *self.functions.values()])
-        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in found]
-        return "\n".join([*used, found])
+        body = "\n".join([*tables, *self.functions.values()])
+        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in body]
+        return "\n".join([*used, body])
 
 
 def _called(line: str) -> str:
@@ -214,10 +214,10 @@ class CBody:
 
     def load(self, where: str, width: int) -> Value:
         self.note("")
-        found = self.new(where)
+        value = self.new(where)
         if where in self.labels:
             self.lines[-1] += f" /* {self.labels[where]} */"
-        return found
+        return value
 
     def store(self, value: Value, where: str) -> None:
         self.write(f"{where} = {value.text};")

@@ -73,11 +73,11 @@ def applied(b: Body, name: str, *args: Value) -> Value:
     return b.each(code, *args)
 
 
-def sin_cos(b: Body, x: Value, wanted: set[str]) -> dict[str, Value]:
+def sin_cos(b: Body, x: Value, kinds: set[str]) -> dict[str, Value]:
     """Return sine, cosine or both of one angle."""
-    if len(wanted) == 2:
+    if len(kinds) == 2:
         return dict(zip(("sin", "cos"), _call(b, "sincos", _sin_and_cos, x), strict=True))
-    (name,) = wanted
+    (name,) = kinds
     make = _sin if name == "sin" else _cos
     return {name: _call(b, name, make, x)[0]}
 

@@ -104,11 +104,11 @@ class _Loop:
                 w.names[node] = outer[node] = self.b.add(w.names[node], term)
             else:
                 w.names[node] = w.operation(node)
-        for each in self.loop.stores:
-            self._reads((each.expr,), index, at)
-            array, row, step = each.array, each.row, self.lanes
+        for store in self.loop.stores:
+            self._reads((store.expr,), index, at)
+            array, row, step = store.array, store.row, self.lanes
             where = self.b.address(array, (row + at) * step, index, step)
-            self.b.store(self.b.wide(w.names[each.expr], self.chunk), where)
+            self.b.store(self.b.wide(w.names[store.expr], self.chunk), where)
         w.names, w.pairs = outer, pairs
 
     def _kept(self, term: Value, skipped: int) -> Value:

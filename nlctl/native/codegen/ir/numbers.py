@@ -132,19 +132,19 @@ class Writer:
         x = b.gathered([self.names[a] for a in angles], 2 if len(angles) == 2 else PACKED)
         kinds = {node.op for node in nodes}
         if kinds <= {"sin", "cos"}:
-            found = sin_cos(b, x, kinds)
+            values = sin_cos(b, x, kinds)
         else:
-            found = {kind: applied(b, kind, x) for kind in kinds}
+            values = {kind: applied(b, kind, x) for kind in kinds}
         for node in nodes:
-            self.names[node] = b.element(found[node.op], angles.index(node.args[0]))
+            self.names[node] = b.element(values[node.op], angles.index(node.args[0]))
 
 
 def _depths(nodes: tuple[Expr, ...], is_packable: Any) -> dict[Expr, int]:
     """Return how many functions stand one behind the other before each number of a level."""
-    found: dict[Expr, int] = {}
+    depth: dict[Expr, int] = {}
     for node in nodes:
-        found[node] = max((found[a] + is_packable(a) for a in node.args if a in found), default=0)
-    return found
+        depth[node] = max((depth[a] + is_packable(a) for a in node.args if a in depth), default=0)
+    return depth
 
 
 def one_line(node: Expr) -> str:

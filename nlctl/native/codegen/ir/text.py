@@ -264,11 +264,11 @@ class Body:
         if full not in self.module.functions:
             self.module.functions[full] = ""  # before those that it calls
             self.module.functions[full] = self._defined(full, kind, make, args)
-        found = self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
+        result = self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
         if count == 1:
-            return (found,)
+            return (result,)
         return tuple(
-            self.new(f"extractvalue {kind} {found.text}, {i}", width) for i in range(count)
+            self.new(f"extractvalue {kind} {result.text}, {i}", width) for i in range(count)
         )
 
     def _full(self, name: str, width: int) -> str:
@@ -311,10 +311,10 @@ class Body:
         if full not in self.module.functions:
             inner, (given, known) = Body(self.module), (Value("%x", x.width), Value("%y", x.width))
             is_far = inner.compare("ogt", inner.intrinsic("fabs", given), limit)
-            found = inner.select(is_far, inner.each(name, given), known)
+            value = inner.select(is_far, inner.each(name, given), known)
             self.module.functions[full] = (
                 f"define internal preserve_allcc {kind} {full}({given}, {known}) "
-                f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {found}\n}}\n"
+                f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {value}\n}}\n"
             )
         return self.new(f"call preserve_allcc {kind} {full}({x}, {y})", x.width)
 
