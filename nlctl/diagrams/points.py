@@ -8,7 +8,7 @@ the diagram, so that nobody else who evaluates it is disturbed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -57,6 +57,17 @@ def agree(
     with np.errstate(invalid="ignore"):
         allowed = relative * np.maximum(np.abs(a), np.abs(b)) + absolute
         return np.asarray((a == b) | (np.abs(a - b) <= allowed))
+
+
+def first_difference(
+    labels: Sequence[Sequence[str]], one: PointValues, other: PointValues, allowed: PointValues
+) -> tuple[str, float, float] | None:
+    """Return the first of some values that differ by more than is allowed: what it is, and both."""
+    for names, a, b, most in zip(labels, one, other, allowed, strict=True):
+        differ = np.flatnonzero(~agree(a, b, most))
+        if differ.size:
+            return names[differ[0]], a[differ[0]], b[differ[0]]
+    return None
 
 
 def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:

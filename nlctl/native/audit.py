@@ -19,7 +19,7 @@ import numpy as np
 from ..blocks import supplied_of
 from ..delays.transport import PAST
 from ..diagrams import Apart, apart, override, supplied_blocks
-from ..diagrams.points import SHAKEN, PointValues, agree, explained, values_now
+from ..diagrams.points import SHAKEN, PointValues, agree, explained, first_difference, values_now
 from ..errors import ParameterError, UsageError
 from ..sampling.system import Happening, happening
 from ..supplied import SuppliedOutput, supplying
@@ -202,12 +202,11 @@ def _compare_beyond_rounding(
         system.state_labels, [*system.output_labels, *arrivals], *[after] * len(trial.meetings),
         *declared_labels(compiled.schedule),
     ]  # fmt: skip
-    for labels, a, b, most in zip(names, ours, theirs, allowed, strict=True):
-        wrong = np.flatnonzero(~agree(a, b, most))
-        if wrong.size:
-            if not compiled.program.sampled:
-                _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
-            raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
+    differ = first_difference(names, ours, theirs, allowed)
+    if differ is not None:
+        if not compiled.program.sampled:
+            _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
+        raise _difference(differ, system.name, point[0])
 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointValues:
@@ -341,9 +340,9 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
                 lambda *near, f=function, s=block: (f(s, *near),), (t, x[own], inputs), (b,),
                 _later(point, trial),
             )  # fmt: skip
-            wrong = np.flatnonzero(~agree(a, b, moved + most))
-            if wrong.size:
-                raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
+            differ = first_difference([labels], (a,), (b,), (moved + most,))
+            if differ is not None:
+                raise _difference(differ, node.path, t)
 
 
 def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
@@ -413,8 +412,8 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarra
     return outputs
 
 
-def _difference(label: str, block: str, values: tuple[Any, Any], t: float) -> AuditError:
-    ours, theirs = values
+def _difference(differ: tuple[str, float, float], block: str, t: float) -> AuditError:
+    label, ours, theirs = differ
     return AuditError(
         f"machine code and python-control differ at '{label}' of block '{block}': {ours:.17g} and "
         f"{theirs:.17g} at t = {t:.6g} s; nothing was returned: run it with "

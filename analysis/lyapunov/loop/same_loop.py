@@ -15,7 +15,14 @@ import control as ct
 import numpy as np
 
 from nlctl.diagrams import state_names
-from nlctl.diagrams.points import PointFunction, PointValues, agree, explained, rates_and_outputs
+from nlctl.diagrams.points import (
+    PointFunction,
+    PointValues,
+    agree,
+    explained,
+    first_difference,
+    rates_and_outputs,
+)
 from nlctl.errors import DiagramError, UsageError
 
 from ...loop_record import array_text, text_key
@@ -102,13 +109,13 @@ def _compare(
 ) -> None:
     """Compare one point; what is not a number in both is the same."""
     (a,), (b,) = (function(*point) for function in both)
-    differ = ~agree(a, b) & ~(np.isnan(a) & np.isnan(b))
-    if differ.any():
-        (most,) = explained(both[0], point, (a,))
-        differ &= ~agree(a, b, most)
-    if differ.any():
-        i = int(np.argmax(differ))
+    a, b = (np.where(np.isnan(a) & np.isnan(b), 0.0, values) for values in (a, b))
+    if agree(a, b).all():
+        return
+    differ = first_difference([what], (a,), (b,), explained(both[0], point, (a,)))
+    if differ is not None:
+        label, one, other = differ
         raise DiagramError(
             f"'{given.name}' is not the loop that the proof is about: at t = {point[0]:.6g} s "
-            f"{what[i]} is {a[i]:.9g}, and {b[i]:.9g} with the blocks connected by name"
+            f"{label} is {one:.9g}, and {other:.9g} with the blocks connected by name"
         )
