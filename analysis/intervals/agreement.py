@@ -94,10 +94,8 @@ def agreeing(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., A
 def on_balls(
     function: Callable[..., Any], refusal: Callable[[str], UsageError]
 ) -> Callable[..., Any]:
-    """Return a function of a user's for balls: where it fails on them, `refusal` says so.
-
-    Wherever it does not fail it is also called with floats, see `agreeing`.
-    """
+    """Return a function of a user's for balls: where it fails on them, `refusal` says so."""
+    # Wherever it does not fail it is also called with floats, see `agreeing`.
     compared = agreeing(function, refusal)
 
     def called(*arguments: Any) -> Any:

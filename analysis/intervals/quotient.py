@@ -83,10 +83,8 @@ class Slope(NumPyFunctions):
         return self if self >= other else other
 
     def pair(self, name: str, other: Any) -> Any:
-        """Return phi of this and another quantity for the NumPy function of that name.
-
-        By the mean value theorem: the derivatives are those between v and 0.
-        """
+        """Return phi of this and another quantity for the NumPy function of that name."""
+        # By the mean value theorem: the derivatives are those between v and 0.
         other = self.lifted(other)
         if other is NotImplemented:
             return other
@@ -150,12 +148,10 @@ class Slope(NumPyFunctions):
 
 
 def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
-    """Return (phi(a) - phi(b)) / (a - b), with the limit phi'(a) where a = b.
-
-    It is the mean of phi' between a and b, so it lies in phi'(hull) and its derivatives with
-    respect to a and b lie in phi''(hull) / 2.  Where a - b has no zero the quotient itself is
-    an enclosure as well.
-    """
+    """Return (phi(a) - phi(b)) / (a - b), with the limit phi'(a) where a = b."""
+    # It is the mean of phi' between a and b, so it lies in phi'(hull) and its derivatives with
+    # respect to a and b lie in phi''(hull) / 2. Where a - b has no zero the quotient itself is an
+    # enclosure as well.
     if name in JUMPS or name == "sinc":
         return _secant_of_jump(name, a, b, at_a, at_b)
     mean = as_ball(FUNCTIONS[name].derivative[0](Ball(a.value.union(b.value), (arb(1),))))

@@ -55,11 +55,9 @@ class Filtered:
         return bounds
 
     def _errors(self) -> tuple[list[Fraction], Fraction]:
-        """Return bounds of |e_1|, ..., |e_n| while |r| < C, and of |r(0)|.
-
-        r is what a chain of filters makes of e_1:
-        z_0 = e_1, z_i = z_(i-1)' + p_i z_(i-1), and the last one is r.
-        """
+        """Return bounds of |e_1|, ..., |e_n| while |r| < C, and of |r(0)|."""
+        # r is what a chain of filters makes of e_1: z_0 = e_1, z_i = z_(i-1)' + p_i z_(i-1), and
+        # the last one is r.
         poles = self._poles()[::-1]
         starts = [self.e0]  # of z_i and its derivatives
         for p in poles:

@@ -15,11 +15,9 @@ from .memories import relaxation
 
 @equation
 def play_band(u, p):
-    """Return the lower and upper output that the gap admits at input u.
-
-    The lines are m_r (u - c_r), taken when u rises, and m_l (u - c_l), taken when it falls.  With
-    unequal slopes they cross; sorting them keeps the operator defined and continuous there.
-    """
+    """Return the lower and upper output that the gap admits at input u."""
+    # The lines are m_r (u - c_r), taken when u rises, and m_l (u - c_l), taken when it falls. With
+    # unequal slopes they cross; sorting them keeps the operator defined and continuous there.
     rising, falling = p.m_r * (u - p.c_r), p.m_l * (u - p.c_l)
     return np.minimum(rising, falling), np.maximum(rising, falling)
 

@@ -21,11 +21,9 @@ def envelope(u, a):
 
 @equation
 def envelope_bands(u, p):
-    """Return the lower and upper end of each play at input u.
-
-    Where the envelopes cross by more than 2 r they are sorted, as the lines of `Backlash` are:
-    the operator stays defined and continuous there.
-    """
+    """Return the lower and upper end of each play at input u."""
+    # Where the envelopes cross by more than 2 r they are sorted, as the lines of `Backlash` are:
+    # the operator stays defined and continuous there.
     rising, falling = envelope(u, p.rising) - p.r, envelope(u, p.falling) + p.r
     return np.minimum(rising, falling), np.maximum(rising, falling)
 

@@ -24,11 +24,9 @@ def kept_side(side):
 
 @equation
 def held_side(side):
-    """Side that a relay outputs: its memory's, never that of its input.
-
-    Behind a threshold a loop may lead back before the memory has switched, and would never leave
-    it.  Beyond 1 a memory is its own side: it jumps, and nothing pushes it.
-    """
+    """Side that a relay outputs: its memory's, never that of its input."""
+    # Behind a threshold a loop may lead back before the memory has switched, and would never leave
+    # it. Beyond 1 a memory is its own side: it jumps, and nothing pushes it.
     return kept_side(side) * np.maximum(1.0, np.abs(side))
 
 

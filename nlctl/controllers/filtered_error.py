@@ -36,10 +36,8 @@ def binomial_lambdas(order: int) -> tuple[float, ...]:
 
 
 def is_hurwitz(coefficients: Sequence[float]) -> bool:
-    """Whether all roots of a polynomial lie in the open left half plane.
-
-    By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
-    """
+    """Whether all roots of a polynomial lie in the open left half plane."""
+    # By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
     numbers = [Fraction(c) for c in coefficients]
     above, row = numbers[::2], numbers[1::2]
     while row:

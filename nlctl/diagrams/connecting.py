@@ -338,11 +338,9 @@ def _state_labels(before: Any, parts: Sequence[Any]) -> list[str]:
 def connected_by_lists(
     systems: Sequence[Any], connections: Any, inplist: Any, outlist: Any
 ) -> Callable[..., Any]:
-    """Check the names in lists of python-control; return what connects blocks by them.
-
-    That takes ``(systems, inputs, outputs, name)`` and returns the diagram; it refuses what
-    python-control refuses, and an input that nothing feeds.
-    """
+    """Check the names in lists of python-control; return what connects blocks by them."""
+    # That takes ``(systems, inputs, outputs, name)`` and returns the diagram; it refuses what
+    # python-control refuses, and an input that nothing feeds.
     for what in (connections, inplist, outlist):
         for text in _texts(what):
             _check_name(systems, text)

@@ -49,10 +49,7 @@ def rates_and_outputs(system: System, params: Mapping[str, Any] | None = None) -
 def agree(
     a: npt.ArrayLike, b: npt.ArrayLike, absolute: Any = 0.0, relative: float = SAME_FUNCTIONS
 ) -> np.ndarray:
-    """Return where values are equal to rounding; NaN equals nothing.
-
-    Shapes: `a, b` (m,).
-    """
+    """Return where values are equal to rounding; NaN equals nothing; shapes: `a, b` (m,)."""
     a, b = np.asarray(a), np.asarray(b)
     with np.errstate(invalid="ignore"):
         allowed = relative * np.maximum(np.abs(a), np.abs(b)) + absolute
@@ -71,10 +68,8 @@ def first_difference(
 
 
 def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
-    """Yield points as far as rounding may move one.
-
-    Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
-    """
+    """Yield points as far as rounding may move one."""
+    # Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
     t, x, u = point
     places = np.arange(x.size + u.size)
     for bit in range(int(places.size).bit_length() + 1):

@@ -32,10 +32,8 @@ class _CanChange(Exception):  # noqa: N818
 
 
 def standing(copies: Apart, params: Mapping[str, Any] | None) -> list[Any] | None:
-    """Return all that parameters hang on, in an order; None where some can change in place.
-
-    They are what they were if each of it is the same object.
-    """
+    """Return all that parameters hang on, in an order; None where some can change in place."""
+    # They are what they were if each of it is the same object.
     try:
         things = list(_of_mapping(params or {}))
         for old, _ in copies.pairs.values():

@@ -30,11 +30,9 @@ def _up(value: float) -> float:
 
 
 def _outlets(plan: LayoutPlan, n: int) -> tuple[dict[int, float], float]:
-    """Heights of a block's outlets below its axis, and half the height that they need.
-
-    Wires to the next column leave on the axis, those to the channels outside of them; the
-    far-reaching stand nearer to the axis, where they do not cross the others.
-    """
+    """Heights of a block's outlets below its axis, and half the height that they need."""
+    # Wires to the next column leave on the axis, those to the channels outside of them; the far-
+    # reaching stand nearer to the axis, where they do not cross the others.
     rank: dict[int, tuple[float, float]] = {}
     for i, wire in enumerate(plan.wires):
         if wire.source == n:

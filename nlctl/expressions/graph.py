@@ -247,10 +247,8 @@ class Graph:
         return a if a.kind == "i" else self.node(a.op, *a.args, data=a.data, size=a.size, kind="i")
 
     def _of_truth_values(self, name: str, *args: Expr) -> Expr:
-        """Return what NumPy makes of truth values alone.
-
-        Of Python's own, such as ``t > 1``, a sum is 2 and not True.
-        """
+        """Return what NumPy makes of truth values alone."""
+        # Of Python's own, such as ``t > 1``, a sum is 2 and not True.
         meaning = BOOLEAN[name]
         if meaning is None:
             raise Ambiguous(

@@ -18,10 +18,8 @@ class _Quantity:
 
 
 def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
-    """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative.
-
-    Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
-    """
+    """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative."""
+    # Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
     quantities: dict[Expr, _Quantity] = {}
     for node in needed([result]):
         if node is variable:

@@ -28,12 +28,10 @@ PATHS = 128  # paths through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
-    """Run a function on tracers and return its result in one dimension.
-
-    A condition that depends on tracers is followed both ways: the function runs again for every
-    way through it, and the results are combined by ``select``, which takes the branch that Python
-    takes, also for NaN.
-    """
+    """Run a function on tracers and return its result in one dimension."""
+    # A condition that depends on tracers is followed both ways: the function runs again for every
+    # way through it, and the results are combined by ``select``, which takes the branch that Python
+    # takes, also for NaN.
     graph.limit = len(graph.nodes) + BUDGET
     assumptions = dict(graph.assumptions)
     try:

@@ -103,10 +103,8 @@ def with_faults(diagram: System, *faults: Fault) -> ct.InterconnectedSystem:
 
 
 def signal_names(diagram: System) -> list[str]:
-    """Return the names of all signals that a fault can be on.
-
-    External inputs first, then outputs and inputs of all blocks and nested diagrams.
-    """
+    """Return the names of all signals that a fault can be on."""
+    # External inputs first, then outputs and inputs of all blocks and nested diagrams.
     return list(_spots(known_system("signal_names", diagram)))
 
 

@@ -43,11 +43,9 @@ class Condition:
 
 
 def parse_condition(text: str) -> Condition:
-    """Read a condition such as ``|e| > 0.5``.
-
-    ``>`` and ``>=`` say the same: the instant at which a signal reaches a level is that at which
-    it passes it.
-    """
+    """Read a condition such as ``|e| > 0.5``."""
+    # ``>`` and ``>=`` say the same: the instant at which a signal reaches a level is that at which
+    # it passes it.
     match = TEXT.fullmatch(text) if isinstance(text, str) else None
     if match is None or match[1] != match[3]:
         raise ParameterError(

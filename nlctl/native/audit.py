@@ -233,11 +233,9 @@ def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
 
 
 def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
-    """Compare the rates of sliding relays' inputs with those that they are to have.
-
-    Python-control's right-hand side is compared with the relays' outputs as machine code has them.
-    That these keep the inputs where they are is seen here, from python-control's own rates.
-    """
+    """Compare the rates of sliding relays' inputs with those that they are to have."""
+    # Python-control's right-hand side is compared with the relays' outputs as machine code has
+    # them. That these keep the inputs where they are is seen here, from python-control's own rates.
     for i, v in trial.relays.items():
         node = compiled.schedule.nodes[i]
         spec = trial.of(node.system).current_spec  # the run's parameters are resolved by now
@@ -259,10 +257,8 @@ def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
 
 
 def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.ndarray:
-    """Return how fast a relay's input changes along python-control's own rates.
-
-    By differences before the point, around it and behind it.
-    """
+    """Return how fast a relay's input changes along python-control's own rates."""
+    # By differences before the point, around it and behind it.
     t, x, u = point
     rates = _by_python_control(compiled, point, trial)[0]
     rates[list(compiled.program.memory)] = 0.0  # they stand still within a step
@@ -303,11 +299,9 @@ def _line(values: np.ndarray) -> SuppliedOutput:
 
 
 def _later(point: Any, trial: Trial) -> float:
-    """Return how much later rounding may make it; near t = 0 a part of the run counts.
-
-    It must be seen next to phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
-    1.2e-16 at t = 0.
-    """
+    """Return how much later rounding may make it; near t = 0 a part of the run counts."""
+    # It must be seen next to phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
+    # 1.2e-16 at t = 0.
     step = float(np.max(np.diff(trial.time), initial=0.0))
     return SHAKEN * max(abs(point[0]), step, _PART_OF_RUN * float(np.ptp(trial.time)))
 

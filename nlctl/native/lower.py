@@ -84,10 +84,8 @@ class Lowered:
 
     @property
     def portable(self) -> frozenset[str]:
-        """Functions that round alike on every processor: a computer's program is what runs there.
-
-        What samples compute, and what they read of parameters.
-        """
+        """Functions that round alike everywhere: a computer's program is what runs there."""
+        # What samples compute, and what they read of parameters.
         samples = {name for name in self.functions if name.startswith("sample")}
         return frozenset(samples | {"prepare"} if samples else ())
 
@@ -162,11 +160,9 @@ def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
 def planned(
     stores: Mapping[str, list[Store]], arguments: Mapping[str, tuple[str, ...]], parameters: int
 ) -> tuple[dict[str, Function], int]:
-    """Return the plans of all functions, and how many rows of `c` they need.
-
-    What depends on parameters alone is computed by `prepare`, and what else depends on no
-    direction by `point`.
-    """
+    """Return the plans of all functions, and how many rows of `c` they need."""
+    # What depends on parameters alone is computed by `prepare`, and what else depends on no
+    # direction by `point`.
     results = [s.expr for part in stores.values() for s in part]
     varying = {node for node in needed(results) if node.varies}
     known = _computed_before(results, varying, parameters)
@@ -221,10 +217,8 @@ def _computed_before(
     rows: int,
     known: Mapping[Expr, tuple[str, int]] | None = None,
 ) -> dict[Expr, tuple[str, int]]:
-    """Return what is used and is not inside, with its place in `c`, beyond what is known already.
-
-    A parameter has the place there that it has in `p`; what is computed lies from `rows` on.
-    """
+    """Return what is used and is not inside, with its place in `c`, beyond what is known."""
+    # A parameter has the place there that it has in `p`; what is computed lies from `rows` on.
     known, inside = known or {}, set(inside)
     nodes = needed(results, known)
     used = set(results) - inside

@@ -260,10 +260,8 @@ def _entry(name: str, slot: Slot, index: Index) -> str:
 
 
 def _beside_a_profiler(function: Callable[[], Any]) -> Any:
-    """Return what a function returns that sets a profiler of its own, as `_local_names` does.
-
-    Where one is at work, such as cProfile's, which Python cannot set again, in another thread.
-    """
+    """Return what a function returns that sets a profiler of its own, as `_local_names` does."""
+    # Where one is at work, such as cProfile's, which Python cannot set again, in another thread.
     if sys.getprofile() is None:
         return function()
     with ThreadPoolExecutor(1) as thread:

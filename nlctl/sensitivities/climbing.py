@@ -61,11 +61,9 @@ def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
 def _step(
     at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float, effort: float
 ) -> tuple[np.ndarray, float]:
-    """Return the best step within reach if margins were linear, and what it promises.
-
-    Slopes of other choices of gains count, too, as far as they do not say less of this one than
-    what is known of it.
-    """
+    """Return the best step within reach if margins were linear, and what it promises."""
+    # Slopes of other choices of gains count, too, as far as they do not say less of this one than
+    # what is known of it.
     rows, limits, k = [], [], at.size
     for place, worth in [(at, here), *others]:
         rows.append(np.hstack([-worth.slopes, worth.slopes, np.ones((len(worth.slopes), 1))]))

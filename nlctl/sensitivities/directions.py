@@ -102,10 +102,8 @@ def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
 
 
 def one_sided(graph: Graph, exprs: Sequence[Expr], direction: Direction) -> list[Expr]:
-    """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads.
-
-    Their derivatives along that direction are those to its own side.
-    """
+    """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads."""
+    # Their derivatives along that direction are those to its own side.
     new: dict[Expr, Expr] = {}
     for node in needed(exprs):
         args = tuple(new.get(a, a) for a in node.args)

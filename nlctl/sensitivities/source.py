@@ -89,10 +89,8 @@ class EquationParts:
     def time(
         self, pieces: Sequence[SomeRows], time: Expr | None = None, delays_move: bool = True
     ) -> Direction:
-        """Return the direction in which everything goes with these rates of the states.
-
-        By `time`, 1 if it is None.  The rates of delayed signals count as 0 unless `delays_move`.
-        """
+        """Return the direction in which everything goes with these rates of the states."""
+        # By `time`, 1 if it is None. The rates of delayed signals count as 0 unless `delays_move`.
         first = self.extended.schedule.ninputs - self.extended.schedule.rates
         lines = range(self.inputs, first if delays_move else self.inputs)
         outside = from_time(self.graph, time, self.inputs, first, lines)
@@ -226,11 +224,9 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
 def _free(
     graph: Graph, roots: Sequence[Expr], condition: Expr, on_it: Mapping[Expr, Expr]
 ) -> dict[Expr, Expr]:
-    """Return what stands for the other conditions: true or false, whatever they ask for.
-
-    What is met only rarely would not be met by values at random.  Only those that parameters alone
-    decide, where this condition switches, are what they are.
-    """
+    """Return what stands for the other conditions: true or false, whatever they ask for."""
+    # What is met only rarely would not be met by values at random. Only those that parameters alone
+    # decide, where this condition switches, are what they are.
     others = [n for n in needed(roots) if n.op in COMPARISONS and n is not condition]
     truths: dict[Expr, Expr] = {}
     row = 0

@@ -359,10 +359,8 @@ def _graded(margins: np.ndarray) -> np.ndarray:
 
 
 def _lowest(values: np.ndarray, lengths: Sequence[int]) -> np.ndarray:
-    """Return the lowest parts that are not higher than the pieces of time next to them.
-
-    Others are least where they end, at what the piece next to them has, too.
-    """
+    """Return the lowest parts that are not higher than the pieces of time next to them."""
+    # Others are least where they end, at what the piece next to them has, too.
     lowest, first = [], 0
     for length in lengths:
         row = np.pad(values[first : first + length], 1, constant_values=np.inf)

@@ -257,23 +257,17 @@ _RATE = 1e-3  # V' <= -1e-3 |x|^2 at samples, for P >= 1
 
 
 def from_linear_part(A: np.ndarray) -> np.ndarray:
-    """Return P of A^T P + P A = -1, symmetric.
-
-    Shapes: `A` (n, n).
-    """
+    """Return P of A^T P + P A = -1, symmetric; shapes: `A` (n, n)."""
     P = solve_continuous_lyapunov(A.T, -np.eye(len(A)))
     return 0.5 * (P + P.T)
 
 
 def fitted(motion: StateRates, at: np.ndarray, P: np.ndarray, level: float) -> Iterator[np.ndarray]:
-    """Yield P for which V falls at samples of sets ever larger than (x - at)^T P (x - at) <= level.
-
-    The program is convex: V' = 2 (x - at)^T P f(x) is linear in P.  Of all P >= 1 that fall at the
-    samples and along the linear part, the one with the largest set is taken, as measured by the
-    trace of P times that of the set before.
-
-    Shapes: `at` (n,), `P` (n, n).
-    """
+    """Yield P for which V falls at samples of sets larger than (x - at)^T P (x - at) <= level."""
+    # The program is convex: V' = 2 (x - at)^T P f(x) is linear in P. Of all P >= 1 that fall at the
+    # samples and along the linear part, the one with the largest set is taken, as measured by the
+    # trace of P times that of the set before.
+    # Shapes: `at` (n,), `P` (n, n).
     n, rng, basis = len(P), np.random.default_rng(0), symmetric_basis(len(P))
     root = np.linalg.inv(np.linalg.cholesky(P / level)).T  # maps the unit ball onto the set
     directions = rng.standard_normal((_SAMPLES, n))

@@ -40,10 +40,8 @@ def total_error(G_max: Any, eps_u: Any, d: Any, eps: Any) -> Any:
 
 
 def alpha_1(gains: Gains) -> float:
-    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31).
-
-    Without a network its term drops out.
-    """
+    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31)."""
+    # Without a network its term drops out.
     rates = [2 * gains.beta, gains.sigma_2 * gains.gamma]
     if gains.W_hat_0:
         rates.append(gains.sigma_1 * gains.Gamma)
@@ -70,8 +68,6 @@ def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N
 
 
 def final_bound(alpha_0: Any, alpha_1: float, V_0: Any, Q: float) -> Any:
-    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0.
-
-    With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
-    """
+    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0."""
+    # With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
     return np.sqrt(2 * (alpha_0 / alpha_1 + V_0 + Q))

@@ -179,10 +179,8 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
 
 
 def _cost_of_weights(gains: Gains, delta_rest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*).
-
-    The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
-    """
+    """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*)."""
+    # The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
     one = Polynomial([0.0, 1.0])
     by_eps, by_W = alpha_0(gains, delta_rest + one, 0.0), alpha_0(gains, 0.0, one)
     by_W_error, rate = Polynomial([0.0]), alpha_1(gains)

@@ -199,10 +199,8 @@ def _with_gains(
 
 
 def _bound(loop: KnownSignLoop, table: list[Demand]) -> tuple[float, float]:
-    """Return the least C_0 for which a box of the table closes, and how far it is from closing.
-
-    Between two boxes of the table delta* is interpolated in C.
-    """
+    """Return the least C_0 for which a box of the table closes, and how far it is from closing."""
+    # Between two boxes of the table delta* is interpolated in C.
     excess = [float(bound_of_r(loop, need.delta_star).level) / need.C for need in table]
     closing = int(np.argmax(np.array(excess) < 1)) if min(excess) < 1 else None
     if closing is None:

@@ -37,11 +37,9 @@ NEAR = 1e-5  # |v| below which G is interpolated: F/v would lose its digits
 
 
 def input_gain(f: Callable) -> Callable:
-    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0.
-
-    For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
-    order of the rounding, 1e-11, for a twice differentiable F.
-    """
+    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0."""
+    # For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
+    # order of the rounding, 1e-11, for a twice differentiable F.
 
     @equation
     def gain(x, v, p):
@@ -142,11 +140,9 @@ def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
 
 
 def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:
-    """Return a record with the same parameters and equations, and with more outputs.
-
-    These are the rates of its states, of a record of vectors also the states that it does not
-    output, and what `terms` returns.
-    """
+    """Return a record with the same parameters and equations, and with more outputs."""
+    # These are the rates of its states, of a record of vectors also the states that it does not
+    # output, and what `terms` returns.
     if not spec.states:
         return spec
     vector = getattr(spec, "vector", False)
@@ -196,11 +192,9 @@ def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
 
 @functools.lru_cache(maxsize=32)
 def update_is_declared(plant: Place) -> bool:
-    """Whether the update function and the chain of f and d are the same expressions.
-
-    False where they differ, and where that is unknown: expressions that are equal but written
-    in another way count as different.
-    """
+    """Whether the update function and the chain of f and d are the same expressions."""
+    # False where they differ, and where that is unknown: expressions that are equal but written in
+    # another way count as different.
     system, graph = plant.system, Graph()
     declared = integrator_chain(*terms_with_parameters(system.current_spec))
 

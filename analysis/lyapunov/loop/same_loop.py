@@ -35,10 +35,8 @@ _AGREED = Remembered()
 
 
 def points_around(x: np.ndarray, *, seed: int = 0) -> list[_Point]:
-    """Return times and states at which loops are compared: the start, and points around it.
-
-    Shapes: `x` (n,).
-    """
+    """Return times and states at which loops are compared: the start, and points around it."""
+    # Shapes: `x` (n,).
     rng = np.random.default_rng(seed)
     points = [(0.0, x)]
     for spread in SPREADS:

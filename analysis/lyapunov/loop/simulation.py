@@ -224,10 +224,8 @@ SHIFT = 0.381966  # of a sampling interval: corners of a function of time lie on
 
 
 def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Margin | None:
-    """Return how far the reference's derivatives are from those of its own outputs.
-
-    Shapes: `time` (m,), `states` (n, m).
-    """
+    """Return how far the reference's derivatives are from those of its own outputs."""
+    # Shapes: `time` (m,), `states` (n, m).
     names, block = declared(place, "outputs"), place.system
     order = sum(name in names for name in derivative_names(len(names))) - 1
     if order < 1 or block.ninputs:

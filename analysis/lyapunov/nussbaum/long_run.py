@@ -22,10 +22,7 @@ _STILL = 0.1  # share of it by which zeta may move from one window to the next, 
 
 
 def outcome(forecast: SlowDrift, time: np.ndarray, zeta: np.ndarray) -> Outcome:
-    """Tell whether a run bore a forecast out.
-
-    Shapes: `time` (m,), `zeta` (m,).
-    """
+    """Tell whether a run bore a forecast out; shapes: `time` (m,), `zeta` (m,)."""
     beyond = np.flatnonzero(zeta >= forecast.lobe.high)
     if forecast.rest is not None:
         return "failed" if beyond.size else _rest(forecast, forecast.rest, time, zeta)

@@ -94,12 +94,10 @@ class NussbaumProperty:
 
 
 def antiderivative(N: GainFunction) -> Antiderivative:
-    """Return int_0^s N as a function of arrays.
-
-    The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
-    between neighbouring arguments; of more than 4096 of them, between 4096 nodes, with N as the
-    slope of the interpolation.
-    """
+    """Return int_0^s N as a function of arrays."""
+    # The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
+    # between neighbouring arguments; of more than 4096 of them, between 4096 nodes, with N as the
+    # slope of the interpolation.
     if N is functions.nussbaum:
         return functions.nussbaum_integral
 
@@ -182,10 +180,8 @@ def _lobe(N: GainFunction, low: float, high: float) -> Lobe:
 
 
 def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: float = 4.0) -> Lobe:
-    """Return the whole lobe that zeta lies in, searched within `reach` on both sides.
-
-    At a zero of N it is the lobe above.
-    """
+    """Return the whole lobe that zeta lies in, searched within `reach` on both sides."""
+    # At a zero of N it is the lobe above.
     near = lobes(N, zeta - reach, zeta + reach)
     inside = [lobe for lobe in near if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]
     if not inside or inside[0] in (near[0], near[-1]):

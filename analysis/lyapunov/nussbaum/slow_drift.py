@@ -41,11 +41,9 @@ _SIGNALS = ("zeta", "r", "u")
 
 
 def law_of_response(loop: Any, response: Any) -> GainFunction:
-    """Return the Nussbaum function of the loop that a response is of.
-
-    The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
-    samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
-    """
+    """Return the Nussbaum function of the loop that a response is of."""
+    # The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
+    # samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
     loop = known_system("slow_drift", loop)
     check_shape(loop, response, _SIGNALS)
     params = own_parameters(loop, response)
@@ -359,10 +357,8 @@ def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
 
 
 def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
-    """Return the zeta of the lobe, below its extremum, at which the balance stops the drift.
-
-    Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
-    """
+    """Return the zeta of the lobe, below its extremum, at which the balance stops the drift."""
+    # Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
     if not (balance.p > 0 and balance.q > 0):
         return None
     gain = balance.p / balance.q
@@ -374,10 +370,8 @@ def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
 def _rest(
     rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Return the resting zeta, and its range over fits that leave a part of the windows out.
-
-    A fit in which the drift does not stop counts as the lobe's upper end.
-    """
+    """Return the resting zeta, and its range over fits that leave a part of the windows out."""
+    # A fit in which the drift does not stop counts as the lobe's upper end.
     rests = []
     for part in np.array_split(np.arange(rates.size), BLOCKS):
         rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
@@ -391,11 +385,9 @@ def _rest(
 def _forecast(
     rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe, zeta: float
 ) -> tuple[float, float, float]:
-    """Return how long the budget lasts, and the shortest and the longest time that it may.
-
-    The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0.  Windows that saw little of the lobe
-    say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
-    """
+    """Return how long the budget lasts, and the shortest and the longest time that it may."""
+    # The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0. Windows that saw little of the lobe
+    # say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
     mean, centre = float(rates.mean()), float(inverse.mean())
     slope, of_slope, of_mean = _slope(rates, inverse)
     p = max(slope, 0.0) ** 3 / (slope**2 + of_slope**2) if slope else 0.0

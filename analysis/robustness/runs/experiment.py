@@ -268,10 +268,8 @@ def simulate_rows(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Ensemble:
-    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment.
-
-    `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
-    """
+    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment."""
+    # `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
     varied = arguments(experiment.space, rows)
     return ensemble_response(
         loop,
@@ -339,11 +337,9 @@ Columns = Mapping[str, str | Sequence[str]]
 
 
 def columns_of(prepared: Prepared) -> Columns:
-    """Return the columns of a sweep's table, in order.
-
-    Those of `experiment.evaluate`, then ``seed`` (see `design.seed_number`) and ``wall_time``, the
-    time (s) that a row's chunk took over its number of rows.
-    """
+    """Return the columns of a sweep's table, in order."""
+    # Those of `experiment.evaluate`, then ``seed`` (see `design.seed_number`) and ``wall_time``,
+    # the time (s) that a row's chunk took over its number of rows.
     experiment = prepared.experiment
     numbers = (*experiment.space.names, *experiment.measured)
     columns: dict[str, str | Sequence[str]] = dict.fromkeys(numbers, "float64")

@@ -73,10 +73,8 @@ class ChunkStore:
 
 @contextmanager
 def locked(folder: Path, error: type[UsageError] = StoreError) -> Iterator[None]:
-    """Hold a folder for this process alone; it is made where there is none.
-
-    The lock is the operating system's: it ends with the process, however that ends.
-    """
+    """Hold a folder for this process alone; it is made where there is none."""
+    # The lock is the operating system's: it ends with the process, however that ends.
     owner, lock = folder / ".owner", FileLock(folder / ".lock", timeout=0)
     me = f"process {os.getpid()} on {socket.gethostname()}".encode()
     try:

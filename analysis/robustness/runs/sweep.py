@@ -361,11 +361,9 @@ class Interrupt:
 
 @contextmanager
 def gentle_interrupt() -> Iterator[Interrupt]:
-    """Take down the first SIGINT; the second one raises KeyboardInterrupt.
-
-    Only Python's main thread may listen to signals: in another one, and where SIGINT is ignored,
-    nothing changes.  What listened before listens again afterwards.
-    """
+    """Take down the first SIGINT; the second one raises KeyboardInterrupt."""
+    # Only Python's main thread may listen to signals: in another one, and where SIGINT is ignored,
+    # nothing changes. What listened before listens again afterwards.
     interrupt = Interrupt()
 
     def pressed(number: int, frame: Any) -> None:

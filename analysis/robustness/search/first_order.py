@@ -72,11 +72,9 @@ FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
 
 
 def lowest_nearby(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
-    """Return where the first order makes the least margin lowest, and that margin.
-
-    No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite
-    where there is no derivative.
-    """
+    """Return where the first order makes the least margin lowest, and that margin."""
+    # No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite
+    # where there is no derivative.
     best, least = place, np.inf
     for requirement in of.requirements:
         lowered = _lowered(of, requirement, place, radius)

@@ -99,10 +99,8 @@ class Radius:
 
 
 def size_of(space: Space, row: Mapping[str, Any]) -> float:
-    """Return the smallest factor by which the box must be scaled to hold a row.
-
-    The largest deviation from nominal, each as a multiple of its side of the box.
-    """
+    """Return the smallest factor by which the box must be scaled to hold a row."""
+    # The largest deviation from nominal, each as a multiple of its side of the box.
     middle, sizes = nominal(space), [0.0]
     for quantity in space.quantities:
         low, high = quantity.box

@@ -12,15 +12,12 @@ _ROUNDING = 1e-9
 
 
 def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
-    """Test whether failing is independent of an option, given how many rows have and do each.
-
-    The statistic is chi-square's; its p-value is exact, the probability of a table at least as far
-    from independence among all with the same sums (the test of Fisher, Freeman and Halton).  Where
-    these are too many they are drawn (a permutation test, whose p is (1 + b) / (1 + draws) and
-    never too small), and where every field expects `LARGE` the law of chi-square is taken.
-
-    Shapes: `counts` (options, 2).
-    """
+    """Test whether failing is independent of an option, given how many rows have and do each."""
+    # The statistic is chi-square's; its p-value is exact, the probability of a table at least as
+    # far from independence among all with the same sums (the test of Fisher, Freeman and Halton).
+    # Where these are too many they are drawn (a permutation test, whose p is (1 + b) / (1 + draws)
+    # and never too small), and where every field expects `LARGE` the law of chi-square is taken.
+    # Shapes: `counts` (options, 2).
     rows, failing = counts.sum(axis=1), int(counts[:, 0].sum())
     if len(rows) == 1:
         return 0.0, 1.0

@@ -62,11 +62,9 @@ def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]
 
 
 def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
-    """Return formulas whose margins have that of `formula` as the least, at the start.
-
-    Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
-    same window follow each other in a row of their own.  What is not a conjunction is alone.
-    """
+    """Return formulas whose margins have that of `formula` as the least, at the start."""
+    # Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
+    # same window follow each other in a row of their own. What is not a conjunction is alone.
     return tuple(_rows(formula, until, pieces))
 
 

@@ -32,11 +32,9 @@ EXAMPLE = "always from 10 s on |e| <= 0.15"
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a requirement such as ``always from 10 s on |e| <= 0.15``.
-
-    It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales other
-    than the default one.
-    """
+    """Read a requirement such as ``always from 10 s on |e| <= 0.15``."""
+    # It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales
+    # other than the default one.
     reader = _Reader(text)
     formula = _formula(reader, 0)
     if reader.here:

@@ -179,10 +179,8 @@ def plan_function(
 
 
 def _rows(node: Expr) -> int:
-    """Rows in memory: a call has its arguments there as well, before its results.
-
-    Behind these are whether an opaque function has failed, and with which arguments.
-    """
+    """Rows in memory: a call has its arguments there as well, before its results."""
+    # Behind these are whether an opaque function has failed, and with which arguments.
     given = sum(node.data[1]) if node.op in CALLS else 0
     return (node.size or 1) + given + (1 + given if node.op == "call" else 0)
 

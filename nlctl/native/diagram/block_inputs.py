@@ -14,10 +14,8 @@ from ...upstream.systems import System
 def block_inputs(
     system: System, u: np.ndarray, outputs: Mapping[int, np.ndarray]
 ) -> Iterator[tuple[Any, np.ndarray]]:
-    """Yield every block of a diagram with its inputs, in the order of the state vector.
-
-    Shapes: `u` (ninputs,).
-    """
+    """Yield every block of a diagram with its inputs, in the order of the state vector."""
+    # Shapes: `u` (ninputs,).
     places = iter(range(len(outputs)))
     yield from ((block, given) for block, given, _ in _walked(system, u, outputs, places))
 

@@ -31,10 +31,8 @@ def check_sizes(system: System, blocks: Iterable[Any]) -> None:
 
 
 def check_functions(path: str, system: System) -> FunctionReading:
-    """Check that a block's functions depend on their arguments alone, and return enough values.
-
-    The functions are read, not called, until they are known to remember nothing.
-    """
+    """Check that a block's functions depend on their arguments alone, and return enough values."""
+    # The functions are read, not called, until they are known to remember nothing.
     is_block, readings = isinstance(system, Block), []
     for what, function in _functions(system):
         values = current_parameters(system) if is_block else current_values(system)
@@ -95,10 +93,8 @@ def _check_counts(path: str, system: Any) -> None:
 
 
 def sized(system: System, inputs: Any, initial_state: Any) -> Any:
-    """Return a block with the numbers of states, inputs and outputs that a run gives it.
-
-    python-control takes them from the run's arguments where a block does not declare them.
-    """
+    """Return a block with the numbers of states, inputs and outputs that a run gives it."""
+    # python-control takes them from the run's arguments where a block does not declare them.
     counts = (system.nstates, system.ninputs, system.noutputs)
     diagram = isinstance(system, ct.InterconnectedSystem)
     if diagram or not isinstance(system, ct.NonlinearIOSystem) or None not in counts:

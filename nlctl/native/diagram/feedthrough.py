@@ -14,14 +14,11 @@ from .trace import dependence
 
 
 def feedthrough(system: Any) -> np.ndarray:
-    """Return which outputs depend directly on which inputs.
-
-    nlctl's blocks declare it, linear systems have their D matrix, and the output functions of
-    others are traced: what reaches an output in their expressions is depended on, whatever the
-    values are.
-
-    returns (noutputs, ninputs).
-    """
+    """Return which outputs depend directly on which inputs."""
+    # nlctl's blocks declare it, linear systems have their D matrix, and the output functions of
+    # others are traced: what reaches an output in their expressions is depended on, whatever the
+    # values are.
+    # returns (noutputs, ninputs).
     shape = (system.noutputs or 0, system.ninputs or 0)
     if isinstance(system, Block):
         return np.full(shape, bool(system.spec.feedthrough))

@@ -48,11 +48,9 @@ class Slot:
 
 
 def current_values(system: Any) -> Mapping[str, Any]:
-    """Return a block's parameters as python-control has resolved them.
-
-    A third-party block in a diagram with nlctl's blocks is handed their qualified names as well;
-    they are none of its business.
-    """
+    """Return a block's parameters as python-control has resolved them."""
+    # A third-party block in a diagram with nlctl's blocks is handed their qualified names as well;
+    # they are none of its business.
     if isinstance(system, Block):
         return current_parameters(system)._asdict()
     if isinstance(system, ct.StateSpace):

@@ -43,10 +43,8 @@ class Program:
 
     @cached_property
     def meetings(self) -> tuple[Happening, ...]:
-        """What may happen at one instant: there is a function of the program for each.
-
-        Where parameters of clocks are overridden, more may; see `machine.evaluations`.
-        """
+        """What may happen at one instant: there is a function of the program for each."""
+        # Where parameters of clocks are overridden, more may; see `machine.evaluations`.
         every = tuple(meetings(self.clocks))
         if len(every) > _MOST:
             raise CompileError(

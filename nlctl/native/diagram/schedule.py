@@ -78,10 +78,8 @@ class Schedule:
 
     @property
     def rates(self) -> int:
-        """Number of the diagram's inputs whose rates a run gives as further inputs.
-
-        Ideal relays ask for them.
-        """
+        """Number of the diagram's inputs whose rates a run gives as further inputs."""
+        # Ideal relays ask for them.
         has_relays = any(supplied_of(node.system) is SLIDING for node in self.nodes)
         return (self.system.ninputs or 0) if has_relays else 0
 
@@ -295,11 +293,9 @@ def first_loop(before: Mapping[_Item, set[_Item]]) -> set[_Item]:
 
 
 def tear(before: Mapping[_Item, set[_Item]]) -> tuple[_Item, ...]:
-    """Choose few items of a loop without which there is no loop.
-
-    The item with the most connections first; then what is in no loop any more drops out.  The
-    result is small, not always the smallest.
-    """
+    """Choose few items of a loop without which there is no loop."""
+    # The item with the most connections first; then what is in no loop any more drops out. The
+    # result is small, not always the smallest.
     left = {item: set(others) for item, others in before.items()}
     torn = []
     while True:

@@ -26,10 +26,8 @@ def time(graph: Graph) -> Tracer:
 def traced_parameters(
     graph: Graph, system: System, slots: Mapping[str, Slot], p: np.ndarray | None = None
 ) -> Any:
-    """Return the record or dict that a block's functions take, with arrays for the numbers.
-
-    Integers have the values that they have in the parameter vector `p`, or in the block now.
-    """
+    """Return the record or dict that a block's functions take, with arrays for the numbers."""
+    # Integers have the values that they have in the parameter vector `p`, or in the block now.
     values = {
         name: _parameter(graph, slots[name], value, p) if name in slots else value
         for name, value in current_values(system).items()
@@ -59,12 +57,9 @@ def _parameter(graph: Graph, slot: Slot, value: Any, p: np.ndarray | None) -> An
 def dependence(
     system: System, function: Callable[..., Any], slots: Mapping[str, Slot]
 ) -> np.ndarray:
-    """Return which results of a block's function depend on which of its inputs.
-
-    What cannot be traced, or holds for some values of a parameter only, depends on all of them.
-
-    returns (noutputs, ninputs).
-    """
+    """Return which results of a block's function depend on which of its inputs."""
+    # What cannot be traced, or holds for some values of a parameter only, depends on all of them.
+    # returns (noutputs, ninputs).
     passes = np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)
     graph = Graph()
 

@@ -108,10 +108,9 @@ def neg(b: Body, x: Ends) -> Ends:
 
 
 def mul(b: Body, x: Ends, y: Ends) -> Ends:
-    """Return the product: of its ends two are enough where the sign of a factor is known.
-
-    0 times infinity is left out where another product of ends is known; the others hold all limits.
-    """
+    """Return the product: of its ends two are enough where the sign of a factor is known."""
+    # 0 times infinity is left out where another product of ends is known; the others hold all
+    # limits.
     if x is y:
         return square_of(b, finite(x))
     x, y = finite(x), finite(y)
@@ -262,10 +261,8 @@ def select_truth(b: Body, condition: Ends, x: Ends, y: Ends) -> Ends:
 
 
 def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
-    """Return whether a comparison surely holds, and whether it possibly does.
-
-    One with what is not a number is open.
-    """
+    """Return whether a comparison surely holds, and whether it possibly does."""
+    # One with what is not a number is open.
     if op in ("gt", "ge"):
         x, y, op = y, x, {"gt": "lt", "ge": "le"}[op]
     if op in ("lt", "le"):

@@ -45,10 +45,8 @@ class BoxCode:
         return kind(self.loaded.addresses["values"])
 
     def values(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds of the functions on boxes, by their natural extension.
-
-        Shapes: `low, high` (boxes, sides); returns (boxes, results).
-        """
+        """Return bounds of the functions on boxes, by their natural extension."""
+        # Shapes: `low, high` (boxes, sides); returns (boxes, results).
         count, lanes = len(low), self.lanes
         ends = np.stack([low, high], axis=2).astype(float)  # (boxes, sides, 2)
         missing = -count % lanes

@@ -49,10 +49,8 @@ def decide_claim(
     max_boxes: int,
     threads: int = 1,
 ) -> BoxVerdict:
-    """Prove or refute that the least of the functions is at most `bound` on a box.
-
-    Shapes: `low, high` (sides,).
-    """
+    """Prove or refute that the least of the functions is at most `bound` on a box."""
+    # Shapes: `low, high` (sides,).
     _check_fixed(code, low, high)
     begun = _Search(code, np.stack([low, high], axis=1).reshape(1, -1), bound)
     begun.run(min(max_boxes, _ALONE))
@@ -111,10 +109,8 @@ class _Search:
             self.stack = np.concatenate([self.stack, np.empty_like(self.stack)])
 
     def verdict(self, parts: list[_Search]) -> BoxVerdict:
-        """Return what was found, by this search and by others that went on with its boxes.
-
-        The first that is refuted counts, and those before it.
-        """
+        """Return what was found, by this search and by others that went on with its boxes."""
+        # The first that is refuted counts, and those before it.
         every = [self, *parts]
         refuted = [part.status == REFUTED for part in every]
         every = every[: refuted.index(True) + 1] if any(refuted) else every
@@ -145,10 +141,7 @@ def enclose_supremum(
     hopeless: int,
     relative: float = 1e-10,
 ) -> Supremum:
-    """Enclose the supremum of the least of the functions on a box.
-
-    Shapes: `low, high` (sides,).
-    """
+    """Enclose the supremum of the least of the functions on a box; shapes: `low, high` (sides,)."""
     _check_fixed(code, low, high)
     box = np.stack([low, high], axis=1).reshape(-1)
     nodes, index, keys = np.empty((_ROOM, box.size)), np.zeros((3, _ROOM), dtype=np.int64), None

@@ -14,10 +14,8 @@ from .unrounded import UnroundedGraph
 
 
 def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> list[Expr]:
-    """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``.
-
-    Its external inputs are 0.
-    """
+    """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``."""
+    # Its external inputs are 0.
     _check(compiled)
     p = compiled.parameter_vector(params)
     numbers = [expr for _, array in compiled.equations.results["dx"] for expr in _numbers(array)]

@@ -139,11 +139,9 @@ _TURN = 1 / (2 * math.pi)
 
 
 def _turns(b: Body, v: Value, per: float, shift: float, side: int) -> Value:
-    """Return v per + shift, rounded to one side: turns of a circle, for per = 1/pi or 1/(2 pi).
-
-    The factor is within 2^-53 of what it stands for, two roundings follow, |per| < 1/3 and
-    |shift| <= 1: their sum is below 2^-52 |v| + 2^-50.
-    """
+    """Return v per + shift, rounded to one side: turns of a circle, for per = 1/pi or 1/(2 pi)."""
+    # The factor is within 2^-53 of what it stands for, two roundings follow, |per| < 1/3 and
+    # |shift| <= 1: their sum is below 2^-52 |v| + 2^-50.
     room = b.fma(b.intrinsic("fabs", v), side * 2.0**-52, side * 2.0**-50)
     return b.add(b.fma(v, per, shift), room, exact=True)
 

@@ -34,10 +34,9 @@ def best_side(x, o, lane, weight, whole):
 
 @kept(nogil=True, error_model="numpy")
 def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
-    """Prove or refute that the least of some functions is at most a bound on boxes.
-
-    Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides + 1,).
-    """
+    """Prove or refute that the least of some functions is at most a bound on boxes."""
+    # Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides +
+    # 1,).
     n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
     top = counts[0]
     while top > 0 and counts[1] < most:
@@ -80,10 +79,8 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
 
 @kept(nogil=True, error_model="numpy")
 def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, bounds):
-    """Enclose the supremum of the least of some functions on a box.
-
-    Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
-    """
+    """Enclose the supremum of the least of some functions on a box."""
+    # Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
     while True:
         judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds)
         if counts[2] + x.shape[1] > nodes.shape[0]:

@@ -232,11 +232,9 @@ _Step = tuple[Ends, Value]
 
 
 def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: Ends) -> _Step:
-    """Choose a point of a side, and write it down; return what the side is around it, and if it is.
-
-    It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an end
-    of the side where the function rises or falls.  A side without end stands for itself.
-    """
+    """Choose a point of a side, and write it; return what the side is around it, and if it is."""
+    # It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an
+    # end of the side where the function rises or falls. A side without end stands for itself.
     b, (low, high) = w.b, side.values
     ends = b.compare("one", b.intrinsic("fabs", b.sub(high, low, exact=True)), _INF)
     over = b.sub(b.mul(slope.high, high, exact=True), b.mul(slope.low, low, exact=True), exact=True)
@@ -256,10 +254,8 @@ def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: End
 def _bound(
     w: EnclosureWriter, expr: Expr, at_centre: Ends, slopes: Sequence[Ends], steps: Sequence[_Step]
 ) -> Value:
-    """Return the upper bound of a result: by its value and by the mean-value form.
-
-    The latter holds where nothing jumps; infinite where there is no value.
-    """
+    """Return the upper bound of a result: by its value and by the mean-value form."""
+    # The latter holds where nothing jumps; infinite where there is no value.
     b, value, mean = w.b, finite(w.names[expr]), at_centre
     for slope, (step, moves) in zip(slopes, steps, strict=True):
         if slope.point != 0:

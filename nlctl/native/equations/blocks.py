@@ -111,10 +111,8 @@ def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
 def _conditions(
     system: System, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: _Events
 ) -> Conditions:
-    """Return what a diagram in continuous time switches at without saying so.
-
-    Also what moves nothing but an event function: a guard, a memory, a function of the run.
-    """
+    """Return what a diagram in continuous time switches at without saying so."""
+    # Also what moves nothing but an event function: a guard, a memory, a function of the run.
     if not ct.isctime(system):
         return Conditions()
     falls = {i: guard for i, (_, guard) in events.guards.items()}

@@ -67,11 +67,10 @@ def found_conditions(
     others: Iterable[Expr],
     watched: Iterable[Expr] = (),
 ) -> Conditions:
-    """Return what switches in a diagram whose blocks have been read.
-
-    Where it moves rates, declared switching functions, guards, by the places of their blocks, what
-    arrives at delays and memories become (`others`), or an event function of the run (`watched`).
-    """
+    """Return what switches in a diagram whose blocks have been read."""
+    # Where it moves rates, declared switching functions, guards, by the places of their blocks,
+    # what arrives at delays and memories become (`others`), or an event function of the run
+    # (`watched`).
     declared, watched = tuple(declared), tuple(watched)
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
@@ -117,10 +116,8 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 def _undeclared(
     reader: Reader, rates: Sequence[Tracer], guards: Mapping[int, Tracer], watched: Sequence[Expr]
 ) -> Iterable[tuple[Expr, Node | None]]:
-    """Yield the conditions of blocks that do not declare theirs, each with its block.
-
-    And those of the run's own event functions.
-    """
+    """Yield the conditions of blocks that do not declare theirs, each with its block."""
+    # And those of the run's own event functions.
     for i, node in enumerate(reader.blocks):
         if node.sampled or _declares(node):
             continue
@@ -214,11 +211,9 @@ def _moving(
 def _frequencies(
     graph: Graph, node: Expr, timed: set[Expr], known: dict[Expr, tuple[Expr, ...] | None]
 ) -> tuple[Expr, ...] | None:
-    """Return the angular frequencies in a function of t; None if it has no highest one.
-
-    Of pieces that are put together at conditions those of the pieces: where one switches, a step
-    ends anyway.
-    """
+    """Return the angular frequencies in a function of t; None if it has no highest one."""
+    # Of pieces that are put together at conditions those of the pieces: where one switches, a step
+    # ends anyway.
     if node not in timed or node.op == "leaf" or node.kind == "b":
         return ()
     if node not in known:

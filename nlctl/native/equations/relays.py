@@ -24,10 +24,8 @@ def relay_places(blocks: Sequence[Node]) -> list[int]:
 
 
 def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
-    """Return a reader that knows outputs and rates of ideal relays, if there are any.
-
-    The diagram is read once more for that, with their outputs as if they came from outside.
-    """
+    """Return a reader that knows outputs and rates of ideal relays, if there are any."""
+    # The diagram is read once more for that, with their outputs as if they came from outside.
     graph, blocks = reader.graph, reader.blocks
     places = relay_places(blocks)
     if not places:

@@ -159,11 +159,9 @@ def at_{call.name}(c, at, lane):
 
 
 def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
-    """Return the program as a module, made of its own source.
-
-    It is registered under the program's key, by which machine code that was kept finds it, and its
-    lines are known to tracebacks.
-    """
+    """Return the program as a module, made of its own source."""
+    # It is registered under the program's key, by which machine code that was kept finds it, and
+    # its lines are known to tracebacks.
     name = f"nlctl_program_{program_key(program)}"
     file = f"<{name}>"
     lines = program.source.splitlines(keepends=True)

@@ -85,14 +85,11 @@ def _entries(functions: tuple[Any, ...]) -> np.ndarray:
 def machine(
     reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> Machine:
-    """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
-
-    It has functions for all that happens to sampled blocks; where clocks with other parameters
-    meet as they do not in the unchanged diagram, these are made.
-
-    Where an integer that steers an equation has another value, the blocks' functions are read
-    once more.  The first member's values decide: `fitting` says for which members they hold.
-    """
+    """Return machine code that holds for parameter vectors `p` of shape (parameters, members)."""
+    # It has functions for all that happens to sampled blocks; where clocks with other parameters
+    # meet as they do not in the unchanged diagram, these are made.
+    # Where an integer that steers an equation has another value, the blocks' functions are read
+    # once more. The first member's values decide: `fitting` says for which members they hold.
     known = reading.cache.of(Machine)
     asked = set(happening)
     for code in known:

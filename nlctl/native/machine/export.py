@@ -86,11 +86,9 @@ def _reach(library: Any, reached: dict[int, Any]) -> None:
 
 
 def _named(module: Any, names: dict[str, str]) -> Any:
-    """Return a module in which only functions of these names can be called from outside.
-
-    What an exception says is left out: only its number is read, and it has the paths of the machine
-    that makes the module.
-    """
+    """Return a module in which only functions of these names can be called from outside."""
+    # What an exception says is left out: only its number is read, and it has the paths of the
+    # machine that makes the module.
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name in names else "internal"
@@ -124,10 +122,8 @@ def _simplify(module: Any) -> None:
 
 
 def _apart(module: Any, entries: Iterable[str]) -> Any:
-    """Return a module whose long functions are not inlined.
-
-    As text: some versions of llvmlite give the attribute to the result.
-    """
+    """Return a module whose long functions are not inlined."""
+    # As text: some versions of llvmlite give the attribute to the result.
     text = str(module)
     for function in module.functions:
         short = str(function).count("\n") < _LONG

@@ -91,10 +91,8 @@ def function_key(*things: Any) -> str:
 
 
 def content_key(*things: Any) -> str:
-    """Return a key of what functions compute: the same wherever their files are.
-
-    Unlike `function_key` it is the same for functions of the same content in different modules.
-    """
+    """Return a key of what functions compute: the same wherever their files are."""
+    # Unlike `function_key` it is the same for functions of the same content in different modules.
     return content_of(*things)[0]
 
 
@@ -367,10 +365,8 @@ def _in_cell(cell: types.CellType) -> Any:
 
 
 def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> Iterator[str]:
-    """Yield text for what is read of a module, ``module.name``; a library's version stands for it.
-
-    Every name that the reader uses may be one.
-    """
+    """Yield text for what is read of a module, ``module.name``; a library has its version."""
+    # Every name that the reader uses may be one.
     yield f"module {module.__name__} {getattr(module, '__version__', '')}"
     if _is_library(module.__name__) or not seen.add(module):
         return
@@ -392,10 +388,8 @@ def _of_numba_type(kind: numba.types.Type, seen: _Seen) -> Iterator[str]:
 
 
 def _defined(module: types.ModuleType) -> Iterator[str]:
-    """Yield a module's source, and its functions and methods as they are in memory.
-
-    What these refer to is in the source, and may change while they are used.
-    """
+    """Yield a module's source, and its functions and methods as they are in memory."""
+    # What these refer to is in the source, and may change while they are used.
     with contextlib.suppress(OSError, TypeError):  # there is none
         yield inspect.getsource(module)
     for name, thing in vars(module).items():

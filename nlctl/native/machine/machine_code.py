@@ -43,10 +43,8 @@ class Wanted:
 
 
 def machine_code(key: str, requests: Sequence[Wanted]) -> list[Any]:
-    """Return functions as machine code, from the store, or compiled and kept there as one entry.
-
-    With NUMBA_DISABLE_JIT=1 they are returned unchanged.
-    """
+    """Return functions as machine code, from the store, or compiled and kept there as one entry."""
+    # With NUMBA_DISABLE_JIT=1 they are returned unchanged.
     if is_jit_disabled():
         return [request.function for request in requests]
     key = store_key(key, *((str(request.signature), request.options) for request in requests))

@@ -82,10 +82,8 @@ def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
 
 
 def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
-    """Return the functions of a program as machine code, from the cache if it is there.
-
-    With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
-    """
+    """Return the functions of a program as machine code, from the cache if it is there."""
+    # With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
     if is_jit_disabled():
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)

@@ -28,11 +28,9 @@ UNDERSTOOD = (
 
 
 def frozen(function: Any) -> Any:
-    """Return a function with constants instead of the objects that it reads.
-
-    Methods, `functools.partial` and objects that can be called become functions as well.  What
-    cannot be replaced stays as it is, and numba will say so.
-    """
+    """Return a function with constants instead of the objects that it reads."""
+    # Methods, `functools.partial` and objects that can be called become functions as well. What
+    # cannot be replaced stays as it is, and numba will say so.
     if isinstance(function, functools.partial):
         inner = frozen(function.func)
         plain = isinstance(inner, FunctionType | CPUDispatcher)
@@ -154,10 +152,8 @@ def _is_constant(value: object) -> bool:
 
 
 def without_imports(function: FunctionType) -> FunctionType:
-    """Return a function whose imports have become globals of its own.
-
-    One whose source cannot be read stays as it is.
-    """
+    """Return a function whose imports have become globals of its own."""
+    # One whose source cannot be read stays as it is.
     try:
         tree = definition(function)
     except Unreadable:

@@ -56,10 +56,8 @@ def outside_of(module: str, name: str) -> str:
 
 
 def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) -> list[str]:
-    """Return the modules that a function imports when it is called, other than libraries.
-
-    Whether one is imported already, and under which name, changes while a loop is used.
-    """
+    """Return the modules that a function imports when it is called, other than libraries."""
+    # Whether one is imported already, and under which name, changes while a loop is used.
     modules = {
         word
         for code in _codes(function.__code__)

@@ -61,10 +61,8 @@ def source_file(function: FunctionType) -> str:
 
 
 def _file_and_text(function: FunctionType) -> tuple[str, str]:
-    """Return where a function stands, and what stands there: "" where nothing is found.
-
-    Functions that cloudpickle has made again do not know their file; their globals do.
-    """
+    """Return where a function stands, and what stands there: "" where nothing is found."""
+    # Functions that cloudpickle has made again do not know their file; their globals do.
     named = function.__code__.co_filename
     for file in (named, str(function.__globals__.get("__file__", named))):
         linecache.checkcache(file)
@@ -89,12 +87,10 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
 
 @functools.lru_cache(maxsize=128)
 def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType]:
-    """Return all code of the statements on a line, however the text was divided into cells.
-
-    The code of a statement depends on its neighbours in one thing: attributes of names that the
-    same cell imports are read by another instruction.  So it is compiled with each run of imports
-    that could stand in its cell.
-    """
+    """Return all code of the statements on a line, however the text was divided into cells."""
+    # The code of a statement depends on its neighbours in one thing: attributes of names that the
+    # same cell imports are read by another instruction. So it is compiled with each run of imports
+    # that could stand in its cell.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         body = ast.parse(text, file).body

@@ -164,10 +164,8 @@ class _Reader:
 def _columns(
     function: Callable[[np.ndarray], np.ndarray], drawn: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return an opaque function of columns: what it computes inside is rounded in other ways.
-
-    Where it does not take arrays that round otherwise, it is called with plain ones.
-    """
+    """Return an opaque function of columns: what it computes inside is rounded in other ways."""
+    # Where it does not take arrays that round otherwise, it is called with plain ones.
 
     def called(given: np.ndarray) -> np.ndarray:
         given = np.broadcast_to(given, (given.shape[0], ROUNDINGS))

@@ -82,10 +82,8 @@ def series_code(rates: Sequence[Expr]) -> SeriesCode:
 
 
 def _with_derivatives(graph: Graph, rates: Sequence[Expr]) -> list[Expr]:
-    """Return rates of x, of directions d and e, and of what both together change, q.
-
-    q' = Df(x) q + D^2 f(x) (d, e).
-    """
+    """Return rates of x, of directions d and e, and of what both together change, q."""
+    # q' = Df(x) q + D^2 f(x) (d, e).
     n, zero = len(rates), graph.const(0.0)
 
     def along(exprs: Sequence[Expr], block: Callable[[int], int | None]) -> list[Expr]:

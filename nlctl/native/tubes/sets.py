@@ -48,10 +48,8 @@ def sizes(P, degrees, by_degree, whole):
 
 @kept(**AS_NUMPY)
 def next_polynomials(J, H, P, table, error):
-    """Carry polynomials on, in place, and add what that leaves out to errors.
-
-    Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
-    """
+    """Carry polynomials on, in place, and add what that leaves out to errors."""
+    # Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
     degrees, _, products, _ = table
     n, degree = P.shape[0], degrees.max()
     by_degree, whole = np.zeros((n, degree + 1)), np.zeros(n)
@@ -97,10 +95,9 @@ def polynomial_product(p, q, products, p_sizes, q_sizes, product):
 
 @kept(**AS_NUMPY)
 def slopes_within(J, H, box, middle, K):
-    """Write J + H d for all d between the middle and a box.
-
-    With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of them.
-    """
+    """Write J + H d for all d between the middle and a box."""
+    # With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of
+    # them.
     n = middle.size
     for k in range(n):
         for i in range(n):
@@ -112,10 +109,8 @@ def slopes_within(J, H, box, middle, K):
 
 @kept(**AS_NUMPY)
 def next_errors(K, error, at, c, B, r):
-    """Carry errors on, in place: those of `r`, with `error` added; `c` becomes what is around `at`.
-
-    Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
-    """
+    """Move errors, in place: those of `r`, with `error` added; `c` becomes what is around `at`."""
+    # Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
     n = at.size
     KB, rotated = np.empty_like(B), np.empty_like(B)
     matrix_product(K, B, KB)
@@ -154,11 +149,9 @@ def add_left_out(B, transposed, x, c):
 
 @kept(**AS_NUMPY)
 def renewed(c, P, even, B, r, most):
-    """Begin with new numbers s where errors have become larger than a part of the polynomials.
-
-    Return whether.  What was there lies in a box along orthogonal directions, with a number for
-    each of them.
-    """
+    """Begin with new numbers s where errors have become larger than a part of the polynomials."""
+    # Return whether. What was there lies in a box along orthogonal directions, with a number for
+    # each of them.
     n = r.shape[0]
     errors, numbers = 0.0, 0.0
     for k in range(n):

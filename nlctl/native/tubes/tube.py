@@ -228,10 +228,9 @@ def span(k, ky, order, h, boxes, over):
 
 @kept(**AS_NUMPY)
 def range_over_step(ky, h, begin, end, over):
-    """Narrow where the states are during a step, by where they are before and after it.
-
-    A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second coefficient.
-    """
+    """Narrow where the states are during a step, by where they are before and after it."""
+    # A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second
+    # coefficient.
     square = up(0.25 * up(h * h))
     for i in range(over.shape[0]):
         below, above = up(square * max(ky[2, i, 1, 0], 0.0)), up(square * max(-ky[2, i, 0, 0], 0.0))

@@ -120,10 +120,8 @@ def _reduced(b: Body, x: Value, shift: float) -> tuple[Value, Value]:
 
 
 def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
-    """Return y 2^k, where k + 1023 is in the last bits of m.
-
-    Where the result may be small it is made in two steps, so that it underflows gradually.
-    """
+    """Return y 2^k, where k + 1023 is in the last bits of m."""
+    # Where the result may be small it is made in two steps, so that it underflows gradually.
     bits = b.logic("add", b.bits(m), b.integer("and", b.mask(small), _STEP))
     y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
     return b.mul(y, b.select(small, 2.0**-_STEP, 1.0), exact=True)

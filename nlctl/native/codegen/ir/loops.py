@@ -90,10 +90,8 @@ class _Loop:
         return self.b.element(v, 0)
 
     def _turn(self, index: str | None, at: int, skipped: int = 0) -> None:
-        """Write what is computed for the elements from index + at on.
-
-        The first `skipped` of them have been added to the sums before.
-        """
+        """Write what is computed for the elements from index + at on."""
+        # The first `skipped` of them have been added to the sums before.
         w = self.w
         outer, pairs = w.names, w.pairs
         w.names, w.pairs = dict(outer), {}
