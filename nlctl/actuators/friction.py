@@ -33,7 +33,6 @@ def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
         )
 
 
-@record
 class _ForceLaw:
     """What force laws of a velocity share."""
 
