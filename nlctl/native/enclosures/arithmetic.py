@@ -209,21 +209,20 @@ def root_of(b: Body, x: Ends) -> Ends:
 
 
 def minimum(b: Body, x: Ends, y: Ends) -> Ends:
-    for one, other in ((x, y), (y, x)):
-        if one.point == float("inf"):
-            return other
-    x, y = finite(x), finite(y)
-    low, high = (_extreme(b, "olt", v, w) for v, w in zip(x.values, y.values, strict=True))
-    return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
+    return _extreme_of(b, x, y, "olt", x.not_negative and y.not_negative, float("inf"))
 
 
 def maximum(b: Body, x: Ends, y: Ends) -> Ends:
+    return _extreme_of(b, x, y, "ogt", x.not_negative or y.not_negative, -float("inf"))
+
+
+def _extreme_of(b: Body, x: Ends, y: Ends, how: str, signed: bool, neutral: float) -> Ends:
     for one, other in ((x, y), (y, x)):
-        if one.point == -float("inf"):
+        if one.point == neutral:
             return other
     x, y = finite(x), finite(y)
-    low, high = (_extreme(b, "ogt", v, w) for v, w in zip(x.values, y.values, strict=True))
-    return Ends(low=low, high=high, not_negative=x.not_negative or y.not_negative)
+    low, high = (_extreme(b, how, v, w) for v, w in zip(x.values, y.values, strict=True))
+    return Ends(low=low, high=high, not_negative=signed)
 
 
 def _extreme(b: Body, how: str, x: Value, y: Value) -> Value:

@@ -98,7 +98,9 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     if known.values[1] < _INF:
         high = smaller(b, known.values[1], high)
     if known.odd:
-        low = b.select(b.logic("and", _at_least(b, x.low), _below(b, low)), 0.0, low)
+        low = b.select(
+            b.logic("and", b.compare("oge", x.low, 0.0), b.compare("olt", low, 0.0)), 0.0, low
+        )
         falls = b.logic("and", b.compare("ole", x.high, 0.0), b.compare("ogt", high, 0.0))
         high = b.select(falls, 0.0, high)
     signed = known.values[0] >= 0 or (known.odd and x.not_negative)
@@ -109,26 +111,10 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends)
 
 
-def _at_least(b: Body, v: Value) -> Value:
-    return b.compare("oge", v, 0.0)
-
-
-def _below(b: Body, v: Value) -> Value:
-    return b.compare("olt", v, 0.0)
-
-
 def _steps(b: Body, name: str, x: Ends) -> _Result:
     low, high = (applied(b, name, v) for v in x.values)
     ends = Ends(low=low, high=high, not_negative=x.not_negative)
     return ends, b.compare("one", low, high)
-
-
-def _absolute(b: Body, x: Ends) -> _Result:
-    return absolute_of(b, x), None
-
-
-def _sqrt(b: Body, x: Ends) -> _Result:
-    return root_of(b, x), None
 
 
 def _cosh(b: Body, x: Ends) -> _Result:
@@ -204,7 +190,7 @@ def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
 
 def _power(b: Body, x: Ends, y: Ends) -> _Result:
     """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
-    at_zero = b.logic("and", _at_least(b, x.low), b.compare("ogt", y.low, 0.0))
+    at_zero = b.logic("and", b.compare("oge", x.low, 0.0), b.compare("ogt", y.low, 0.0))
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
     result = _corners(b, "power", x, y)
     result = Ends(low=larger(b, 0.0, result.low), high=result.high, not_negative=True)
@@ -291,8 +277,8 @@ def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
 
 
 RULES: dict[str, Callable[..., _Result]] = {
-    "absolute": _absolute,
-    "sqrt": _sqrt,
+    "absolute": lambda b, x: (absolute_of(b, x), None),
+    "sqrt": lambda b, x: (root_of(b, x), None),
     "cosh": _cosh,
     "sin": _circular("sin", 0.25),
     "cos": _circular("cos", 0.0),

@@ -27,6 +27,7 @@ import numpy as np
 from ...annotations import unreported
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
+from ..purity.source import codes_in
 
 _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
     *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and
@@ -250,19 +251,14 @@ def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> I
 @functools.lru_cache(maxsize=4096)
 def _all_texts(code: types.CodeType) -> list[str]:
     """Return the texts that stand in a code object and in those nested in it."""
-    texts = {part for part in code.co_consts if isinstance(part, str)}
-    for part in code.co_consts:
-        if isinstance(part, types.CodeType):
-            texts.update(_all_texts(part))
-    return sorted(texts)
+    return sorted({c for part in codes_in(code) for c in part.co_consts if isinstance(c, str)})
 
 
 @functools.lru_cache(maxsize=4096)  # code never changes, what names refer to may
 def _globals_of(code: types.CodeType) -> set[str]:
     """Return the names that a code object, and those nested in it, read by themselves."""
-    inner = [part for part in code.co_consts if isinstance(part, types.CodeType)]
-    names = {i.argval for i in dis.get_instructions(code) if "GLOBAL" in i.opname}
-    return names.union(*map(_globals_of, inner))
+    steps = (step for part in codes_in(code) for step in dis.get_instructions(part))
+    return {step.argval for step in steps if "GLOBAL" in step.opname}
 
 
 def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
@@ -436,11 +432,7 @@ def _code_parts(code: types.CodeType) -> Iterator[str]:
 @functools.lru_cache(maxsize=4096)
 def _all_names(code: types.CodeType) -> list[str]:
     """Return the global names of a code object and of those nested in it, in a fixed order."""
-    names = set(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            names.update(_all_names(constant))
-    return sorted(names)
+    return sorted({name for part in codes_in(code) for name in part.co_names})
 
 
 def _constant(value: object) -> str:

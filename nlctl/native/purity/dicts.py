@@ -78,8 +78,7 @@ _KNOWN: weakref.WeakSet[FunctionType] = weakref.WeakSet()  # a function may call
 def make_callable(function: FunctionType) -> None:
     """Let machine code call the plain functions that a function refers to, and theirs."""
     # numba knows them from then on; the functions themselves stay as they are.
-    closure = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
-    used = [cell.cell_contents for cell in closure.values()]
+    used = [cell.cell_contents for cell in function.__closure__ or ()]
     used += [function.__globals__.get(name) for name in function.__code__.co_names]
     for other in used:
         library = getattr(other, "__module__", None) or ""

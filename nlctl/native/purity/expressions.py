@@ -15,7 +15,7 @@ import numpy as np
 
 from . import known_calls, made
 from .known_calls import MEMORY
-from .source import source_file
+from .source import cells_of, source_file
 from .values import (
     FRESH,
     OUTSIDE,
@@ -92,7 +92,7 @@ class Expressions(ast.NodeVisitor):
                 return frame.names[name]
             frame = frame.parent
         function = self.frame.function
-        cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        cells = cells_of(function)
         try:
             if name in cells:
                 return self.walk.captured(cells[name], name, cells[name].cell_contents)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...upstream.numba_internals import CPUDispatcher
-from .source import Definition, Unreadable, definition
+from .source import Definition, Unreadable, cells_of, definition
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (
@@ -47,7 +47,7 @@ def frozen(function: Any) -> Any:
         node = definition(function)
     except Unreadable:
         return function
-    old_cells = list(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    old_cells = cells_of(function).items()
     new_cells = [_cell(name, cell, node) for name, cell in old_cells]
     new_globals = {
         name: record
@@ -170,7 +170,7 @@ def without_imports(function: FunctionType) -> FunctionType:
     code = _moved(body, function)
     result = FunctionType(
         code, names, function.__name__, function.__defaults__,
-        tuple(_cells_of(function)[name] for name in code.co_freevars),
+        tuple(cells_of(function)[name] for name in code.co_freevars),
     )  # fmt: skip
     result.__module__, result.__qualname__ = function.__module__, function.__qualname__
     return result
@@ -188,10 +188,6 @@ class _Hoist(ast.NodeTransformer):
 
     visit_Import = _take
     visit_ImportFrom = _take
-
-
-def _cells_of(function: FunctionType) -> dict[str, Any]:
-    return dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
 
 
 def _moved(node: ast.FunctionDef, function: FunctionType) -> CodeType:

@@ -12,6 +12,8 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from .source import cells_of, codes_in
+
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named
     "time": ("the time", _EVERYTHING),
@@ -35,7 +37,7 @@ _FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__bui
 def asked_outside(function: types.FunctionType) -> Iterator[str]:
     """Yield what a function asks, with the words that ask, ``time.time``."""
     cells, names = _cells(function), function.__globals__
-    for code in _codes(function.__code__):
+    for code in codes_in(function.__code__):
         for word, follower in _pairs(code):
             thing = cells[word] if word in cells else names.get(word)
             if not isinstance(thing, types.ModuleType):
@@ -60,7 +62,7 @@ def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) 
     # Whether one is imported already, and under which name, changes while a loop is used.
     modules = {
         word
-        for code in _codes(function.__code__)
+        for code in codes_in(function.__code__)
         for what, word in _words(code)
         if what == "IMPORT_NAME" and not is_library(word)
     }
@@ -81,17 +83,10 @@ def _pairs(code: types.CodeType) -> tuple[tuple[str, str], ...]:
     return tuple((a, b) for a, b in near if isinstance(b, str))
 
 
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
-    yield code
-    for part in code.co_consts:
-        if isinstance(part, types.CodeType):
-            yield from _codes(part)
-
-
 def _cells(function: types.FunctionType) -> dict[str, Any]:
     """Return what a function closes over, by name."""
     contents = {}
-    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+    for name, cell in cells_of(function).items():
         try:
             contents[name] = cell.cell_contents
         except ValueError:  # not yet filled

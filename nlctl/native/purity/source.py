@@ -14,7 +14,7 @@ import functools
 import linecache
 import warnings
 from collections.abc import Iterator
-from types import CodeType, FunctionType
+from types import CellType, CodeType, FunctionType
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
@@ -24,6 +24,19 @@ _LOOPS = ("<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>")  # code of its o
 _FUTURES = functools.reduce(
     int.__or__, (getattr(__future__, name).compiler_flag for name in __future__.all_feature_names)
 )
+
+
+def codes_in(code: CodeType) -> Iterator[CodeType]:
+    """Yield a code object, and those nested in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from codes_in(constant)
+
+
+def cells_of(function: FunctionType) -> dict[str, CellType]:
+    """Return the cells of what a function closes over, by name."""
+    return dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
 
 
 class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
@@ -82,7 +95,7 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
     for node in ast.walk(tree):
         if isinstance(node, Definition):
             places.setdefault((_name(node), _first_line(node)), []).append(node)
-    return places, frozenset(_inside(module))
+    return places, frozenset(codes_in(module))
 
 
 @functools.lru_cache(maxsize=128)
@@ -100,7 +113,7 @@ def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType
                 for neighbours in _runs(body[:place], body[place + 1 :]):
                     cell = ast.Module([*neighbours, statement], type_ignores=[])
                     code = compile(cell, file, "exec", flags=flags, dont_inherit=True)
-                    codes |= set(_inside(code))
+                    codes |= set(codes_in(code))
     return frozenset(codes)
 
 
@@ -123,16 +136,9 @@ def _first_line(node: ast.stmt | ast.expr) -> int:
     return min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
 
 
-def _inside(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _inside(constant)
-
-
 def _candidates(places: Places, code: CodeType) -> Iterator[Definition]:
     """Yield the functions that begin on this line, with this name and these functions inside."""
-    inside = sorted(c.co_name for c in list(_inside(code))[1:] if c.co_name not in _LOOPS)
+    inside = sorted(c.co_name for c in list(codes_in(code))[1:] if c.co_name not in _LOOPS)
     arguments = code.co_varnames[: code.co_argcount]
     for node in places.get((code.co_name, code.co_firstlineno), ()):
         if tuple(a.arg for a in node.args.posonlyargs + node.args.args) == arguments:
