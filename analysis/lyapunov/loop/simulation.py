@@ -22,8 +22,7 @@ from nlctl import native
 from nlctl.arguments import number
 from nlctl.diagrams import Place, initial_state
 from nlctl.diagrams import state_names as all_states
-from nlctl.errors import DiagramError, ParameterError
-from nlctl.native import AlgebraicLoopError
+from nlctl.errors import AlgebraicLoopError, DiagramError, ParameterError
 from nlctl.references import derivative_names
 from nlctl.response import input_output_response
 from nlctl.upstream.control_internals import outputs_now, rates_now

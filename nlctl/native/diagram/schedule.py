@@ -21,6 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from ...blocks import supplied_of, within
 from ...delays.transport import PAST
 from ...diagrams import places, samplings, supplied_blocks
+from ...errors import AlgebraicLoopError
 from ...responses.watched import Watched
 from ...sampling.system import Happening
 from ...sliding.relay import SLIDING
@@ -29,7 +30,7 @@ from ..purity.captured import Captured, noted
 from .checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
 from .nodes import Node
-from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
+from .wiring import Combination, Signal, Wiring
 
 
 @dataclass(frozen=True, kw_only=True)
