@@ -23,7 +23,7 @@ from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
 from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
-from nlctl.native.enclosures.unrounded import UnroundedGraph
+from nlctl.native.enclosures.scalars import UnroundedGraph
 from nlctl.upstream.numba_internals import is_jit_disabled
 
 from .arithmetic import Ball, as_ball

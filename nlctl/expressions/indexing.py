@@ -11,9 +11,8 @@ import numpy as np
 
 from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
 from .graph import Graph, Untraceable
-from .integers import integer_range
 from .masked import Masked, MaskedPlaces
-from .operators import elementwise
+from .operators import elementwise, integer_range
 
 GATHERED = 64  # places among which an integer may choose
 

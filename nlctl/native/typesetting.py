@@ -26,10 +26,10 @@ from ..expressions.latex import Index, LatexWriter, index_text, number_text, sym
 from ..params import declared_params
 from ..sliding.relay import SLIDING
 from ..upstream.systems import System
-from .diagram.feedthrough import feedthrough
 from .diagram.nodes import Node
 from .diagram.parameters import Slot, slots_of
 from .diagram.schedule import Schedule, Signal, schedule
+from .diagram.trace import feedthrough
 from .equations.reader import Reader
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))

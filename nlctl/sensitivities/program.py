@@ -19,8 +19,7 @@ from ..native import Compiled
 from ..native.diagram.program import Program
 from ..native.equations.blocks import Equations
 from .directions import Direction, SomeRows
-from .names import Observed, VariedQuantity
-from .places import StatePlaces
+from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
 from .schedule import Extended, extended, with_derivatives
 from .sides import KeptSides, sides_of

@@ -20,7 +20,7 @@ from functools import cached_property
 from ..expressions.graph import Expr, Graph, needed
 from ..native.sliding.pieces import replaced_parts
 from .directions import Direction, SomeRows, Taken, rows_replaced
-from .places import StatePlaces
+from .names import StatePlaces
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
 

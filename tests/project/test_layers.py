@@ -77,7 +77,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     "nlctl.expressions": [
         ["graph"],
         ["functions", "elimination"],
-        ["arrays", "integers", "operators", "masked", "indexing"],
+        ["arrays", "operators", "masked", "indexing"],
         [
             "conditions",
             "continuity",

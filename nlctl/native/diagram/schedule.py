@@ -28,8 +28,8 @@ from ...sliding.relay import SLIDING
 from ...upstream.systems import System
 from ..purity.captured import Captured, noted
 from .checks import check_functions
-from .feedthrough import closer_feedthrough, feedthrough
 from .nodes import Node
+from .trace import closer_feedthrough, feedthrough
 from .wiring import Combination, Signal, Wiring
 
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import control as ct
 import numpy as np
 
 from ...blocks import Block
 from ...expressions.arrays import Tracer, leaf_vector, scalar
 from ...expressions.dependence import structure
-from ...expressions.graph import Graph, Untraceable
+from ...expressions.graph import Ambiguous, Graph, Untraceable
 from ...expressions.operators import elementwise
 from ...expressions.trace import trace
 from ...upstream.control_internals import current_parameters
 from ...upstream.systems import System
-from .parameters import Slot, current_values
+from .parameters import Slot, current_values, slots_of
 
 
 def time(graph: Graph) -> Tracer:
@@ -71,3 +72,31 @@ def dependence(
     if result.size != system.noutputs or graph.assumptions:
         return passes
     return structure(list(result.pieces()), "u", system.ninputs or 0)
+
+
+def feedthrough(system: Any) -> np.ndarray:
+    """Return which outputs depend directly on which inputs."""
+    # nlctl's blocks declare it, linear systems have their D matrix, and the output functions of
+    # others are traced: what reaches an output in their expressions is depended on, whatever the
+    # values are.
+    # returns (noutputs, ninputs).
+    shape = (system.noutputs or 0, system.ninputs or 0)
+    if isinstance(system, Block):
+        return np.full(shape, bool(system.spec.feedthrough))
+    if isinstance(system, ct.StateSpace):
+        return np.not_equal(system.D, 0.0)
+    if 0 in shape or getattr(system, "outfcn", None) is None:
+        return np.zeros(shape, dtype=bool)
+    return _traced(system)
+
+
+def closer_feedthrough(system: Any, direct: np.ndarray) -> np.ndarray:
+    """Return which entries of `direct` are there in the expressions of a block of nlctl."""
+    return direct & _traced(system) if isinstance(system, Block) and direct.any() else direct
+
+
+def _traced(system: Any) -> np.ndarray:
+    try:
+        return dependence(system, system.outfcn, slots_of(system))
+    except Ambiguous:  # the block is refused when it is read
+        return np.ones((system.noutputs or 0, system.ninputs or 0), dtype=bool)

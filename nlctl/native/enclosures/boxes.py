@@ -18,8 +18,7 @@ from ...expressions.trace import trace
 from ..machine.finish import Loaded, finished
 from ..purity.check import check_pure
 from ..purity.values import FRESH, Impure
-from .scalars import scalar_expressions
-from .unrounded import UnroundedGraph
+from .scalars import UnroundedGraph, scalar_expressions
 from .writer import LANES, JudgedRows, enclosure_text
 
 

@@ -9,8 +9,7 @@ import control as ct
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ..equations.relays import relay_places
 from ..reading import Reading
-from .scalars import scalar_expressions
-from .unrounded import UnroundedGraph
+from .scalars import UnroundedGraph, scalar_expressions
 
 
 def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> list[Expr]:

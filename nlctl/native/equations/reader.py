@@ -21,11 +21,10 @@ from ...sampling.system import Happening, Sampled, oldest, rounded
 from ...wording import counted
 from ..codegen.newton import inside, solver
 from ..codegen.solver import Solver
-from ..diagram.feedthrough import feedthrough
 from ..diagram.nodes import Node
 from ..diagram.program import check_continuous, count_guards, count_switching_functions, memory
 from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, signal_name
-from ..diagram.trace import time, traced_parameters
+from ..diagram.trace import feedthrough, time, traced_parameters
 from ..opaque.called import call_of
 from ..opaque.calls import Call
 
