@@ -79,31 +79,6 @@ def _with_facade(written: Any) -> Any:
     return lambda graph, *rest, **named: written(Facade(graph), *rest, **named)
 
 
-def expit(np: Facade, x: Any) -> Any:
-    """1 / (1 + e^-x)."""
-    return 1.0 / (1.0 + np.exp(-1.0 * x))
-
-
-def logit(np: Facade, x: Any) -> Any:
-    """The inverse of expit."""
-    return np.log(x / (1.0 - x))
-
-
-def log_expit(np: Facade, x: Any) -> Any:
-    """ln expit(x)."""
-    return -1.0 * np.logaddexp(0.0, -1.0 * x)
-
-
-def xlogy(np: Facade, x: Any, y: Any) -> Any:
-    """x ln y, 0 for x = 0."""
-    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y))
-
-
-def xlog1py(np: Facade, x: Any, y: Any) -> Any:
-    """x ln(1 + y), 0 for x = 0."""
-    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y))
-
-
 def softmax(np: Facade, x: Any, axis: object = None) -> Any:
     """e^x, divided by the sum of all."""
     e = np.exp(x - np.max(x, axis=axis, keepdims=True))
@@ -119,9 +94,14 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
 
 
 _FORMULAS = {
-    "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy, "xlog1py": xlog1py,
-    "softmax": softmax, "logsumexp": logsumexp,
-}  # fmt: skip
+    "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
+    "logit": lambda np, x: np.log(x / (1.0 - x)),
+    "log_expit": lambda np, x: -1.0 * np.logaddexp(0.0, -1.0 * x),
+    "xlogy": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y)),
+    "xlog1py": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y)),
+    "softmax": softmax,
+    "logsumexp": logsumexp,
+}
 
 
 # -- math ------------------------------------------------------------------------------------------
