@@ -33,13 +33,13 @@ def _modules() -> list[Any]:
 
 def block_records() -> dict[str, type]:
     """Return every block record of nlctl by name."""
-    found = {}
+    records = {}
     for module in _modules():
         for name in module.__all__:
             thing = getattr(module, name)
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):
-                found[name] = thing
-    return found
+                records[name] = thing
+    return records
 
 
 def named_block(name: str) -> type:
@@ -62,18 +62,18 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
 def function_summaries() -> dict[str, dict[str, str]]:
     """Return the first line of each function that makes blocks: ``{group: {name: line}}``."""
-    found = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
-    return {group: lines for group, lines in found.items() if lines}
+    summaries = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
+    return {group: lines for group, lines in summaries.items() if lines}
 
 
 def paper_summaries() -> dict[str, str]:
     """Return the first line of each paper's module: ``{name: line}``."""
     folder = Path(errors.__file__).parent / "papers"
-    found = {}
+    summaries = {}
     for name in _public(ast.parse((folder / "__init__.py").read_bytes())):
         said = ast.get_docstring(ast.parse((folder / f"{name}.py").read_bytes())) or ""
-        found[name] = said.partition("\n")[0]
-    return found
+        summaries[name] = said.partition("\n")[0]
+    return summaries
 
 
 def making_function(name: str) -> Any:
@@ -85,14 +85,16 @@ def making_function(name: str) -> Any:
 def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
     """Return what is chosen of the public names of a module, or of a package and its rooms."""
     folder = Path(errors.__file__).parent / group
-    own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
-    found = {
+    face = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
+    summaries = {
         node.name: (ast.get_docstring(node) or "").partition("\n")[0]
-        for path in (sorted(folder.rglob("*.py")) or [own])
+        for path in (sorted(folder.rglob("*.py")) or [face])
         for node in ast.parse(path.read_bytes()).body
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and chosen(node)
     }
-    return {name: found[name] for name in _public(ast.parse(own.read_bytes())) if name in found}
+    return {
+        name: summaries[name] for name in _public(ast.parse(face.read_bytes())) if name in summaries
+    }
 
 
 def _is_record(node: ast.stmt) -> bool:

@@ -85,7 +85,7 @@ def loop_report(
     "The loop 'actuator' has 2 blocks and 1 state."
     """
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
-    found = [f"The loop '{loop.name}' has {blocks} and {states}."]
+    sentences = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = diagram_sections(loop, ("loop", "loop-equations"))
     if response is not None:
         given = own_parameters(loop, response) if params is None else dict(params)
@@ -94,21 +94,21 @@ def loop_report(
     parts += sections
     if ledger is not None:
         _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
-        found.append(ledger_text(ledger))
+        sentences.append(ledger_text(ledger))
         parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
     if certificate is not None:
         _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
-        found.append(f"Certificate: {certificate.verdict}.")
+        sentences.append(f"Certificate: {certificate.verdict}.")
         parts.append(certificate_section(certificate))
     if study is not None:
         _check_study(loop, study)
-        found.append(without_assumptions(study.verdict))
+        sentences.append(without_assumptions(study.verdict))
         parts += _studied(study)
     described, sources = ([], []) if study is None else methods(study)
     return Report(
         title=title,
         question=question or ("" if study is None else study.study.study.question),
-        verdict=verdict or " ".join(found),
+        verdict=verdict or " ".join(sentences),
         claims=[*claims, *([] if study is None else study_claims(study, "study-"))],
         sections=parts,
         command=command,
@@ -126,7 +126,7 @@ def loop_report(
 def _studied(result: Result) -> list[Section]:
     """Return a study as the part behind everything else."""
     lost: list[str] = []
-    kept = rows_again(result, loop_again(result, tell=lost.append))
+    kept = rows_again(result, loop_again(result, notify=lost.append))
     intro = [result.study.study.question or result.study.study.title, *lost]
     heading = Section(
         key="study",
@@ -138,29 +138,29 @@ def _studied(result: Result) -> list[Section]:
 
 def _numbers(response: Any, study: Result | None) -> dict[str, Any]:
     """Return all numbers for ``report.json``."""
-    told: dict[str, Any] = {} if study is None else {"study": numbers(study)}
+    content: dict[str, Any] = {} if study is None else {"study": numbers(study)}
     if response is not None:
-        told["run"] = {
+        content["run"] = {
             name: {"least": y.min(), "largest": y.max(), "last": y[-1]}
             for name, y in outputs_of_run(response).items()
         }
-    return told
+    return content
 
 
 def _check_record(
     loop: ct.InputOutputSystem, what: str, name: str, facts: Mapping[str, Mapping[str, str]]
 ) -> None:
     """Refuse what has a record of another loop."""
-    if told := difference_text([*fact_differences(facts, loop_facts(loop))]):
+    if differing := difference_text([*fact_differences(facts, loop_facts(loop))]):
         raise DiagramError(
-            f"the {what} is of another loop '{name}' than '{loop.name}' ({told}): give the loop "
-            "that it was made of"
+            f"the {what} is of another loop '{name}' than '{loop.name}' ({differing}): give the "
+            "loop that it was made of"
         )
 
 
 def _check_study(loop: ct.InputOutputSystem, result: Result) -> None:
-    if told := diagram_differences(result.origin, loop):
+    if differing := diagram_differences(result.origin, loop):
         raise DiagramError(
-            f"the study in '{result.folder}' is of another loop than '{loop.name}' ({told}): give "
-            "the loop as the study's function makes it"
+            f"the study in '{result.folder}' is of another loop than '{loop.name}' ({differing}): "
+            "give the loop as the study's function makes it"
         )

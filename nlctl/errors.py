@@ -181,7 +181,7 @@ class ZenoError(DivergedError):
 
 
 class InexactWarning(UserWarning):
-    """Derivatives hold differences, of a function that is called as it stands: it says which.
+    """Derivatives hold differences, of a function that is called in Python: it says which.
 
     Examples
     --------

@@ -40,36 +40,36 @@ def compose_page(
     name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
 ) -> Report:
     """Run a loop, check what can be checked of any, and compose its page."""
-    made = simulated(name, settings, inputs, until, step)
+    run = simulated(name, settings, inputs, until, step)
     from ..loop_checks import (
         LoopCheck,
         checks_of,
         checks_section,
         headline,
+        in_sentences,
         proof_check,
         proof_of,
-        told,
     )
     from ..loop_report import loop_report
     from .terminal import progress_bar
 
     with progress_bar("checking the loop", 2) as advance:
-        checks = checks_of(made.loop, made.response, made.params)
+        checks = checks_of(run.loop, run.response, run.params)
         advance(1)
-        proof = proof_of(made.loop, until, made.start, made.params)
+        proof = proof_of(run.loop, until, run.start, run.params)
         advance(1)
     applies = not isinstance(proof, LoopCheck)
     every = [*checks, proof_check(proof) if applies else proof]
     page = loop_report(
-        made.loop,
-        title=made.loop.name,
-        response=made.response,
-        params=made.params,
+        run.loop,
+        title=run.loop.name,
+        response=run.response,
+        params=run.params,
         ledger=proof if applies else None,
         sections=[checks_section(every)],
         command=_command(name, settings, inputs, until, step),
     )
-    return replace(page, verdict=f"{page.verdict} {told(every)}", headline=headline(every))
+    return replace(page, verdict=f"{page.verdict} {in_sentences(every)}", headline=headline(every))
 
 
 def _command(

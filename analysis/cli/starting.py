@@ -24,10 +24,10 @@ def start_project(folder: Path) -> list[Path]:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ParameterError(f"'{folder}' exists already: give the name of a new folder")
     folder.mkdir(parents=True, exist_ok=True)
-    made = []
+    paths = []
     for source, target in _FILES.items():
         text = (Path(__file__).parent / "starter" / f"{source}.txt").read_text(encoding="utf-8")
         content = Template(text).substitute(name=name).encode()
         path = folder / target.format(name=name)
-        made.append(replace_file(path, lambda file, content=content: file.write(content)))
-    return made
+        paths.append(replace_file(path, lambda file, content=content: file.write(content)))
+    return paths

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..studies.result import Result
     from ..studies.run import Watch
 
-__all__ = ["NO_STAMP", "Stamp", "report_study", "stamped", "tell"]
+__all__ = ["NO_STAMP", "Stamp", "notify", "report_study", "stamped"]
 
 
 Stamp = Mapping[str, str]  # revision and date, as far as they are given
@@ -59,17 +59,17 @@ def report_study(
         else load_result(path, trust=trust)
     )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    prepared = loop_again(result, trust=trust, tell=tell)
+    prepared = loop_again(result, trust=trust, notify=notify)
     loop = None if prepared is None else loop_of(prepared)
     published = PUBLISHED.get(result.study.loop)
-    made = study_report(result, rows_again(result, prepared, threads), command, loop, published)
-    made = stamped(made, stamp)
+    report = study_report(result, rows_again(result, prepared, threads), command, loop, published)
+    report = stamped(report, stamp)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
-        made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
+        report = replace(report, files={(data / k).as_posix(): v for k, v in report.files.items()})
     folder = result.folder if out is None else out
     with recorded_page(folder) if _is_in_run(folder, result) else nullcontext():
-        return write_report(made, folder, interactive=interactive, force=force), result
+        return write_report(report, folder, interactive=interactive, force=force), result
 
 
 def _is_in_run(page: Path, result: Result) -> bool:
@@ -86,6 +86,6 @@ def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trus
     return run(file, folder, resume=True, force=force, threads=threads, **how)
 
 
-def tell(words: str) -> None:
+def notify(words: str) -> None:
     """Print what a page will lack."""
     error_line(f"nlctl: {words}")

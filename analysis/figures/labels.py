@@ -31,7 +31,7 @@ def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
 
 
 def arms(value: np.ndarray, low: object, high: object) -> np.ndarray:
-    """Return the lengths of error bars; a bootstrap interval may lie beside its estimate."""
+    """Return the lengths of error bars; an estimate may lie outside its bootstrap interval."""
     return np.maximum([value - np.asarray(low), np.asarray(high) - value], 0.0)
 
 

@@ -136,12 +136,12 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
 
 @as_annotated
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
-    """Lowest margin that was found at each size that was looked at, and the radius.
+    """Lowest margin that was found at each size that was tried, and the radius.
 
     Parameters
     ----------
     steps : pandas.DataFrame
-        Sizes that were looked at, with the lowest margin at each.
+        Sizes that were tried, with the lowest margin at each.
     radius : float
         The robustness radius.
 

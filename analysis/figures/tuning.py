@@ -81,9 +81,9 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     y = within_reach(history["cost"]) if cost else clipped_margins(history["margin"])
     runs = within_reach(history["runs"])
     for name, (colour, marker, label) in _CHOSEN.items():
-        own = (history["by"] == name).to_numpy()
-        if own.any():
-            ax.plot(runs[own], y[own], marker, color=colour, markersize=4, label=label)
+        by_this = (history["by"] == name).to_numpy()
+        if by_this.any():
+            ax.plot(runs[by_this], y[by_this], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)
         ax.step(runs, best, where="post", color=TEXT_INK, linewidth=1.4, label="best")

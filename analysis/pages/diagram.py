@@ -91,7 +91,7 @@ def _equation_items(diagram: ct.InputOutputSystem) -> Iterator[Item]:
     """Yield the equations of every block, read from the functions that are run."""
     try:
         blocks = typeset(diagram)
-    except UsageError as refused:  # it was run all the same, by calling a function as it stands
+    except UsageError as refused:  # it was run all the same, by calling a function in Python
         yield Paragraph(text=f"There are no formulas of this loop: {refused}")
         return
     yield Paragraph(text=_EQUATIONS)
@@ -104,5 +104,5 @@ def _value(value: Any) -> Any:
     """Return a value as the table shows it; of long ones only the size."""
     if isinstance(value, bool | int | float | str):
         return value
-    told = str(value)
-    return told if len(told) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"
+    text = str(value)
+    return text if len(text) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"

@@ -125,8 +125,8 @@ def _order(example: str) -> int:
 
 def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
     order = _order(example)
-    own = {key.removeprefix("controller."): value for key, value in gains.items()}
-    return FunnelControl(order=order, rho_0=5.0, **own)
+    settings = {key.removeprefix("controller."): value for key, value in gains.items()}
+    return FunnelControl(order=order, rho_0=5.0, **settings)
 
 
 _MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {

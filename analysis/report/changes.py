@@ -39,7 +39,7 @@ class ClaimChange:
 
     @property
     def statuses(self) -> tuple[str, str]:
-        """What became of it in both."""
+        """Its status in both."""
         before = _NEW if self.first is None else claim_status(self.first)[0]
         return before, _GONE if self.second is None else claim_status(self.second)[0]
 
@@ -77,7 +77,7 @@ def claim_changes(
     Claims belong together that say the same, or else have their evidence at the same place.
     """
     one, other = ([Claim(**claim) for claim in claims] for claims in (first, second))
-    found, left = [], list(other)
+    changes, left = [], list(other)
     alone = []
     for claim in one:
         same = next((c for c in left if c.text == claim.text), None)
@@ -85,22 +85,22 @@ def claim_changes(
             alone.append(claim)
             continue
         left.remove(same)
-        found.append(ClaimChange(first=claim, second=same))
+        changes.append(ClaimChange(first=claim, second=same))
     for claim in alone:
         same = next((c for c in left if c.evidence and c.evidence == claim.evidence), None)
         if same is not None:
             left.remove(same)
-        found.append(ClaimChange(first=claim, second=same))
-    found += [ClaimChange(first=None, second=claim) for claim in left]
+        changes.append(ClaimChange(first=claim, second=same))
+    changes += [ClaimChange(first=None, second=claim) for claim in left]
     return sorted(
-        found, key=lambda change: (-change.worse, change.statuses[0] == change.statuses[1])
+        changes, key=lambda change: (-change.worse, change.statuses[0] == change.statuses[1])
     )
 
 
 def figure_changes(
     reports: Sequence[Mapping[str, Any]], folders: Sequence[Path | None]
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield key, caption and what became of every figure of two reports."""
+    """Yield key, caption and change of every figure of two reports."""
     one, other = (_figures(report) for report in reports)
     drawn = [{} if folder is None else drawings(folder / "index.html") for folder in folders]
     for key in dict.fromkeys([*one, *other]):

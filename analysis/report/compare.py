@@ -128,18 +128,18 @@ def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     """Return all that is compared, by the name of the place where it stands."""
-    found = {"title": report["title"], "verdict": report["verdict"]}
+    values = {"title": report["title"], "verdict": report["verdict"]}
     claims = report["claims"]
     for name, claim in zip(_names([c["text"] for c in claims]), claims, strict=True):
-        found |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
-    found |= _leaves("numbers", report["numbers"])
+        values |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
+    values |= _leaves("numbers", report["numbers"])
     for key, section in report["sections"].items():
         if key not in sections:
             continue
         tables = [item for item in section["items"] if item["kind"] == "table"]
         for number, table in enumerate(tables, 1):
-            found |= _cells(f"section '{key}', table {number}", table)
-    return found
+            values |= _cells(f"section '{key}', table {number}", table)
+    return values
 
 
 def _leaves(where: str, value: object) -> dict[str, Any]:
@@ -156,19 +156,19 @@ def _placeless(value: object) -> Any:
 
 
 def _cells(where: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the cells of a table by row and column; rows are told by their first cells."""
-    found = {f"{where}, columns": list(table["columns"])}
+    """Return the cells of a table by row and column; rows are named by their first cells."""
+    cells = {f"{where}, columns": list(table["columns"])}
     columns = _names(table["columns"])
     rows = [[_placeless(value) for value in row] for row in table["rows"]]
     for name, row in zip(_row_names(rows), rows, strict=True):
         for place, value in enumerate(row):
             column = columns[place] if place < len(columns) else str(place + 1)
-            found[f"{where}, row '{name}', column '{column}'"] = value
-    return found
+            cells[f"{where}, row '{name}', column '{column}'"] = value
+    return cells
 
 
 def _row_names(rows: Sequence[Sequence[Any]]) -> list[str]:
-    """Return a name for each row: as few of its first cells as tell the rows apart."""
+    """Return a name for each row: as few of its first cells as make names unique."""
     for width in (1, 2, 3):
         names = [" | ".join(map(str, row[:width])) for row in rows]
         if len(set(names)) == len(names):

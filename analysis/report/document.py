@@ -3,7 +3,7 @@
 Text is plain text; a formula inside it stands between ``\\(`` and ``\\)``, in LaTeX.
 
 A report is data until the last step; `nlctl.analysis.report.render` turns it into a page and into
-``report.json``, so that every number on the page is also in the file beside it.
+``report.json``, so that every number on the page is also in the file next to it.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class History:
     """Signals over time for a chart to zoom in and to read values from.
 
     It is on the page only if that is asked for, and only where scripts run.  Hence it shows
-    nothing of its own: a figure beside it shows the same signals.
+    nothing of its own: a figure next to it shows the same signals.
 
     Attributes
     ----------
@@ -173,12 +173,12 @@ class History:
     shown: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        wanted = checked_times(self.time).shape
+        shape = checked_times(self.time).shape
         for name, samples in self.signals.items():
-            if np.shape(samples) != wanted:
+            if np.shape(samples) != shape:
                 raise ParameterError(
                     f"signal '{name}' of history '{self.key}' has shape {np.shape(samples)}, "
-                    f"its time {wanted}"
+                    f"its time {shape}"
                 )
         for name in self.shown:
             if name not in self.signals:
@@ -308,11 +308,11 @@ class Report:
         Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
         (``doi 10...``) becomes a link, the only kind that leads out of the page.
     files : mapping
-        Name and SHA-256 of each data file beside the page (`nlctl.analysis.report.file_hashes`).
+        Name and SHA-256 of each data file next to the page (`nlctl.analysis.report.file_hashes`).
     question : str
-        What was asked; it stands before the verdict.
+        The question that the report answers; it precedes the verdict.
     lead : Figure, optional
-        The picture beside the verdict that tells the story.
+        The picture next to the verdict that shows the main result.
     author, revision, date : str
         Below the title.  They are only what is given: a report that is made twice is the same to
         the byte.
@@ -357,6 +357,6 @@ PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib
 
 def versions(*others: str) -> dict[str, str]:
     """Return the machine, Python, and the versions of the packages that every report needs."""
-    own = {"system": f"{platform.system()} {platform.machine()}"}
-    own["Python"] = platform.python_version()
-    return own | {name: version(name) for name in (*PACKAGES, *others)}
+    platform_ = {"system": f"{platform.system()} {platform.machine()}"}
+    platform_["Python"] = platform.python_version()
+    return platform_ | {name: version(name) for name in (*PACKAGES, *others)}

@@ -35,7 +35,7 @@ def drawings(page: Path) -> dict[str, str]:
 
 
 def _with_shapes(drawn: str, shapes: dict[str, str]) -> str:
-    return _USED.sub(lambda found: f'"{shapes.get(found[1], "")}"', drawn)
+    return _USED.sub(lambda match: f'"{shapes.get(match[1], "")}"', drawn)
 
 
 def _digest(text: str) -> str:

@@ -14,7 +14,7 @@ from .outline import place_anchors
 __all__ = ["SIGNALS_FILE", "chart", "signals_json", "thinned"]
 
 SIGNALS_FILE = "signals.json"
-"""File beside a page with the time histories of the page, for comparisons."""
+"""File next to a page with the time histories of the page, for comparisons."""
 
 _COUNT = 2000  # samples of each signal on the page
 DIGITS = 6
@@ -67,8 +67,8 @@ def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
         part, known = signals[:, places], finite[:, places]
         lowest = np.where(known, part, np.inf).argmin(axis=1)
         highest = np.where(known, part, -np.inf).argmax(axis=1)
-        for found in (lowest, highest, known.argmin(axis=1)):
-            kept |= {*places[found].tolist()}
+        for indices in (lowest, highest, known.argmin(axis=1)):
+            kept |= {*places[indices].tolist()}
     return np.array(sorted(kept))
 
 

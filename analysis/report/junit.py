@@ -56,12 +56,12 @@ def junit(title: str, claims: Sequence[Claim]) -> bytes:
             known = ElementTree.SubElement(case, "properties")
             for one in claim.ids:
                 ElementTree.SubElement(known, "property", name="requirement", value=_text(one))
-        found = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
+        evidence = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
         if verdict:
-            told = ElementTree.SubElement(case, verdict, message=_text(found))
-            told.text = _text(f"evidence: {claim.evidence}") if claim.evidence else None
+            failure = ElementTree.SubElement(case, verdict, message=_text(evidence))
+            failure.text = _text(f"evidence: {claim.evidence}") if claim.evidence else None
         else:
-            ElementTree.SubElement(case, "system-out").text = _text(found)
+            ElementTree.SubElement(case, "system-out").text = _text(evidence)
     ElementTree.indent(suite)
     return ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True) + b"\n"
 

@@ -68,7 +68,7 @@ MEANINGS = {  # of the statuses of claims, as the page explains them
     "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
     "is wrong, and nothing of this report failed",
     "not shown yet": "what was run neither shows nor refutes it",
-    "undecided": "what was run does not tell",
+    "undecided": "what was run does not decide it",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
     "fails": "what was measured is beyond the limit",
@@ -106,8 +106,8 @@ def place_anchors(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            wanted = item.key if isinstance(item, Figure | History) else f"{heading}-{kind(item)}"
-            anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
+            proposed = item.key if isinstance(item, Figure | History) else f"{heading}-{kind(item)}"
+            anchor = _anchor(proposed, taken, ("-title", "-desc")) if _has_anchor(item) else ""
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)
         placed.append(Placed(anchor=heading, level=level, section=section, items=items))
@@ -236,7 +236,7 @@ def claim_status(claim: Claim) -> tuple[str, str]:
 def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
     """Return what the statuses of the claims mean, as far as they are the usual ones."""
     used = {claim_status(claim)[0] for claim in claims}
-    return {status: told for status, told in MEANINGS.items() if status in used}
+    return {status: meaning for status, meaning in MEANINGS.items() if status in used}
 
 
 def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[str, str]:
@@ -278,7 +278,7 @@ def _known(claims: Sequence[Claim], before: str, after: str = "") -> str:
 
 
 def _refuted(claims: Sequence[Claim]) -> str:
-    """Return what became of the claims where some are refuted; somebody's and ours apart."""
+    """Return how many claims hold where some are refuted; somebody's and ours apart."""
     whose = {claim.by for claim in claims if claim_status(claim)[1] == "refuted"}
     by = whose.pop() if len(whose) == 1 else None
     theirs = [claim for claim in claims if claim.by == by] if by else claims
@@ -288,9 +288,9 @@ def _refuted(claims: Sequence[Claim]) -> str:
     waiting = [f"{open_} {'is' if open_ == 1 else 'are'} {_waiting(claims)}"] * bool(open_)
     are = "is" if refuted == 1 else "are"
     if by:
-        told = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
-        told += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
-        return f"{', '.join(told)}{_ours([claim for claim in claims if claim.by != by])}."
+        parts = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
+        parts += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
+        return f"{', '.join(parts)}{_ours([claim for claim in claims if claim.by != by])}."
     first = f"{counted(refuted, 'claim')} {are} refuted"
     if by is not None:
         first = f"{some_of(refuted, len(claims), 'claim', 'is', 'are')} refuted"
@@ -299,14 +299,14 @@ def _refuted(claims: Sequence[Claim]) -> str:
 
 
 def _ours(claims: Sequence[Claim]) -> str:
-    """Return what became of our own claims, of which none fails or is refuted."""
+    """Return how many of our own claims hold, of which none fails or is refuted."""
     held = [claim for claim in claims if claim_status(claim)[1] != "caution"]
     left = len(claims) - len(held)
-    told = []
+    parts = []
     if held:
         every = "all " if not left and len(held) > 1 else ""
         verb = "holds" if len(held) == 1 else "hold"
-        told.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
+        parts.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
     if left:
-        told.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
-    return f"; of ours {', '.join(told)}" if told else ""
+        parts.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
+    return f"; of ours {', '.join(parts)}" if parts else ""

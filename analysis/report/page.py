@@ -125,7 +125,7 @@ def check_report_folder(folder: str | os.PathLike[str]) -> None:
         folder / n for n in ("index.html", "report.json", "report.pdf", "signals.json")
     )
     is_own = _maker(page) == generator("report.html")
-    others = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
+    others = [p for p, is_ours in ((page, is_own), (content, _is_report(content))) if not is_ours]
     others += [] if is_own else others_of_page
     _refuse([path for path in others if path.exists()], "take another folder with --out")
 
@@ -149,10 +149,10 @@ def _maker(page: Path) -> str:
     """Return who made a page; nothing if it does not say, or cannot be read."""
     try:
         with page.open("rb") as file:
-            found = MADE.search(file.read(HEAD).decode(errors="replace"))
+            match = MADE.search(file.read(HEAD).decode(errors="replace"))
     except OSError:
         return ""
-    return found[1] if found else ""
+    return match[1] if match else ""
 
 
 def _is_report(path: Path) -> bool:

@@ -41,7 +41,7 @@ class Revision:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trend:
-    """What became of the claims and main numbers of one study.
+    """Claims and main numbers of one study over its revisions.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Trend:
 
 
 def trends(revisions: Iterable[Revision]) -> list[Trend]:
-    """Return a trend for each study of which there are several reports, which are told by title."""
+    """Return a trend for each study of which there are several reports, found by title."""
     by_title: dict[str, list[Revision]] = {}
     for revision in revisions:
         by_title.setdefault(str(revision.content["title"]), []).append(revision)
@@ -112,8 +112,8 @@ def _claims_over(these: Sequence[Revision]) -> dict[str, list[Claim | None]]:
     """Return each claim at each revision: from one to the next they are matched as in compare."""
     rows: list[list[Claim | None]] = [[Claim(**c)] for c in these[0].content["claims"]]
     for place, (one, other) in enumerate(itertools.pairwise(these), 1):
-        found = claim_changes(one.content["claims"], other.content["claims"])
-        for change in found:
+        changes = claim_changes(one.content["claims"], other.content["claims"])
+        for change in changes:
             row = next((r for r in rows if change.first is not None and r[-1] == change.first
                         and len(r) == place), None)  # fmt: skip
             if row is not None:
@@ -150,12 +150,12 @@ def _spread(row: Sequence[float]) -> float:
 
 def _main(content: Mapping[str, Any]) -> dict[str, float]:
     """Return margins of claims and the numbers of a report that are not lines of its tables."""
-    found = {
+    numbers = {
         f"margin: {claim['text']}": float(sort_key(claim["margin"]))
         for claim in content["claims"]
         if sort_key(claim.get("margin", ""))
     }
-    return found | {
+    return numbers | {
         name: value for name, value in _leaves("", content["numbers"]) if not _PARTS.search(name)
     }
 

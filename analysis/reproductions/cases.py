@@ -1,4 +1,4 @@
-"""Cases of a paper: a diagram of its, a start, an input, and what became of them."""
+"""Cases of a paper: a diagram, a start, an input, and how they ended."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from .file.schema import Study
 from .file.shipped import shipped
 from .finding import Finding
 from .folder import load_result
-from .kind import Ground, Kind, Setup, made
+from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
 from .reading.parse import StudyFile, read_study
@@ -35,9 +35,9 @@ __all__ = [
     "StudyFile",
     "Varied",
     "Wholeness",
+    "finding_of",
     "from_toml",
     "load_result",
-    "made",
     "origin_differences",
     "plan",
     "read_study",

@@ -41,7 +41,7 @@ class Finding:
 
     Examples
     --------
-    See `made`.
+    See `finding_of`.
     """
 
     key: str
@@ -62,7 +62,7 @@ class Finding:
         return self.answer == "shown" if self.answer else None
 
     @property
-    def told(self) -> str:
+    def outcome(self) -> str:
         """The answer in words, ``not shown yet (needs ...)``."""
         return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
 

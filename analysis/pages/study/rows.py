@@ -69,10 +69,10 @@ def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield how the rows of the main table ended, and the worst of them."""
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    told = violate(violated, len(table))
+    sentence = violate(violated, len(table))
     if refused := refusal(result):
-        told += f". That is not an estimate of a probability: {refused}"
-    yield Paragraph(text=f"{told}.")
+        sentence += f". That is not an estimate of a probability: {refused}"
+    yield Paragraph(text=f"{sentence}.")
     statuses = table["status"].astype(str)
     counts = statuses.value_counts().sort_index()
     yield Table(
@@ -198,7 +198,7 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
         key=f"{key}-history",
         caption=f"The nominal run and the worst one that is known (margin {worst}).",
         description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
-        "figure above shows the same runs, the slider below tells their values.",
+        "figure above shows the same runs, the slider below reads their values.",
         time=kept.time,
         signals=both,
         shown=list(both)[: len(runs)],
@@ -221,14 +221,14 @@ def _limits(kept: Histories) -> str:
 
 def _peaks(kept: Histories) -> str:
     """Say how large each signal becomes; a run that has ended counts as infinite."""
-    told = []
+    sentences = []
     for name, samples in kept.signals.items():
         largest = [
             float(np.max(np.where(np.isnan(y), np.inf, np.abs(y))))
             for y in (kept.nominal[name], samples, kept.worst[name])
         ]
-        told.append(
+        sentences.append(
             f"Largest magnitude of {name}: nominal {largest[0]:.4g}, of all {largest[1]:.4g}, of "
             f"the worst run {largest[2]:.4g}."
         )
-    return " ".join(told)
+    return " ".join(sentences)

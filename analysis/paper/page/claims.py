@@ -19,7 +19,7 @@ ACTUATED = ("1", "2", "1-backlash", "2-dead-zone")  # cases: both examples, both
 def paper_verdict(
     runs: Mapping[str, CaseRun], compared: Sequence[Check], far: Mapping[str, LongRun]
 ) -> str:
-    """Return the report's first sentence, and what became of the loops far beyond 20 s."""
+    """Return the report's first sentence, and how the loops end far beyond 20 s."""
     total = len(compared)
     missed = [c for c in compared if not c.passed]
     if missed:
@@ -113,17 +113,17 @@ def theorem_claims(
     proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None = None
 ) -> list[Claim]:
     """Return what the paper claims for all time."""
-    found = [_theorem()] if proofs else []
-    return found + [_bounded(run, burst) for run in _lost(far)]
+    claims = [_theorem()] if proofs else []
+    return claims + [_bounded(run, burst) for run in _lost(far)]
 
 
 def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
     """Return what was found of the proof's steps, and what nlctl proves in its place."""
-    found = []
+    claims = []
     for number, one in proofs.items():
         lines, bound = one.ledger, one.certificate.C_0
         checked = [line for line in lines.lines if line.reading == "corrected"]
-        found += [
+        claims += [
             Claim(
                 text=f"Example {number}: do the proof's steps, corrected where they can be, hold "
                 f"along a run of {HORIZON:g} s?",
@@ -143,7 +143,7 @@ def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
                 status="proved" if np.isfinite(bound) else "undecided",
             ),
         ]
-    return found
+    return claims
 
 
 def _theorem() -> Claim:

@@ -21,26 +21,26 @@ __all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
 
 def lyapunov_sections(
-    found: Mapping[int, Evidence],
+    proofs: Mapping[int, Evidence],
     far: Mapping[str, LongRun] | None = None,
     burst: Burst | None = None,
 ) -> list[Section]:
     """Compose the part from what was found."""
-    if not found:
+    if not proofs:
         return []
-    parts = [section for number, one in found.items() for section in _example(number, one)]
-    return [_finding(found, far or {}, burst), _lemma(), *parts]
+    parts = [section for number, one in proofs.items() for section in _example(number, one)]
+    return [_finding(proofs, far or {}, burst), _lemma(), *parts]
 
 
 def _finding(
-    found: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
+    proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
 ) -> Section:
     return Section(
         key="proof",
         title="The proof, and what happens far beyond 20 s",
         items=[
             *_burst(far, burst),
-            _slow_drift_table(found),
+            _slow_drift_table(proofs),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
@@ -74,12 +74,12 @@ def _burst(far: Mapping[str, LongRun], burst: Burst | None) -> Iterator[Item]:
 
 
 def _after(run: LongRun, burst: Burst) -> Iterator[Item]:
-    told = text.after_text(run, burst)
-    yield Paragraph(text=told)
+    sentence = text.after_text(run, burst)
+    yield Paragraph(text=sentence)
     yield Figure(
         key="proof-after",
         caption=text.AFTER,
-        description=f"{told} {text.AFTER}",
+        description=f"{sentence} {text.AFTER}",
         figure=after_burst(burst),
     )
 
@@ -120,9 +120,9 @@ def _forecast_table(far: Mapping[str, LongRun]) -> Table:
     )
 
 
-def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
+def _slow_drift_table(proofs: Mapping[int, Evidence]) -> Table:
     rows = []
-    for number, one in found.items():
+    for number, one in proofs.items():
         c = one.slow_drift
         burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"

@@ -36,12 +36,12 @@ CALM = (
 AFTER = (
     "Example 2 through its burst, with the ripple of the gain averaged. Left: the filtered error r "
     "and the input u over ζ; between the dashed lines N(ζ) has the wrong sign. Right: the tracking "
-    "error after the burst, with a large constant in the place of |N|, which no longer matters."
+    "error after the burst, with a large constant instead of |N|, which no longer matters."
 )
 FORECASTS = (
-    "What was forecast from the beginning of each run, and what became of it. Held: the burst lies "
+    "What was predicted from the beginning of each run, and what happened. Held: the burst lies "
     "in the range, or ζ rests within 0.01 of its place. Failed: there was no burst in the range, "
-    "or ζ has gone past that place. Open: the run does not tell."
+    "or ζ has gone past that place. Open: the run does not show it."
 )
 FAR_CAPTION = (
     "Runs of this report far beyond 20 s. "
@@ -52,7 +52,7 @@ FAR_CAPTION = (
 )
 SLOW_DRIFT = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
-    "integral of |N|. Drifts: by the fitted balance of the drift it goes on until the budget is "
+    "integral of |N|. Drifts: by the fitted balance of the drift it continues until the budget is "
     "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
     "Undecided: the fits disagree, or the chirp of Example 1 has not shown enough."
 )
@@ -115,14 +115,14 @@ def burst_text(run: LongRun) -> str:
         f"tolerance {run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to "
         "the wrong sign: r and the input grow by orders of magnitude within milliseconds, to "
         f"{r:.2g} and {u:.2g}, and the integrator's steps shrink to nothing. {sure} That the "
-        "signals are unbounded is not shown by that. The drift told of it long before: from the "
+        "signals are unbounded is not shown by that. The drift predicts it long before: from the "
         f"first {early.time:g} s the burst was forecast for {early.burst:.0f} s, from the first "
         f"{late.time:g} s for {late.burst:.0f} s."
     )
 
 
 def after_text(run: LongRun, burst: Burst) -> str:
-    """Return what became of Example 2 after its burst, in one paragraph."""
+    """Return how Example 2 continues after its burst, in one paragraph."""
     peak, largest_input = burst.peaks
     bounds, late = burst.bounds, burst.late_time[-1]
     years = bounds.right.budget / (run.lobe.budget / run.burst) / (365.25 * 86_400)
@@ -134,7 +134,7 @@ def after_text(run: LongRun, burst: Burst) -> str:
         "the right sign again. By the integral of N alone, whatever the gain does within its "
         f"bounds, max |r| is at most {bounds.peak[1]:.3g}, and ζ rests between "
         f"{bounds.rest[0]:.3f} and {bounds.rest[1]:.3f}. Then the loop is calm: |e₁| ≤ "
-        f"{burst.calm:.4f} over {late:.0f} s, found with constants {gains} in the place of N, "
+        f"{burst.calm:.4f} over {late:.0f} s, found with constants {gains} instead of N, "
         f"which agree to {100 * burst.apart:.1g} %. At the rate of the drift so far the budget of "
         f"the next lobe lasts for {years:.0e} years. So by this computation the signals stay "
         "finite; that they stay bounded for all time is neither proved nor refuted."
@@ -142,7 +142,7 @@ def after_text(run: LongRun, burst: Burst) -> str:
 
 
 def calm(run: LongRun) -> str:
-    """Return what became of a long run that did not burst."""
+    """Return how a long run ended that did not burst."""
     return f"No burst within {run.time[-1]:.0f} s: ζ ends at {run.signals['zeta'][-1]:.3f}."
 
 

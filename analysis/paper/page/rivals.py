@@ -50,9 +50,9 @@ def rivals_section(record: pd.DataFrame) -> Section:
 
 def _sentence(record: pd.DataFrame, example: str) -> str:
     """Say who beats the paper's controller behind every actuator, and whom it beats."""
-    found, alone = beaten_by(record, example).values(), "no single controller"
+    tallies, alone = beaten_by(record, example).values(), "no single controller"
     beaten, beats = (
-        tuple(x for x in KNOWLEDGE if all(x in each[key] for each in found))
+        tuple(x for x in KNOWLEDGE if all(x in tally[key] for tally in tallies))
         for key in ("beaten by", "beats")
     )
     return (
@@ -68,9 +68,9 @@ def _winners(record: pd.DataFrame) -> Table:
         "difference on the same samples on one side of 0.",
         columns=("example", "actuator", "beaten by", "better than"),
         rows=[
-            (title, RIVAL_ACTUATORS[name], _listed(each["beaten by"]), _listed(each["beats"]))
+            (title, RIVAL_ACTUATORS[name], _listed(tally["beaten by"]), _listed(tally["beats"]))
             for example, title in _TITLES.items()
-            for name, each in beaten_by(record, example).items()
+            for name, tally in beaten_by(record, example).items()
         ],
     )
 
@@ -80,10 +80,10 @@ def _listed(labels: tuple[str, ...], nobody: str = "none") -> str:
 
 
 def _table(record: pd.DataFrame, example: str) -> Table:
-    own: Any = record[record["example"] == example]
+    rows: Any = record[record["example"] == example]
     return Table(
         caption=f"{_TITLES[example]}: violations of |e| ≤ 0.15 for t ≥ {TAIL:g} s or |u| ≤ 15 in "
-        f"{own['samples'].iloc[0]} runs (in brackets those that did not reach their end), and "
+        f"{rows['samples'].iloc[0]} runs (in brackets those that did not reach their end), and "
         "medians of the RMS of e, of the largest |u|, and of the energy of u. Less than the "
         "paper: median difference in the RMS of e on the same samples, with its exact interval.",
         columns=(
@@ -97,7 +97,7 @@ def _table(record: pd.DataFrame, example: str) -> Table:
                     "late_rms", "peak_u", "energy", "less", "less_low", "less_high",
                 )),
             )
-            for row in own.to_dict("records")
+            for row in rows.to_dict("records")
         ],
         folded=True,
     )  # fmt: skip

@@ -21,20 +21,20 @@ _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 def sampling_section(record: pd.DataFrame) -> Section:
     """Return the section on sampling time, delay and steps of converters."""
-    found = spec_ends(record)
+    limits = spec_ends(record)
     return Section(
         key="sampling",
         title="On a computer",
         items=[
-            *(Paragraph(text=_sentence(found, example, _ERROR)) for example in _TITLES),
+            *(Paragraph(text=_sentence(limits, example, _ERROR)) for example in _TITLES),
             Figure(
                 key="sampling-errors",
                 caption=f"Largest {_ERROR} for t ≥ {TAIL:g} s against the sampling time, by "
                 "Euler's method; a cross is the last run that ends well, the line what is asked.",
-                description=" ".join(_sentence(found, example, "|y − yd|") for example in _TITLES),
+                description=" ".join(_sentence(limits, example, "|y − yd|") for example in _TITLES),
                 figure=sampling_errors(record, _TITLES, BAND),
             ),
-            _table(found),
+            _table(limits),
             Paragraph(
                 text="These are runs of a kept record, 13 to 21 for each entry of the table; two "
                 "of them are run again for this page and agree to 1e-3. The command that makes all "
@@ -44,12 +44,12 @@ def sampling_section(record: pd.DataFrame) -> Section:
     )
 
 
-def _sentence(found: pd.DataFrame, example: str, error: str) -> str:
+def _sentence(limits: pd.DataFrame, example: str, error: str) -> str:
     """Say how far the paper's controller goes, and its rivals of the figure."""
-    own: Any = found.loc[(example, "paper")]
-    dt_text, delay, measured, given = (_text(own, quantity) for quantity in QUANTITIES)
+    papers: Any = limits.loc[(example, "paper")]
+    dt_text, delay, measured, given = (_text(papers, quantity) for quantity in QUANTITIES)
     rivals = [
-        f"{r} {_text(found.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
+        f"{r} {_text(limits.loc[(example, r)], QUANTITIES[0])}" for r in SAMPLED_CONTROLLERS[1:]
     ]
     return (
         f"{_TITLES[example]} with the paper's controller: {error} ≤ {BAND:g} for t ≥ {TAIL:g} s "
@@ -69,7 +69,7 @@ def _text(row: Any, quantity: Quantity) -> str:
     return f"{quantity.factor * good:.3g}{unit}{more}"
 
 
-def _table(found: pd.DataFrame) -> Table:
+def _table(limits: pd.DataFrame) -> Table:
     return Table(
         caption='Up to where each controller meets what is asked, to 4 to 7 %: "less than" '
         "means that the least value that was tried violates it already, as it may in "
@@ -78,7 +78,7 @@ def _table(found: pd.DataFrame) -> Table:
         columns=("example", "controller", *(q.title for q in QUANTITIES)),
         rows=[
             (_TITLES[example], label, *(_text(row, q) for q in QUANTITIES))
-            for (example, label), row in zip(found.index, found.to_dict("records"), strict=True)
+            for (example, label), row in zip(limits.index, limits.to_dict("records"), strict=True)
         ],
         folded=True,
     )

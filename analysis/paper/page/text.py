@@ -1,4 +1,4 @@
-"""What the paper prints: its equations in LaTeX, and its parameters beside the ones used.
+"""What the paper prints: its equations in LaTeX, and its parameters next to the ones used.
 
 Text only.  The numbers in use are filled in from the blocks themselves.
 """

@@ -35,7 +35,7 @@ from ..file.asked import Asked
 from ..file.field_types import Confidence, Names, Whole
 from ..file.schema import Choices
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..resolve import option
@@ -196,7 +196,7 @@ def _run(asked: Compare, ground: Ground) -> Finding | None:
         return None
     table = done.table.astype({c.name: str for c in space.choices})
     comparison = compare(design, options, table, asked.metrics, confidence=asked.confidence)
-    return made(
+    return finding_of(
         asked,
         _sentence(asked, comparison),
         **_answer(asked, comparison),

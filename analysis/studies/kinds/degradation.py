@@ -17,7 +17,7 @@ from ...robustness.statistics.guarantee import design_assumptions, rounded_down,
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Flag, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import margin_text
 from .context import CLOPPER
@@ -79,7 +79,7 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     assumed = "; ".join(design_assumptions(independent(space, asked.runs, ground.seed)))
     limit = asked.limit
     verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
-    return made(
+    return finding_of(
         asked,
         f"Violations with all deviations scaled: {counts}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "

@@ -20,7 +20,7 @@ from ...robustness.stl.spec import violates
 from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page.tables import known
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _run(asked: Map, ground: Ground) -> Finding:
             f"cells at the boundary have sides {sides}{fine}. Points were chosen near the "
             "boundary, so their share is not a probability."
         )
-    return made(
+    return finding_of(
         asked,
         f"In the plane of {margin_map.x} and {margin_map.y}, the others nominal, {outcome}",
         runs=len(margin_map.table),

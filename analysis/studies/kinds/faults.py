@@ -31,7 +31,7 @@ from ..build import faults_of
 from ..file.asked import Asked
 from ..file.field_types import Flag, Names, Size
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_text
 
@@ -261,7 +261,7 @@ def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
         "pairs_violating": len(bad_pairs),
         "only_together": only,
     }
-    return made(
+    return finding_of(
         asked,
         f"{words} Nominal values, one run each: nothing is said of other onsets or magnitudes.",
         **_answer(asked, bad),

@@ -15,7 +15,7 @@ from ...robustness import Design, Space, elementary_effects, morris
 from ..file.asked import Asked
 from ..file.field_types import Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import response
@@ -60,7 +60,7 @@ def _run(asked: Morris, ground: Ground) -> Finding | None:
     values, failed, numbers = response(asked.of, ground, done)
     table = elementary_effects(design, values)
     order = ", ".join(table.nlargest(3, "mu_star").index)
-    return made(
+    return finding_of(
         asked,
         f"Largest mean effects on '{asked.of}': {order} ({counted(done.done, 'run')} of a Morris "
         f"design, which screens and proves nothing).{failed}",

@@ -14,7 +14,7 @@ from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
 from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
 
@@ -54,7 +54,7 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     violation = violation_probability(design, margins, asked.confidence, asked.side)
     verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
-    return made(
+    return finding_of(
         asked,
         str(violation),
         **verdict,

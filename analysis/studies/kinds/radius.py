@@ -15,7 +15,7 @@ from ...robustness.search.radius import robustness_radius
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text
@@ -66,7 +66,7 @@ def _run(asked: AskedRadius, ground: Ground) -> Finding:
     numbers |= {"largest": radius.largest, "margin": radius.margin, "witness": radius.witness}
     if radius.statement is not None:
         numbers["statement"] = statement_numbers(radius.statement)
-    return made(
+    return finding_of(
         asked,
         str(radius),
         **_no_small_violation(asked.limit, radius.upper, radius.largest),

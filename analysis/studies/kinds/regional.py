@@ -14,7 +14,7 @@ from ...report.document import Figure
 from ...robustness import regional
 from ..file.asked import Asked
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import HOLM
@@ -54,11 +54,11 @@ def _run(asked: Regional, ground: Ground) -> Finding:
         sentence = (
             f"Every one of {counted(margins.size, 'row')} {which}: nothing sets failures apart."
         )
-        return made(asked, sentence, runs=margins.size)
+        return finding_of(asked, sentence, runs=margins.size)
     table = regional(design, margins)
     largest = table.nlargest(3, "statistic")["statistic"].to_dict()
     largest_first = ", ".join(f"{name} ({value:.2g})" for name, value in largest.items())
-    return made(
+    return finding_of(
         asked,
         f"What sets {counted(margins.size - passed, 'failing row')} most apart from "
         f"{counted(passed, 'passing one')} (distance of the two distributions, 0 to 1): "

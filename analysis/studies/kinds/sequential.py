@@ -15,7 +15,7 @@ from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
 from .context import HOWARD, ROBBINS, statement_numbers
 
@@ -42,7 +42,7 @@ class Sequential(Asked):
 def _run(asked: Sequential, ground: Ground) -> Finding:
     design, margins = ground.main
     test = decide(design, margins, asked.limit, asked.confidence)
-    return made(
+    return finding_of(
         asked,
         str(test),
         **vars(test_verdict(test)),

@@ -15,7 +15,7 @@ from ...robustness import Design, Space, saltelli, sobol_indices
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from .context import response
@@ -66,7 +66,7 @@ def _run(asked: Sobol, ground: Ground) -> Finding | None:
     table = sobol_indices(design, values, asked.confidence)
     largest = table.nlargest(3, "ST")["ST"].to_dict()
     shares = ", ".join(f"{name} ({share:.0%})" for name, share in largest.items())
-    return made(
+    return finding_of(
         asked,
         f"Largest shares of the variance of '{asked.of}', interactions included: {shares} "
         f"({counted(done.done, 'run')}; intervals by bootstrap with confidence "

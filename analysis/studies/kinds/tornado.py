@@ -20,7 +20,7 @@ from ...report.document import Figure
 from ...robustness import Experiment, Space, Uncertain, arguments, from_table, nominal
 from ..file.asked import Asked
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, column, made
+from ..kind import Ground, Kind, Setup, column, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 
@@ -86,7 +86,7 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
         + f"; what changes it most within its box, by its derivative: {largest} (one run with "
         f"{counted(len(varied), 'derivative')}, {counted(len(rows), 'run')} without).{without}"
     )
-    return made(
+    return finding_of(
         asked,
         sentence,
         runs=1 + len(rows),

@@ -37,7 +37,7 @@ from ...robustness.statistics.guarantee import rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Pair, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..page.text import margin_text
@@ -150,7 +150,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
         violation_probability(design, part, asked.confidence) for part in np.split(margins, 2)
     )
     verdict = {} if asked.limit is None else vars(bound_verdict(after, asked.limit))
-    return made(
+    return finding_of(
         asked,
         _sentence(asked, tuned, before, after),
         **verdict,

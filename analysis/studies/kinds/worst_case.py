@@ -22,7 +22,7 @@ from ...robustness.search.worst_case import worst_case
 from ..file.asked import Varied
 from ..file.field_types import Flag, Number, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_text, status_text
@@ -77,7 +77,7 @@ def _run(asked: AskedWorstCase, ground: Ground) -> Finding:
             sentences.append(str(small))
             numbers["shrunk"] = vars(small)
             count += small.runs
-    return made(
+    return finding_of(
         asked,
         " ".join(sentences),
         **_no_low_margin(asked.limit, worst.margin, bool(numbers.get("is_confirmed", True))),

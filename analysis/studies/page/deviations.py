@@ -1,4 +1,4 @@
-"""Rows that a search found, beside the nominal one."""
+"""Rows that a search found, next to the nominal one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Row = Mapping[str, Any]
 
 
 def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> Iterator[Item]:
-    """Yield some rows beside the nominal one, and how far their numbers deviate.
+    """Yield some rows next to the nominal one, and how far their numbers deviate.
 
     What a row leaves out is nominal.
     """
@@ -27,7 +27,7 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
     rows = {label: middle | dict(row) for label, row in rows.items()}
     table = deviations_table(rows, quantities)
     yield Table(
-        caption="Its values beside the nominal ones; * deviates from nominal.",
+        caption="Its values next to the nominal ones; * deviates from nominal.",
         columns=("quantity", "unit", "nominal", *rows),
         rows=[
             (name, unit, middle, *(_marked(row[name], middle) for row in rows.values()))
@@ -35,14 +35,14 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
         ],
     )
     if np.any(table.to_numpy() != 0):
-        told = "; ".join(
+        values = "; ".join(
             f"{name}: " + ", ".join(f"{row} {value:.3g}" for row, value in line.items())
             for name, line in table.iterrows()
         )
         yield Figure(
             key=f"{key}-deviations",
             caption=DEVIATIONS,
-            description=f"{DEVIATIONS} {told}.",
+            description=f"{DEVIATIONS} {values}.",
             figure=figures.deviations(table),
         )
 

@@ -37,7 +37,7 @@ def without_assumptions(sentence: str) -> str:
 def assumptions_in(sentences: Iterable[str]) -> list[str]:
     """Return what statements assume, each assumption once."""
     clauses = (clause for words in sentences for clause in _ASSUMED.findall(words))
-    return list(dict.fromkeys(part for told in clauses for part in told.split("; ")))
+    return list(dict.fromkeys(part for assumption in clauses for part in assumption.split("; ")))
 
 
 def violate(count: int, total: int) -> str:
