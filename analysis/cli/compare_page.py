@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from ..pages.compared import Compared
     from ..report.document import Report
 
-__all__ = ["compose_comparison"]
-
 
 def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
     """Compose the page of two reports or runs, which have been checked."""

@@ -23,8 +23,6 @@ from ..catalogue import (
 if TYPE_CHECKING:
     from ..studies.kind import Kind
 
-__all__ = ["show", "show_all"]
-
 _KINDS, _CONTROLLERS = "kinds", "controllers"
 _WIDEST = 120  # characters of a table that no terminal shows
 HELP = """

@@ -6,8 +6,6 @@ import errno
 import mmap
 import os
 
-__all__ = ["TOO_LITTLE", "TO_BEGIN", "check_memory", "is_short_of_memory"]
-
 TOO_LITTLE = "this needs more memory than there is"
 TO_BEGIN = 1300 * 10**6
 """Bytes of address space that libraries, compiling and running take on two cores.

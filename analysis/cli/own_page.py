@@ -13,8 +13,6 @@ from .simulation import simulated
 if TYPE_CHECKING:
     from ..report.document import Report
 
-__all__ = ["compose_page", "is_loop_name", "is_paper_name", "page_folder"]
-
 HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
 

@@ -7,9 +7,6 @@ import re
 import sys
 from typing import Any
 
-__all__ = ["error_line", "in_json", "printable", "say"]
-
-
 _ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 
 from .printing import error_line
 
-__all__ = ["progress_lines"]
-
 FIRST_LINE, NEXT_LINE = 2.0, 10.0  # s: what is done sooner needs no line
 
 

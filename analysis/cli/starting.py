@@ -9,8 +9,6 @@ from string import Template
 from nlctl.errors import ParameterError
 from nlctl.host.files import replace_file
 
-__all__ = ["start_project"]
-
 _FILES = {"loop.py": "loop.py", "study.toml": "{name}.toml", "test_loop.py": "test_loop.py"}
 
 

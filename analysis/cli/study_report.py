@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from ..studies.result import Result
     from ..studies.run import Watch
 
-__all__ = ["NO_STAMP", "Stamp", "notify", "report_study", "stamped"]
-
-
 Stamp = Mapping[str, str]  # revision and date, as far as they are given
 NO_STAMP: Stamp = MappingProxyType({})
 

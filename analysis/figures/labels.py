@@ -12,8 +12,6 @@ from matplotlib.figure import Figure
 from nlctl.plotting.axes import WIDTH, set_style
 from nlctl.plotting.labels import plain
 
-__all__ = ["arms", "drawable", "number_axes", "plain", "within_reach"]
-
 _LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
 
 

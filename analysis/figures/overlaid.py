@@ -11,8 +11,6 @@ from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, TIME, legend_above, stacked_axes
 from nlctl.plotting.labels import plain
 
-__all__ = ["overlaid"]
-
 
 @as_annotated
 def overlaid(

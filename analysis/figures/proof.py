@@ -27,17 +27,6 @@ from nlctl.plotting.axes import (
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.long_run import LongRun
 
-__all__ = [
-    "bounds",
-    "burst",
-    "equality_residuals",
-    "inequality_margins",
-    "long_zeta",
-    "lyapunov_bound",
-    "story",
-    "windowed_maximum",
-]
-
 
 @as_annotated
 def burst(run: LongRun) -> Figure:

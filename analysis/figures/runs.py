@@ -26,22 +26,10 @@ from nlctl.plotting.axes import (
     set_style,
     stacked_axes,
 )
-from nlctl.plotting.bands import LIMIT, Limit, bands, most_frequent, quantile
+from nlctl.plotting.bands import Limit, bands
 
 from ..robustness.stl.spec import violates
 from .labels import arms, within_reach
-
-__all__ = [
-    "CLIP",
-    "LIMIT",
-    "Limit",
-    "clipped_margins",
-    "fans",
-    "margins_figure",
-    "most_frequent",
-    "quantile",
-    "running_estimate",
-]
 
 CLIP = 2.0
 """Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""

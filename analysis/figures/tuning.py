@@ -24,8 +24,6 @@ from nlctl.plotting.axes import (
 from .labels import number_axes, plain, within_reach
 from .runs import clipped_margins
 
-__all__ = ["before_and_after", "bought", "margins_of_both", "tried"]
-
 _CHOSEN = {
     "search": (BLUE, "o", "search"),
     "Sobol'": (GREY, "x", "points of Sobol'"),

@@ -28,8 +28,6 @@ from ..report.document import (
 )
 from ..report.outline import sort_key, summary
 
-__all__ = ["Compared", "comparison_page"]
-
 _LISTED = 100  # numbers of a table
 _DRAWN = 4  # signals of a figure
 _CLAIM_COLUMNS = (

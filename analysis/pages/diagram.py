@@ -17,8 +17,6 @@ from ..report.document import Figure, Item, Paragraph, Section, Table
 from ..report.equations import block_items
 from ..studies.page.text import unit_text
 
-__all__ = ["diagram_figure", "diagram_sections"]
-
 _LONGEST = 60  # characters of a value
 _DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
 _ALL_PARAMETERS = "All parameters of the loop, with their values."

@@ -11,8 +11,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-__all__ = ["formulas"]
-
 _GREEK = {
     "eps": r"\varepsilon", "delta": r"\delta", "alpha": r"\alpha", "sigma": r"\sigma",
     "Gamma": r"\Gamma", "gamma": r"\gamma", "beta": r"\beta", "tau": r"\tau", "zeta": r"\zeta",

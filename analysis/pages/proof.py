@@ -13,8 +13,6 @@ from ..report.document import Item, Paragraph, Section, Table
 from .notation import formulas
 from .run import own_values
 
-__all__ = ["certificate_section", "ledger_section", "ledger_text"]
-
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
     "in closed form."

@@ -15,8 +15,6 @@ from nlctl.responses.time_response import as_response
 
 from ..report.document import Figure, History, Item, Paragraph, Section, Table
 
-__all__ = ["outputs_of_run", "own_values", "run_section"]
-
 _SHOWN = 6  # signals of a chart at first
 
 

@@ -36,8 +36,6 @@ from ..lyapunov.loop.roles import Parts, read_parts
 from ..lyapunov.nussbaum.aftermath import Aftermath, aftermath
 from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LongRun
 
-__all__ = ["HELD_GAINS", "Burst", "averaged", "through_the_burst"]
-
 HELD_GAINS = (1e3, 3e3)  # K of N = -K: what both agree in is that of -3e10
 _BEAT = 20 * np.pi  # s; common period of the reference and of the disturbance
 _LENGTH = 1e-3  # s; the burst lasts a tenth of it

@@ -34,17 +34,6 @@ from .burst import Burst, through_the_burst
 from .controllers import compared_controllers
 from .reference_run import continued, read_record
 
-__all__ = [
-    "FAR_HORIZONS",
-    "LOOK",
-    "Evidence",
-    "FarRuns",
-    "compile_evidence_ahead",
-    "evidence",
-    "far_runs_in_background",
-    "known_sign",
-]
-
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
 LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is predicted
 FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s)

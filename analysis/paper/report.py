@@ -37,17 +37,6 @@ from .reproduction import compile_cases_ahead as compile_cases
 from .rival_record import checked_rivals
 from .sampling_limits import checked_record
 
-__all__ = [
-    "QUICK",
-    "Composed",
-    "ProgressWatch",
-    "clear",
-    "compose",
-    "proof",
-    "reproduction",
-    "robustness",
-]
-
 QUICK = ("example-1-quick", "example-2-quick")
 """The studies of the report, of those that come with nlctl."""
 

@@ -20,18 +20,6 @@ from ..loop_record import loop_facts, loop_values
 from ..studies import shipped
 from .rivals import rival_loop
 
-__all__ = [
-    "KEY",
-    "RIVALS_RECORD",
-    "RIVAL_ACTUATORS",
-    "beaten_by",
-    "checked_rivals",
-    "failed_text",
-    "loop_key",
-    "rivals_study",
-    "study_key",
-]
-
 RIVALS_RECORD = Path(__file__).with_name("rivals.csv")
 KEY = ["parameters", "rates"]
 RIVAL_ACTUATORS = {"ideal": "no nonlinearity"} | {

@@ -34,18 +34,6 @@ from nlctl.names import unknown
 from . import loops
 from .controllers import part_of, published_controller
 
-__all__ = [
-    "KNOWLEDGE",
-    "RIVAL_GAINS",
-    "behind",
-    "example_with",
-    "made_with",
-    "rival_actuators",
-    "rival_controller",
-    "rival_controllers",
-    "rival_loop",
-]
-
 KNOWLEDGE = {
     "paper": "states, n derivatives of the reference",
     "paper, tuned": "states, n derivatives of the reference; gains for this plant",

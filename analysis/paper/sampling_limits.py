@@ -23,19 +23,6 @@ from nlctl.sampling import sampled
 from .cases import HORIZON, TAIL
 from .controllers import compared_controllers
 
-__all__ = [
-    "BAND",
-    "PEAK",
-    "QUANTITIES",
-    "SAMPLING_RECORD",
-    "Quantity",
-    "checked_record",
-    "controller_program",
-    "sampling_runs",
-    "spec_ends",
-    "where_it_ends",
-]
-
 SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
 BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|
 _STEP = 0.002  # s: sampling time where something else is varied

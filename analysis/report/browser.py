@@ -15,8 +15,6 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
-__all__ = ["find_browser", "open_page", "write_pdf"]
-
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 BROWSER_TIMEOUT = 300  # s after which the browser is checked for activity
 BUSY = 1.0  # s of CPU time in that time are a sign of life, also on a machine with other work

@@ -16,8 +16,6 @@ from .drawings import drawings
 from .history import SIGNALS_FILE
 from .outline import claim_status
 
-__all__ = ["STATUS_RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
-
 STATUS_RANK = {
     "pass": 0,
     "proved": 0,

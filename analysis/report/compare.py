@@ -18,8 +18,6 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["ABSENT", "Difference", "compare_contents", "differing_numbers", "read_report"]
-
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
 

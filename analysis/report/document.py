@@ -22,20 +22,6 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import checked_times
 
-__all__ = [
-    "Claim",
-    "Equation",
-    "Figure",
-    "Headline",
-    "History",
-    "Item",
-    "Paragraph",
-    "Report",
-    "Section",
-    "Table",
-    "versions",
-]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,6 @@ import hashlib
 import re
 from pathlib import Path
 
-__all__ = ["drawings"]
-
 _SHAPE = re.compile(
     r'<(?:path|g) id="(g:\d+)"(.*?)(?=<(?:path|g) id="g:|</defs>)', re.DOTALL
 )  # letters, words and marks that all figures of a page share, numbered as they came

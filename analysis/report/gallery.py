@@ -20,8 +20,6 @@ from .page import check_gallery_folder, fill, write_files
 from .svg import shapes_svg, svg, svg_files
 from .trends import Revision, Trend, trends
 
-__all__ = ["Entry", "entries", "write_gallery"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:

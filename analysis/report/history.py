@@ -11,8 +11,6 @@ from ..json_values import as_json
 from .document import History, Report
 from .outline import place_anchors
 
-__all__ = ["SIGNALS_FILE", "chart", "signals_json", "thinned"]
-
 SIGNALS_FILE = "signals.json"
 """File next to a page with the time histories of the page, for comparisons."""
 

@@ -11,8 +11,6 @@ from nlctl.annotations import as_annotated
 from .document import Claim
 from .outline import claim_status
 
-__all__ = ["junit"]
-
 _NO_XML = re.compile("[^\\t\\n\\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 

@@ -18,19 +18,6 @@ from markupsafe import Markup
 
 from .document import Equation
 
-__all__ = [
-    "ATTRIBUTES",
-    "CHARACTERS",
-    "ELEMENTS",
-    "FAMILY",
-    "font_face",
-    "inline",
-    "italic",
-    "mathml",
-    "spoken",
-    "subset",
-]
-
 ELEMENTS = frozenset(
     (
         *("math", "mfrac", "mi", "mn", "mo", "mover", "mpadded", "mphantom", "mroot", "mrow"),

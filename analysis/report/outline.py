@@ -16,24 +16,6 @@ from nlctl.wording import counted, some_of
 
 from .document import Claim, Figure, Headline, History, Item, Report, Section, Table
 
-__all__ = [
-    "Placed",
-    "TableCell",
-    "_shown",
-    "cells",
-    "claim_status",
-    "evidence_anchors",
-    "is_long",
-    "is_short",
-    "kind",
-    "light",
-    "meanings",
-    "numeric",
-    "place_anchors",
-    "sort_key",
-    "summary",
-]
-
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself

@@ -22,16 +22,6 @@ from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric
 from .typography import pieces, plain_text
 
-__all__ = [
-    "PARTS",
-    "check_gallery_folder",
-    "check_report_folder",
-    "fill",
-    "generator",
-    "to_bytes",
-    "write_files",
-]
-
 UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 

@@ -29,8 +29,6 @@ from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 from .typography import plain_text
 
-__all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
-
 RARE = ("ids", "links")
 DRAWN = ("figure", "time", "signals")  # curves are on the page only
 _TITLES = {

@@ -22,8 +22,6 @@ from nlctl.plotting import axes
 from .document import Figure, Section
 from .typography import plain_text
 
-__all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", "svg", "svg_files"]
-
 # Colours of the figures that follow the page's theme, by the page's own names for them.
 THEME = {
     "#000000": "currentColor",

@@ -13,8 +13,6 @@ from .changes import claim_changes
 from .document import Claim, Table
 from .outline import claim_status, sort_key
 
-__all__ = ["Revision", "Trend", "trends"]
-
 NUMBERS = 8  # that are followed
 _PARTS = re.compile(
     r"\b(tables|running estimate|quantities|requirements|metrics|seed|rows|witness)\b"

@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 
 from .mathml import spoken
 
-__all__ = ["Piece", "in_print", "pieces", "plain_text"]
-
 NO_BREAK = "\u00a0"
 UNITS = (
     "%|‰|°C|°|s|ms|µs|min|h|m|mm|cm|µm|km|g|kg|N|kN|Nm|rad|mrad|deg|Hz|kHz|V|mV|A|mA|W|kW|K|Pa|kPa"

@@ -12,8 +12,6 @@ import pandas as pd
 from nlctl.diagrams import state_names
 from nlctl.response import input_output_response
 
-__all__ = ["PaperCase", "PaperRun", "simulate_case", "simulate_cases"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PaperCase:

@@ -23,17 +23,6 @@ from .sections import (
     source_section,
 )
 
-__all__ = [
-    "Composed",
-    "ProgressWatch",
-    "Reproduction",
-    "claims_of",
-    "compose_paper",
-    "paper_page",
-    "report_of",
-    "verdict_of",
-]
-
 ProgressWatch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
 """``watch(what, total)`` is entered around a part of the work; what it gives is called with how
 much more of `total` is done."""

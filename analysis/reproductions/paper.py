@@ -11,8 +11,6 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from ..report.document import Item
 
-__all__ = ["FoundNumber", "Paper", "PaperFigure", "PaperSource", "Part", "Statement"]
-
 PaperRuns = Mapping[str, Any]
 """Simulated cases of a paper by key."""
 

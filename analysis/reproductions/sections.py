@@ -13,15 +13,6 @@ from ..report.document import Figure, Item, Paragraph, Section, Table
 from ..report.equations import equations_of
 from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part
 
-__all__ = [
-    "drawn_figure",
-    "found_numbers",
-    "model_section",
-    "open_section",
-    "part_sections",
-    "source_section",
-]
-
 
 def found_numbers(paper: Paper, runs: PaperRuns) -> list[FoundNumber]:
     """Return every statement of a paper with the value that the runs give it."""

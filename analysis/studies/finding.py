@@ -10,8 +10,6 @@ import pandas as pd
 
 from .sealed import as_json
 
-__all__ = ["Finding"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:

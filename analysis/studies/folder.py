@@ -57,19 +57,6 @@ from .sealed import (
 from .whole.contents import CONTENTS, check_whole
 from .whole.shapes import FindingFile, ResultsFile, RunFile, shaped
 
-__all__ = [
-    "METRIC_COLUMNS",
-    "checked",
-    "load_finding",
-    "load_result",
-    "load_rows",
-    "load_run",
-    "load_study",
-    "received",
-    "remove_run",
-    "save_finding",
-]
-
 _OWN = ("study.toml", "run.json", "results.json", CONTENTS, "rows", ".lock", ".owner")
 _OWN += ("index.html", "report.json", "signals.json", "report.pdf")
 METRIC_COLUMNS = ("key", "signal", "unit", "meaning")

@@ -39,18 +39,6 @@ from .result import Result
 if TYPE_CHECKING:
     from ..report.document import Item
 
-__all__ = [
-    "Ground",
-    "Kind",
-    "RunDesign",
-    "Setup",
-    "answer",
-    "column",
-    "finding_of",
-    "tagged",
-    "unanswered",
-]
-
 _NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
 
 

@@ -25,16 +25,6 @@ from ..robustness.runs.identity import differences_of, experiment_facts, labels_
 from .file.schema import Study, keyed
 from .kind import Setup
 
-__all__ = [
-    "compared_differences",
-    "diagram_differences",
-    "loop_differences",
-    "origin_of",
-    "plain_study",
-    "unseen_notes",
-    "version_differences",
-]
-
 
 def origin_of(setup: Setup, prepared: Prepared) -> dict[str, Any]:
     """Return what the results of a study follow from, as data for a JSON file."""

@@ -25,8 +25,6 @@ from .reading.parse import StudyFile
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
-__all__ = ["Replay", "replay", "replay_figure"]
-
 _MOST = 8  # panels of a figure
 
 

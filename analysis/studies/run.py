@@ -39,8 +39,6 @@ from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
 from .whole.contents import seal, unseal
 
-__all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
-
 _OWN = (
     ".lock",
     ".owner",

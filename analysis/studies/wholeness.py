@@ -14,8 +14,6 @@ from .folder import read_through
 from .whole.contents import CONTENTS, is_part, problems_in, sealed_record
 from .whole.page import PAGE_FILES, page_problems
 
-__all__ = ["Wholeness", "verify"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Wholeness:

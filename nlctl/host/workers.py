@@ -8,8 +8,6 @@ import threading
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import wait
 
-__all__ = ["end_with_parent", "process_pool"]
-
 ORPHANED = 1  # exit code that nobody reads
 _WATCHED = threading.Event()
 

@@ -16,8 +16,6 @@ from ..expressions.jacobian_source import jacobian_function
 from ..params import as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
-__all__ = ["ExtendedKalmanFilter"]
-
 _MOST = 8  # states
 
 

@@ -14,8 +14,6 @@ from ..params import param, record
 from ..wording import counted
 from .signals import estimate_names, set_names
 
-__all__ = ["LuenbergerObserver", "luenberger"]
-
 _NEAR = 1e-6  # of the largest pole: how far those that were placed may lie from those wanted
 
 

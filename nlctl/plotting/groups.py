@@ -16,8 +16,6 @@ import numpy as np
 
 from ..blocks import Block, memory_states, within
 
-__all__ = ["Wires", "groups_of", "wires_of"]
-
 _MOST = 4  # signals in one row: as many as there are line styles
 _COMPARED = 40  # signals of which sums are looked for: their pairs are
 _SAMPLES = 64

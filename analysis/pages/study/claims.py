@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from ...studies.finding import Finding
     from ...studies.result import Result
 
-__all__ = ["claims", "refusal", "verdict"]
-
 AT_ONCE = 2
 """So many findings are in the verdict where nothing is claimed."""
 

@@ -17,8 +17,6 @@ from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
 from ...robustness.search.evaluation import as_table, margins_of
 from ...robustness.uncertainty.space import nominal
 
-__all__ = ["Histories", "histories"]
-
 _MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
     *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),

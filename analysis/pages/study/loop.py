@@ -18,8 +18,6 @@ from ...studies.result import Result
 from ..diagram import diagram_sections
 from . import text as text
 
-__all__ = ["Published", "StudyLoop", "loop_of", "loop_sections"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyLoop:

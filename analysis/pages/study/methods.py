@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from ...studies.result import Result
     from .loop import Published
 
-__all__ = ["limits", "methods"]
-
 DONZE = (
     "A. Donzé, O. Maler: Robust satisfaction of temporal logic over real-valued signals. FORMATS "
     "2010, LNCS 6246, 92–106. doi 10.1007/978-3-642-15297-9_9."

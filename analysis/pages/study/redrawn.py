@@ -12,8 +12,6 @@ from ...studies.run import reopened
 from ...studies.sealed import RunFolderError, as_written
 from .histories import Histories, histories
 
-__all__ = ["loop_again", "rows_again"]
-
 
 def loop_again(
     result: Result, *, trust: bool = False, notify: Callable[[str], object]

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from ...studies.finding import Finding
     from ...studies.result import Result
 
-__all__ = ["study_part", "study_report", "study_sections"]
-
 OUTCOMES = {  # by the light
     "pass": "shown",
     "caution": "not shown yet",

@@ -26,13 +26,6 @@ if TYPE_CHECKING:
     from ...studies.result import Result
     from .loop import Published
 
-__all__ = [
-    "fan_items",
-    "margin_items",
-    "row_items",
-    "setup_items",
-]
-
 WORST = 10  # rows that are listed
 _PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
 

@@ -11,8 +11,6 @@ from ...studies.file.schema import keyed
 if TYPE_CHECKING:
     from ...studies.result import Result
 
-__all__ = ["has_ids", "traceability"]
-
 CAPTION = (
     "From requirement to evidence. No claim: no analysis answers the requirement; without an id: "
     "the claim names no requirement."

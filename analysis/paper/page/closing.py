@@ -10,8 +10,6 @@ import pandas as pd
 from ...report.document import Paragraph, Section, Table
 from .. import HORIZON, METRICS, TAIL, CaseRun
 
-__all__ = ["closing_sections", "metric_table"]
-
 _Runs = Mapping[str, CaseRun]
 
 

@@ -12,12 +12,9 @@ from ...pages.notation import formulas
 from ...pages.proof import ledger_section
 from ...report.document import Figure, Item, Paragraph, Section, Table
 from ..burst import Burst
-from ..evidence import FAR_HORIZONS, LOOK, Evidence, evidence
+from ..evidence import FAR_HORIZONS, LOOK, Evidence
 from ..figures import after_burst
 from . import proof_text as text
-from .proof_text import LONG_RUN
-
-__all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
 
 def lyapunov_sections(

@@ -13,8 +13,6 @@ from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expec
 from .. import figures as histories
 from . import text as text
 
-__all__ = ["LV_2017", "found_of"]
-
 _CASES = {case.key: case for case in CASES}
 _METRICS = {metric.key: metric for metric in METRICS}
 

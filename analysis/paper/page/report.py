@@ -23,8 +23,6 @@ from .record import LV_2017, found_of
 from .rivals import rivals_section
 from .sampling import sampling_section
 
-__all__ = ["paper_report", "paper_sections"]
-
 _Runs = Mapping[str, CaseRun]
 
 

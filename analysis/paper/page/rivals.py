@@ -11,8 +11,6 @@ from .. import TAIL
 from ..rival_record import RIVAL_ACTUATORS, beaten_by, failed_text
 from ..rivals import KNOWLEDGE
 
-__all__ = ["rivals_section"]
-
 _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 

@@ -12,8 +12,6 @@ from .. import TAIL
 from ..figures import SAMPLED_CONTROLLERS, sampling_errors
 from ..sampling_limits import BAND, PEAK, QUANTITIES, Quantity, spec_ends
 
-__all__ = ["sampling_section"]
-
 # of the plant: e₁ is what the controller sees, in steps of the measurement
 _ERROR = r"\(|y - y_d|\)"
 _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}

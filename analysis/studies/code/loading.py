@@ -21,8 +21,6 @@ import cloudpickle
 from nlctl.errors import ParameterError
 from nlctl.host.former_name import FORMER, is_former
 
-__all__ = ["Admits", "load_file", "loaded_with"]
-
 Admits = Callable[[Path], str]
 """Returns why a file may not be run; nothing if it may."""
 

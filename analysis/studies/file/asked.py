@@ -8,8 +8,6 @@ from pydantic import BeforeValidator, Field
 
 from .field_types import Id, Names, Strict
 
-__all__ = ["Asked", "Varied"]
-
 
 def _listed(value: object) -> Any:
     return (value,) if isinstance(value, str) else value

@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["COMPARE"]
-
 MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first option are shown
 RANKING = (
     "Options on the same samples, best first: by violations, then by the mean rank in the first "

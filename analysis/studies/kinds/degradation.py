@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["DEGRADATION"]
-
 _CAPTION = (
     "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
     "confidence {confidence:g} %, {together}."

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["FAILURE_MAP"]
-
 _CAPTION = (
     "Margin over the plane, the other quantities nominal; between the points that were run, the "
     "dots, it is interpolated."

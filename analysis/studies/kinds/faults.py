@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["FAULTS"]
-
 TOGETHER = 256  # unfinished runs that are simulated again in batches
 _MOST = 40  # rows of the table of pairs
 _MARGINS = (

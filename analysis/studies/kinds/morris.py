@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["MORRIS"]
-
 MORRIS_CAPTION = (
     "Elementary effects on '{of}': μ* is the mean magnitude, with its bootstrap interval; a σ far "
     "from 0 shows that a quantity does not act linearly, or not on its own."

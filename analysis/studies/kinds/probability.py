@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["PROBABILITY"]
-
 DECIDES_FIXED = (
     " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
     "was fixed in advance. The band shows how the estimate settled; it is wider because it allows "

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["RADIUS"]
-
 SIZES = 12  # that the search tries, roughly
 _CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
 _SMALLEST = " Dashed: the smallest size with a violation."

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["REGIONAL"]
-
 _CAPTION = (
     "Distance between the distributions in failing and in passing runs; for choices Cramér's V. 0: "
     "alike, 1: apart. p: of the test that they are alike; Holm: adjusted for the number of lines."

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["SEQUENTIAL"]
-
 DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 
 

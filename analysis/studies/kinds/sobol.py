@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["SOBOL"]
-
 SOBOL_CAPTION = (
     "Shares of the variance of '{of}' with bootstrap intervals, confidence {confidence:g} % each. "
     "S₁: a quantity by itself; S_T: with all its interactions."

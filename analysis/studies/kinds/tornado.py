@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["TORNADO"]
-
 _CAPTION = (
     "'{of}' is {value:.4g} at the nominal values. Bars: its derivative by each quantity times the "
     "distance to either end of the box; marks: a run with that quantity at that end, all others "

@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["GAIN_TUNING"]
-
 _BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
 _TRIED = "What every choice of gains was worth on the samples that gains were found on."
 _BOUGHT = (

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from ...report.document import Item
     from ..result import Result
 
-__all__ = ["WORST_CASE"]
-
 SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
 ZELLER = (
     "A. Zeller, R. Hildebrandt: Simplifying and isolating failure-inducing input. IEEE Trans. "

@@ -12,8 +12,6 @@ from ... import figures as figures
 from ...report.document import Figure, Item, Table
 from .tables import known
 
-__all__ = ["deviations_table", "found_rows"]
-
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
 _Row = Mapping[str, Any]
 

@@ -18,8 +18,6 @@ from ...robustness.stl.spec import violates
 from ..finding import Finding
 from ..result import Result
 
-__all__ = ["running", "running_items"]
-
 _POINTS = 150  # of the estimate
 _RUNNING = (
     "Line: share of violations after n runs, in their order. Band: bounds that hold at all n at "

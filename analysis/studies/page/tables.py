@@ -10,8 +10,6 @@ import pandas as pd
 from ...report.document import Table
 from . import text as text
 
-__all__ = ["column_in_words", "known", "result_table"]
-
 
 def column_in_words(column: Any) -> str:
     """Return a column of numbers in words, for the description of a figure."""

@@ -17,8 +17,6 @@ from ..file.toml import read_toml
 from ..kind import Kind
 from .own_kinds import model_of
 
-__all__ = ["from_toml", "remember_run", "to_toml"]
-
 
 @as_annotated
 def to_toml(study: Study) -> str:

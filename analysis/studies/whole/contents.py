@@ -20,8 +20,6 @@ from ..result import Result
 from ..sealed import RunFolderError, file_digest, write_json
 from .shapes import ContentsFile, shaped
 
-__all__ = ["CONTENTS", "check_whole", "is_part", "problems_in", "seal", "sealed_record", "unseal"]
-
 CONTENTS = "contents.json"
 _LONGEST = 200  # characters of names in a message
 _AT_TOP = ("study.toml", "run.json", "results.json")

@@ -12,8 +12,6 @@ from ...robustness.runs.store import locked
 from ..sealed import RunFolderError, file_digest, write_json
 from .contents import CONTENTS, check_whole, sealed_record
 
-__all__ = ["PAGE_FILES", "check_page", "is_run", "page_problems", "recorded_page", "recorded_print"]
-
 _PAGE, _SIGNALS, _PRINT = ("index.html", "report.json"), "signals.json", "report.pdf"
 PAGE_FILES = (*_PAGE, _SIGNALS, _PRINT)
 _PARTS = ("study.toml", "run.json", "results.json", CONTENTS)

@@ -19,8 +19,6 @@ from pydantic import (
 
 from ..sealed import ANEW, RunFolderError, read_json
 
-__all__ = ["ContentsFile", "FindingFile", "ResultsFile", "RunFile", "shaped"]
-
 _Shape = TypeVar("_Shape", bound=BaseModel)
 
 
