@@ -88,9 +88,7 @@ def margins_figure(values: np.ndarray) -> Figure:
 
 @as_annotated
 def running_estimate(
-    curve: pd.DataFrame,
-    limit: float | None = None,
-    fixed: tuple[float, float] | None = None,
+    curve: pd.DataFrame, limit: float | None = None, fixed: tuple[float, float] | None = None
 ) -> Figure:
     """Share of violations after n runs, and bounds that hold at all n together.
 

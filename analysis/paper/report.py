@@ -62,9 +62,7 @@ def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
 
 
 def proof(
-    horizon: float = HORIZON,
-    far: proofs.FarRuns | None = None,
-    watch: ProgressWatch = unwatched,
+    horizon: float = HORIZON, far: proofs.FarRuns | None = None, watch: ProgressWatch = unwatched
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part."""
     far = far or proofs.FarRuns()

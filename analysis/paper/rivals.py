@@ -62,9 +62,7 @@ def _paper(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
     return replaced(
         published,
         weights=AdaptiveWeights(
-            nodes=old["weights"].nodes,
-            sigma_1=old["weights"].sigma_1,
-            Gamma=gains["weights.Gamma"],
+            nodes=old["weights"].nodes, sigma_1=old["weights"].sigma_1, Gamma=gains["weights.Gamma"]
         ),
         robust=RobustTerm(
             gamma=gains["robust.gamma"], sigma_2=old["robust"].sigma_2, tau=old["robust"].tau

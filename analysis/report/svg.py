@@ -51,9 +51,7 @@ NONE_DRAWN: Drawn = MappingProxyType({})
 
 
 def svg_files(
-    figures: Sequence[MatplotlibFigure],
-    pool: Executor | None = None,
-    drawn: Drawn = NONE_DRAWN,
+    figures: Sequence[MatplotlibFigure], pool: Executor | None = None, drawn: Drawn = NONE_DRAWN
 ) -> list[bytes]:
     """Return figures as SVG files; this process and those of a pool share the work.
 

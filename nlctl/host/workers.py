@@ -19,9 +19,7 @@ def process_pool(jobs: int) -> ProcessPoolExecutor:
     work would otherwise wait for ever, since it holds both ends of the queue that it waits at.
     """
     return ProcessPoolExecutor(
-        jobs,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=end_with_parent,
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=end_with_parent
     )
 
 

@@ -138,10 +138,7 @@ def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
     )
     values = worst[names].itertuples(name=None)
     yield Table(
-        caption="The values of these rows.",
-        columns=("row", *names),
-        rows=list(values),
-        folded=True,
+        caption="The values of these rows.", columns=("row", *names), rows=list(values), folded=True
     )
 
 

@@ -18,11 +18,7 @@ _METRICS = {metric.key: metric for metric in METRICS}
 
 _PLOTS = (
     ("tracking", histories.tracking, r"Output \(y\) and reference \(y_d\)."),
-    (
-        "input",
-        histories.control_input,
-        r"Control input \(u\), and output \(v\) of the actuator.",
-    ),
+    ("input", histories.control_input, r"Control input \(u\), and output \(v\) of the actuator."),
     (
         "error",
         histories.tracking_error,

@@ -342,12 +342,7 @@ COMPARE = Kind(
         "(Efron 1987), which is approximate and marked where it is not to be trusted; p-values are "
         "adjusted for the number of pairs (Holm 1979)."
     ),
-    sources=(
-        MCNEMAR_1947,
-        EFRON,
-        HOLM,
-        CLOPPER,
-    ),
+    sources=(MCNEMAR_1947, EFRON, HOLM, CLOPPER),
     keywords=("keyword",),
     check=_check,
     runs=_runs,

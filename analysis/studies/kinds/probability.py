@@ -53,11 +53,7 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     violation = violation_probability(design, margins, asked.confidence, asked.side)
     verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
     return finding_of(
-        asked,
-        str(violation),
-        **verdict,
-        runs=violation.runs,
-        numbers=statement_numbers(violation),
+        asked, str(violation), **verdict, runs=violation.runs, numbers=statement_numbers(violation)
     )
 
 
@@ -95,11 +91,7 @@ PROBABILITY = Kind(
         "Pearson 1934). The running estimate is drawn with a confidence sequence, valid at every "
         "number of runs (Robbins 1970; Howard et al. 2021)."
     ),
-    sources=(
-        CLOPPER,
-        ROBBINS,
-        HOWARD,
-    ),
+    sources=(CLOPPER, ROBBINS, HOWARD),
     needs_rows=True,
     is_statement=True,
     measured=_measured,

@@ -140,11 +140,7 @@ RADIUS = Kind(
         f"At each size of the radius the box was searched by {SEARCHED}, with the same random "
         "numbers; each violation is moved towards nominal along its ray."
     ),
-    sources=(
-        HANSEN,
-        AUGER,
-        CLOPPER,
-    ),
+    sources=(HANSEN, AUGER, CLOPPER),
     quantities=("quantities",),
     runs=_runs,
     ends_early=True,

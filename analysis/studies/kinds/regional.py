@@ -96,11 +96,7 @@ REGIONAL = Kind(
         "all tables with the same sums (Freeman and Halton 1951) or over draws of them where "
         "counts are small; p-values are adjusted for their number (Holm 1979)."
     ),
-    sources=(
-        SPEAR,
-        FREEMAN,
-        HOLM,
-    ),
+    sources=(SPEAR, FREEMAN, HOLM),
     needs_rows=True,
     items=_items,
 )

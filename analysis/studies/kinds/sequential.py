@@ -81,10 +81,7 @@ SEQUENTIAL = Kind(
         "The sequential test uses a confidence sequence, valid at every number of runs (Robbins "
         "1970; Howard et al. 2021)."
     ),
-    sources=(
-        ROBBINS,
-        HOWARD,
-    ),
+    sources=(ROBBINS, HOWARD),
     needs_rows=True,
     is_statement=True,
     stop=_stop,

@@ -103,10 +103,7 @@ SOBOL = Kind(
         "Shares of the variance are estimated from two Sobol' samples and their mixtures (Sobol' "
         "2001; Saltelli et al. 2010)."
     ),
-    sources=(
-        SOBOL_2001,
-        SALTELLI,
-    ),
+    sources=(SOBOL_2001, SALTELLI),
     columns=("of",),
     design=_design,
     largest=_largest,

@@ -180,11 +180,7 @@ WORST_CASE = Kind(
         "of the tolerances with an explicit and a stiff integrator before it is called confirmed, "
         "and shrunk to few deviations (Zeller and Hildebrandt 2002)."
     ),
-    sources=(
-        HANSEN,
-        AUGER,
-        ZELLER,
-    ),
+    sources=(HANSEN, AUGER, ZELLER),
     quantities=("quantities",),
     runs=_runs,
     ends_early=True,
