@@ -18,13 +18,12 @@ from .rankings import paired_differences, screening, set_apart, shares, tornado,
 from .runs import CLIP, fans, margins_figure, running_estimate
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
 from .trend import trend
-from .tuning import before_and_after, bought, margins_of_both, tried
+from .tuning import bought, margins_of_both, tried
 
 __all__ = [
     "CLIP",
     "LIMIT",
     "Limit",
-    "before_and_after",
     "bought",
     "bounds",
     "burst",

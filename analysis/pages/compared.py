@@ -17,13 +17,13 @@ from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figu
 from ..report.compare import ABSENT, Difference, differing_numbers
 from ..report.document import (
     Claim,
-    Figure,
     Headline,
     Item,
     Paragraph,
     Report,
     Section,
     Table,
+    captioned,
     versions,
 )
 from ..report.outline import sort_key, summary
@@ -261,14 +261,13 @@ def _signal_items(
         if not names:
             continue
         both = [(c.time, {n: c.signals[n] for n in names[:_DRAWN]}) for c in (one, other)]
+        drawn = figures.overlaid(*both, unit=one.unit, bands=(one.bands, other.bands))
         caption = f"{key.removesuffix('-history')}: {', '.join(names[:_DRAWN])} before and after."
-        yield Figure(
-            key=f"overlaid-{key}",
-            caption=caption,
-            description=f"{caption} Largest differences: "
-            + "; ".join(f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:_DRAWN]),
-            figure=figures.overlaid(*both, unit=one.unit),
-        )
+        if any(name in one.bands and name in other.bands for name in names[:_DRAWN]):
+            caption += " Bands hold 90 % of the rows at each time: filled before, hatched after."
+        largest = (f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:_DRAWN])
+        values = f"Largest differences: {'; '.join(largest)}"
+        yield captioned(f"overlaid-{key}", caption, values, drawn)
         yield Table(
             caption="How far the signals are apart at most, and when; to 6 digits.",
             columns=("signal", "largest difference", "at (s)", "share of its range before",

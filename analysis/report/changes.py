@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -123,11 +123,12 @@ def _figures(report: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Signals of one chart of a page: times (s), samples by name, and their unit."""
+    """Signals of one chart of a page: times (s), samples by name, their unit, bands by name."""
 
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
     unit: str = ""
+    bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def largest_difference(self, other: Curves, name: str) -> tuple[float, float]:
         """Return how far a signal is from the same of another run at most (1), and when (s)."""
@@ -156,9 +157,11 @@ def curves_of(folder: Path | None) -> dict[str, Curves]:
 
 
 def _curves(chart: Mapping[str, Any]) -> Curves:
-    time, *samples = (
-        np.array([np.nan if x is None else x for x in row], dtype=float) for row in chart["data"]
-    )
-    return Curves(
-        time=time, signals=dict(zip(chart["names"], samples, strict=True)), unit=str(chart["unit"])
-    )
+    time, *samples = map(_samples, chart["data"])
+    bands = {name: (_samples(a), _samples(b)) for name, (a, b) in chart.get("bands", {}).items()}
+    signals = dict(zip(chart["names"], samples, strict=True))
+    return Curves(time=time, signals=signals, unit=str(chart["unit"]), bands=bands)
+
+
+def _samples(row: Sequence[float | None]) -> np.ndarray:
+    return np.array([np.nan if x is None else x for x in row], dtype=float)

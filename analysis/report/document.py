@@ -116,6 +116,11 @@ class Figure:
     figure: MatplotlibFigure
 
 
+def captioned(key: str, caption: str, values: str, figure: MatplotlibFigure) -> Figure:
+    """Return a figure that is described by its caption and the values that it shows."""
+    return Figure(key=key, caption=caption, description=f"{caption} {values}", figure=figure)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class History:
     """Signals over time for a chart to zoom in and to read values from.
@@ -135,12 +140,15 @@ class History:
         Unit of all signals.
     shown : sequence of str
         Signals that are drawn at first; all of them if it is empty.
+    bands : mapping of str to two arrays of shape (m,)
+        By signal the lower and the upper end of a band of an ensemble around it, which
+        comparisons of two pages draw.
 
     Raises
     ------
     ParameterError
-        If the times do not increase, a signal is not as long as they are, or a name in `shown`
-        is that of no signal.
+        If the times do not increase, a signal or an end of a band is not as long as they are, or
+        a name in `shown` or `bands` is that of no signal.
 
     Examples
     --------
@@ -157,16 +165,18 @@ class History:
     signals: Mapping[str, Sequence[float] | np.ndarray]
     unit: str = ""
     shown: Sequence[str] = ()
+    bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = checked_times(self.time).shape
-        for name, samples in self.signals.items():
+        ends = ((name, end) for name, band in self.bands.items() for end in band)
+        for name, samples in (*self.signals.items(), *ends):
             if np.shape(samples) != shape:
                 raise ParameterError(
                     f"signal '{name}' of history '{self.key}' has shape {np.shape(samples)}, "
                     f"its time {shape}"
                 )
-        for name in self.shown:
+        for name in (*self.shown, *self.bands):
             if name not in self.signals:
                 raise unknown("signal", name, self.signals)
 

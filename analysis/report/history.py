@@ -18,27 +18,28 @@ _COUNT = 2000  # samples of each signal on the page
 DIGITS = 6
 
 
-def chart(history: History) -> dict[str, Any]:
+def chart(history: History, bands: bool = False) -> dict[str, Any]:
     """Return what ``history.js`` draws a time history from, as JSON can hold it.
 
-    What is not finite becomes null, which is drawn as a gap.
+    What is not finite becomes null, which is drawn as a gap.  Its bands are for comparisons.
     """
     time = np.asarray(history.time, dtype=float)
     rows = [np.asarray(samples, dtype=float) for samples in history.signals.values()]
     signals = np.array(rows).reshape(len(rows), len(time))
     kept = thinned(signals)
+    ends = {name: [_rounded(end[kept]) for end in band] for name, band in history.bands.items()}
     return {
         "names": list(history.signals),
         "shown": [not history.shown or name in history.shown for name in history.signals],
         "unit": history.unit,
         "data": [_rounded(row[kept]) for row in (time, *signals)],
-    }
+    } | ({"bands": ends} if bands and ends else {})
 
 
 def signals_json(report: Report) -> str:
     """Return the time histories of a report by their anchors; nothing if it has none."""
     charts = {
-        anchor: chart(item)
+        anchor: chart(item, bands=True)
         for part in place_anchors(report)
         for anchor, _, item in part.items
         if isinstance(item, History)

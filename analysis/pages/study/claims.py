@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid
+from ...studies.file.asked import Asked
+from ...studies.finding import Finding
 from ...studies.page.text import without_assumptions
-
-if TYPE_CHECKING:
-    from ...studies.file.asked import Asked
-    from ...studies.finding import Finding
-    from ...studies.result import Result
+from ...studies.result import Result
 
 AT_ONCE = 2
 """So many findings are in the verdict where nothing is claimed."""

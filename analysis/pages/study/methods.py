@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nlctl.wording import counted
 
-if TYPE_CHECKING:
-    from ...studies.result import Result
-    from .loop import Published
+from ...studies.result import Result
+from .loop import Published
 
 DONZE = (
     "A. Donzé, O. Maler: Robust satisfaction of temporal logic over real-valued signals. FORMATS "

@@ -6,17 +6,18 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.asked import Varied
+from ...studies.finding import Finding
 from ...studies.kinds import KINDS
 from ...studies.page.running import running
 from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
 from ...studies.reading.own_kinds import STAND_IN
-from ...studies.result import LISTED
+from ...studies.result import LISTED, Result
 from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text
@@ -25,10 +26,6 @@ from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
 from .traceability import traceability
-
-if TYPE_CHECKING:
-    from ...studies.finding import Finding
-    from ...studies.result import Result
 
 OUTCOMES = {  # by the light
     "pass": "shown",

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...report.document import Section, Table
 from ...studies.file.schema import keyed
-
-if TYPE_CHECKING:
-    from ...studies.result import Result
+from ...studies.result import Result
 
 CAPTION = (
     "From requirement to evidence. No claim: no analysis answers the requirement; without an id: "

@@ -10,7 +10,7 @@ from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...pages.notation import formulas
 from ...pages.proof import ledger_section
-from ...report.document import Figure, Item, Paragraph, Section, Table
+from ...report.document import Figure, Item, Paragraph, Section, Table, captioned
 from ..burst import Burst
 from ..evidence import FAR_HORIZONS, LOOK, Evidence
 from ..figures import after_burst
@@ -173,11 +173,11 @@ def _example(number: int, one: Evidence) -> list[Section]:
 
 def _bound(key: str, one: Evidence) -> Iterator[Item]:
     c = one.conservatism
-    yield Figure(
-        key=f"{key}-V",
-        caption=text.V_CAPTION,
-        description=f"{text.V_CAPTION} C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
-        figure=figures.lyapunov_bound(one.t, one.curves),
+    yield captioned(
+        f"{key}-V",
+        text.V_CAPTION,
+        f"C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
+        figures.lyapunov_bound(one.t, one.curves),
     )
     for caption, group in (
         (text.shares_caption(c), c.shares),
@@ -216,11 +216,11 @@ def _margins(key: str, one: Evidence) -> Iterator[Item]:
         )
     equalities = [m for m in one.margins if m.kind == "equality"]
     worst = max(-m.least / m.scale for m in equalities)
-    yield Figure(
-        key=f"{key}-equations",
-        caption=text.EQUATIONS,
-        description=f"{text.EQUATIONS} The largest is {worst:.2g}.",
-        figure=figures.equality_residuals(equalities),
+    yield captioned(
+        f"{key}-equations",
+        text.EQUATIONS,
+        f"The largest is {worst:.2g}.",
+        figures.equality_residuals(equalities),
     )
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
-from ...report.document import Figure, Paragraph, Report, Section
+from ...report.document import Figure, Paragraph, Report, Section, captioned
 from ...reproductions.page import report_of
 from ...reproductions.sections import model_section, part_sections
 from .. import TAIL, CaseRun, checks
@@ -90,11 +90,11 @@ def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     caption = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
     if long is not None and np.isfinite(long.burst):
         caption = f"{caption} {text.LEAD_BURST.format(hours=long.burst / 3600)}"
-    return Figure(
-        key="lead",
-        caption=caption,
-        description=f"{caption} max |e₁| for t ≥ {TAIL:g} s is {run.metrics['tail_max_e']:.5g}.",
-        figure=figures.story(run.time, run.signals["y"], run.signals["yd"], long),
+    return captioned(
+        "lead",
+        caption,
+        f"max |e₁| for t ≥ {TAIL:g} s is {run.metrics['tail_max_e']:.5g}.",
+        figures.story(run.time, run.signals["y"], run.signals["yd"], long),
     )
 
 

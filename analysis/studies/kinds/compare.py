@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...figures.labels import plain
-from ...report.document import Figure
+from ...report.document import Figure, Item, captioned
 from ...robustness import (
     Choice,
     Experiment,
@@ -39,11 +39,8 @@ from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..resolve import option
+from ..result import Result
 from .context import CLOPPER, HOLM
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first option are shown
 RANKING = (
@@ -274,11 +271,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     t, confidence = finding.tables, 100 * finding.numbers["confidence"]
     ranking = t["ranking"]
     caption = RATES.format(confidence=confidence)
-    yield Figure(
-        key=f"{key}-rates",
-        caption=caption,
-        description=f"{caption} {column_in_words(ranking['rate'])}.",
-        figure=figures.violation_rates(ranking),
+    yield captioned(
+        f"{key}-rates",
+        caption,
+        f"{column_in_words(ranking['rate'])}.",
+        figures.violation_rates(ranking),
     )
     titles = {"rate": "share", "rate_low": "from", "rate_high": "to", "failed": "did not end"}
     titles = {c: titles.get(c) or c.replace("rank ", "mean rank ", 1) for c in ranking.columns}
@@ -316,11 +313,11 @@ def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> I
             f"{other}: {middle:.4g}"
             for other, middle in zip(others, with_first["median"], strict=True)
         )
-        yield Figure(
-            key=f"{key}-medians-{number}",
-            caption=caption,
-            description=f"{caption} {words}.",
-            figure=figures.paired_differences(with_first, list(others), _axis(metric, units)),
+        yield captioned(
+            f"{key}-medians-{number}",
+            caption,
+            f"{words}.",
+            figures.paired_differences(with_first, list(others), _axis(metric, units)),
         )
 
 

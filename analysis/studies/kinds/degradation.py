@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field, model_validator
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Table
+from ...report.document import Item, Table, captioned
 from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
@@ -20,11 +20,8 @@ from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import margin_text
+from ..result import Result
 from .context import CLOPPER
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 _CAPTION = (
     "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
@@ -113,12 +110,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"
     caption = _CAPTION.format(confidence=100 * n["confidence"], together=together)
-    yield Figure(
-        key=f"{key}-curve",
-        caption=caption,
-        description=f"{caption} "
-        + "; ".join(f"{size:g}: {row['rate']:.4g}" for size, row in curve.iterrows()),
-        figure=figures.degradation(curve, asked.at, asked.limit),
+    yield captioned(
+        f"{key}-curve",
+        caption,
+        "; ".join(f"{size:g}: {row['rate']:.4g}" for size, row in curve.iterrows()),
+        figures.degradation(curve, asked.at, asked.limit),
     )
     yield Table(
         caption=f"{text.SAME}.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from pydantic import Field
 from nlctl.wording import counted, some_of
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph
+from ...report.document import Item, Paragraph, captioned
 from ...robustness import Space
 from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
@@ -22,10 +22,7 @@ from ..file.field_types import Pair, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page.tables import known
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
+from ..result import Result
 
 _CAPTION = (
     "Margin over the plane, the other quantities nominal; between the points that were run, the "
@@ -110,11 +107,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     caption = _CAPTION + _VIOLATED * bool(np.any(violates(points["spec"])))
     caption += BOUNDARY * bool(len(edge)) + STAR * is_nominal + BOX
     box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
-    yield Figure(
-        key=f"{key}-map",
-        caption=caption,
-        description=f"{caption} {finding.sentence}",
-        figure=figures.failure_map_figure(
+    yield captioned(
+        f"{key}-map",
+        caption,
+        finding.sentence,
+        figures.failure_map_figure(
             points,
             finding.tables["triangles"].to_numpy(),
             names,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -21,7 +21,7 @@ from nlctl.native import Status
 from nlctl.wording import some_of
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph, Table
+from ...report.document import Figure, Item, Paragraph, Table, captioned
 from ...robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
 from ...robustness.runs.experiment import by_diagram, simulate_rows
 from ...robustness.stl.spec import Requirement, violates
@@ -34,10 +34,7 @@ from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_text
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
+from ..result import Result
 
 TOGETHER = 256  # unfinished runs that are simulated again in batches
 _MOST = 40  # rows of the table of pairs
@@ -319,12 +316,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     single = _single(effects)
     names = [_label(row, several) for row in single.to_dict("records")]
     margin = pd.Series(single["margin"].to_numpy(), index=names)
-    yield Figure(
-        key=f"{key}-margins",
-        caption=_MARGINS,
-        description=f"{_MARGINS} "
-        + "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
-        figure=figures.fault_margins(margin),
+    yield captioned(
+        f"{key}-margins",
+        _MARGINS,
+        "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
+        figures.fault_margins(margin),
     )
     watched = _columns(asked, result)
     yield _effects(single, EFFECTS, result, finding.key, watched)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
 from ..file.asked import Asked
 from ..file.field_types import Whole
@@ -18,11 +18,8 @@ from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import response
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 MORRIS_CAPTION = (
     "Elementary effects on '{of}': μ* is the mean magnitude, with its bootstrap interval; a σ far "
@@ -72,11 +69,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     """Yield the elementary effects."""
     table = finding.tables["effects"]
     caption = MORRIS_CAPTION.format(of=finding.numbers["of"])
-    yield Figure(
-        key=f"{key}-effects",
-        caption=caption,
-        description=f"{caption} μ*: {column_in_words(table['mu_star'])}.",
-        figure=figures.screening(table),
+    yield captioned(
+        f"{key}-effects",
+        caption,
+        f"μ*: {column_in_words(table['mu_star'])}.",
+        figures.screening(table),
     )
     yield result_table(
         table.sort_values("mu_star", ascending=False, kind="stable"),

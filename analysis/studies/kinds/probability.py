@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from nlctl.wording import counted
 
+from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked
@@ -16,11 +17,8 @@ from ..file.field_types import Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
+from ..result import Result
 from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 DECIDES_FIXED = (
     " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness.search.largest_scale import largest_scale
 from ...robustness.search.radius import robustness_radius
 from ..file.asked import Varied
@@ -19,11 +19,8 @@ from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text
+from ..result import Result
 from .context import AUGER, CLOPPER, HANSEN, SEARCHED, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 SIZES = 12  # that the search tries, roughly
 _CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
@@ -119,11 +116,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         for step in steps.to_dict("records")
     )
     caption = _CAPTION + _SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
-    yield Figure(
-        key=f"{key}-sizes",
-        caption=caption,
-        description=f"{caption} Lowest margin by size: {listed}.",
-        figure=figures.radius_steps(steps, float(n["upper"])),
+    yield captioned(
+        f"{key}-sizes",
+        caption,
+        f"Lowest margin by size: {listed}.",
+        figures.radius_steps(steps, float(n["upper"])),
     )
     if n["witness"] is not None:
         yield from found_rows({"violating row": n["witness"]}, result.quantities, key)

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import regional
 from ..file.asked import Asked
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import HOLM
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 _CAPTION = (
     "Distance between the distributions in failing and in passing runs; for choices Cramér's V. 0: "
@@ -71,11 +68,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     if "differences" not in finding.tables:
         return
     table = finding.tables["differences"]
-    yield Figure(
-        key=f"{key}-distances",
-        caption=_CAPTION,
-        description=f"{_CAPTION} {column_in_words(table['statistic'])}.",
-        figure=figures.set_apart(table),
+    yield captioned(
+        f"{key}-distances",
+        _CAPTION,
+        f"{column_in_words(table['statistic'])}.",
+        figures.set_apart(table),
     )
     columns = {"statistic": "distance"}
     if np.isfinite(table["p"].to_numpy()).any():  # rows are independent draws

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
+from ...report.document import Item
 from ...robustness import Design, decide, test_verdict
 from ...robustness.runs.progress import Progress, until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
@@ -17,11 +18,8 @@ from ..file.field_types import Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
+from ..result import Result
 from .context import HOWARD, ROBBINS, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import Design, Space, saltelli, sobol_indices
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Whole
@@ -18,11 +18,8 @@ from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import response
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 SOBOL_CAPTION = (
     "Shares of the variance of '{of}' with bootstrap intervals, confidence {confidence:g} % each. "
@@ -81,11 +78,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     caption = SOBOL_CAPTION.format(
         of=finding.numbers["of"], confidence=100 * finding.numbers["confidence"]
     )
-    yield Figure(
-        key=f"{key}-shares",
-        caption=caption,
-        description=f"{caption} S_T: {column_in_words(table['ST'])}.",
-        figure=figures.shares(table),
+    yield captioned(
+        f"{key}-shares", caption, f"S_T: {column_in_words(table['ST'])}.", figures.shares(table)
     )
     columns = {"S1": "S₁", "S1_low": "from", "S1_high": "to"}
     columns |= {"ST": "S_T", "ST_low": "from", "ST_high": "to"}

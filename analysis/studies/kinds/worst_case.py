@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from pydantic import Field
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph, Table
+from ...report.document import Item, Paragraph, Table, captioned
 from ...robustness import nominal
 from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
@@ -26,11 +26,8 @@ from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_text, status_text
+from ..result import Result
 from .context import AUGER, HANSEN, SEARCHED
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
 
 SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
 ZELLER = (
@@ -128,12 +125,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     n = finding.numbers
     lowest = finding.tables["best"]["margin"].to_numpy(dtype=float)
     caption = SEARCH + text.clipped(lowest)
-    yield Figure(
-        key=f"{key}-search",
-        caption=caption,
-        description=f"{caption} After {counted(lowest.size, 'run')} it is "
-        f"{margin_text(lowest[-1])}.",
-        figure=figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
+    yield captioned(
+        f"{key}-search",
+        caption,
+        f"After {counted(lowest.size, 'run')} it is {margin_text(lowest[-1])}.",
+        figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
     )
     if "replays" in finding.tables:
         yield _replays(finding.tables["replays"], bool(n["is_confirmed"]))

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ... import figures as figures
-from ...report.document import Figure, Item, Table
+from ...report.document import Item, Table, captioned
 from .tables import known
 
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
@@ -37,12 +37,7 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
             f"{name}: " + ", ".join(f"{row} {value:.3g}" for row, value in line.items())
             for name, line in table.iterrows()
         )
-        yield Figure(
-            key=f"{key}-deviations",
-            caption=DEVIATIONS,
-            description=f"{DEVIATIONS} {values}.",
-            figure=figures.deviations(table),
-        )
+        yield captioned(f"{key}-deviations", DEVIATIONS, f"{values}.", figures.deviations(table))
 
 
 def _marked(value: object, middle: Any) -> str:
