@@ -177,7 +177,7 @@ def _show_function(name: str, function: Any) -> None:
 
 
 def _documented_arguments(docstring: str) -> dict[str, str]:
-    """Return what the section Parameters of a docstring says of each argument."""
+    """Return the description of each argument in the section Parameters of a docstring."""
     section = docstring.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
     meanings: dict[str, str] = {}
     names: list[str] = []

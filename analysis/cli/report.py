@@ -346,7 +346,7 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
 def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     """Print where the page is; print it to PDF and show it, as wanted."""
     from ..report.browser import open_page, write_pdf
-    from ..studies.whole.page import recorded_print
+    from ..studies.intact.page import recorded_print
 
     say(page)
     if pdf:
@@ -397,7 +397,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 def _check_run(path: Path) -> None:
     """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
-    from ..studies.whole.page import check_page, is_run
+    from ..studies.intact.page import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()
@@ -408,7 +408,7 @@ def _check_run(path: Path) -> None:
 
 
 def _no_report(path: Path) -> UsageError:
-    """Return what is said of a path that cannot be compared, with the next step."""
+    """Return why a path cannot be compared, with the next step."""
     from nlctl.errors import UsageError
 
     if not path.exists():
@@ -428,7 +428,7 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     from ..pages.trend import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
-    from ..studies.whole.page import check_page
+    from ..studies.intact.page import check_page
     from .terminal import check_writable
 
     check_writable(folder)

@@ -191,9 +191,9 @@ def verify_command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     json: Json = False,
 ) -> None:
-    """Say whether the folder of a run is whole: every file as the run has written it.
+    """Say whether the folder of a run is intact: every file as the run has written it.
 
-    Nothing is run or imported.  Exit codes: 0 it is whole, 1 something is missing, edited or too
+    Nothing is run or imported.  Exit codes: 0 it is intact, 1 something is missing, edited or too
     much, 2 it is not the folder of a run that has come to an end.
     """
     with exit_codes(json):
@@ -202,7 +202,7 @@ def verify_command(
         check_run_path(folder)
         verified = verify(folder)
         if json:
-            content = {key: getattr(verified, key) for key in ("is_whole", "files", "rows")}
+            content = {key: getattr(verified, key) for key in ("is_intact", "files", "rows")}
             lists = {
                 k: list(getattr(verified, k)) for k in ("analyses", "done", "problems", "others")
             }
@@ -211,7 +211,7 @@ def verify_command(
             say(verified)
             for name in verified.others:
                 say(f"  '{name}' is not a part of the run")
-        if not verified.is_whole:
+        if not verified.is_intact:
             raise typer.Exit(FAILS)
 
 
@@ -242,7 +242,7 @@ def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
     from nlctl.errors import UsageError
 
-    from ..studies.whole.page import is_run
+    from ..studies.intact.page import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))

@@ -48,7 +48,7 @@ def report_study(
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result
-    from ..studies.whole.page import recorded_page
+    from ..studies.intact.page import recorded_page
 
     result = (
         _run(path, threads, watch, force, trust)

@@ -109,7 +109,7 @@ def _without_correction(command: str, suffix: str, amplitude: float) -> list[Sta
 
 
 def _statements() -> list[Statement]:
-    """Return what is said of the runs, and what must follow."""
+    """Return the statements on the runs, and what follows from them."""
     say = partial(Statement, part="example-1", case="controllable error, 5 sin 0.5t")
     return [
         *(line for c, (suffix, _) in _COMMANDS.items() for line in _with_correction(c, suffix)),

@@ -104,7 +104,7 @@ HEAD = 4096  # bytes of a page in which its generator stands
 
 
 def generator(template: str) -> str:
-    """Return what the page of a template says of who made it."""
+    """Return the generator that a page names."""
     return f"nlctl {Path(template).stem}"
 
 

@@ -48,7 +48,7 @@ class Statement:
     value : callable
         ``value(runs) -> float``.
     relation : {"=", "≤", "≥"}
-        What is said of the value.
+        How the value relates to it.
     tolerance : float
         For "=", how far it may be off; of what is printed exactly, rounding.
     read : str

@@ -7,6 +7,7 @@ from .file.schema import Study
 from .file.shipped import shipped
 from .finding import Finding
 from .folder import load_result
+from .integrity import Integrity, verify
 from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
@@ -16,13 +17,13 @@ from .replay import Replay, replay, replay_figure
 from .result import Result
 from .run import run
 from .sealed import RunFolderError
-from .wholeness import Wholeness, verify
 
 __all__ = [
     "KINDS",
     "Asked",
     "Finding",
     "Ground",
+    "Integrity",
     "Kind",
     "Plan",
     "Problem",
@@ -34,7 +35,6 @@ __all__ = [
     "StudyError",
     "StudyFile",
     "Varied",
-    "Wholeness",
     "finding_of",
     "from_toml",
     "load_result",

@@ -1,8 +1,8 @@
 """What results are computed from: study, equations, wiring, values, versions.
 
 The record is kept with a run (``run.json``), a key of it with every finding and all rows.  Whatever
-adds to a run or draws from it compares first: nothing is said of one loop next to the numbers of
-another one.
+adds to a run or draws from it compares first: no statement about one loop appears next to the
+numbers of another one.
 """
 
 from __future__ import annotations

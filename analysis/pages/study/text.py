@@ -24,5 +24,5 @@ PART = (
     "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
     "files reports/*.toml of nlctl are such studies."
 )
-FOUND = "What was asked of the loop, and what was found."
+FOUND = "Analyses of the loop, and their results."
 SOURCE = "As it was when this page was made:"

@@ -36,7 +36,7 @@ def _choices(runs: _Runs) -> Section:
     shown = [r for r in runs.values() if r.case.group in ("published", "choice")]
     return Section(
         key="choices",
-        title="What the paper leaves open",
+        title="Choices that the paper does not specify",
         folded=True,
         items=[
             Paragraph(
@@ -84,8 +84,8 @@ def _numerics(runs: _Runs, residuals: pd.DataFrame | None) -> Section:
 
 def _apart(residuals: pd.DataFrame) -> Table:
     return Table(
-        caption="The published cases again with other tolerances, and with a stiff method in the "
-        "place of the explicit pair: largest difference over 20 s from tsit5 at 1e-10. The "
+        caption="The published cases with other tolerances, and with a stiff method instead of "
+        "the explicit pair: largest difference over 20 s from tsit5 at 1e-10. The "
         "absolute tolerance is a hundredth of the relative one.",
         columns=("example", "method", "relative tolerance", "difference in e₁", "difference in ζ"),
         rows=[tuple(row) for row in residuals.itertuples(index=False)],
@@ -96,7 +96,7 @@ def _limits(runs: _Runs) -> Section:
     drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
     return Section(
         key="limits",
-        title="What this does not show",
+        title="Limitations",
         items=[
             Paragraph(
                 text=f"The runs end at {HORIZON:g} s, as the paper's do. They show that all "

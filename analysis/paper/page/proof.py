@@ -34,7 +34,7 @@ def _finding(
 ) -> Section:
     return Section(
         key="proof",
-        title="The proof, and what happens far beyond 20 s",
+        title="The stability proof, and simulations far beyond 20 s",
         items=[
             *_burst(far, burst),
             _slow_drift_table(proofs),
@@ -84,7 +84,7 @@ def _after(run: LongRun, burst: Burst) -> Iterator[Item]:
 def _far_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FAR_CAPTION,
-        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "happened"),
+        columns=("loop", "rtol", "simulated until (s)", "max |e₁| before", "outcome"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
@@ -101,7 +101,7 @@ def _far_table(far: Mapping[str, LongRun]) -> Table:
 def _forecast_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FORECASTS,
-        columns=("loop", "from the first (s)", "forecast", "range", "happened", "outcome"),
+        columns=("loop", "from the first (s)", "prediction", "range", "observed", "outcome"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
@@ -129,7 +129,7 @@ def _slow_drift_table(proofs: Mapping[int, Evidence]) -> Table:
         rows.append((f"Example {number}", f"{c.zeta:.5g}", spent, c.verdict, rest, burst))
     return Table(
         caption=f"The drift of ζ, judged after {LOOK:g} s. {text.SLOW_DRIFT}",
-        columns=("loop", "ζ", "budget spent", "verdict", "ζ comes to rest at", "burst at"),
+        columns=("loop", "ζ", "budget used", "verdict", "ζ settles at", "burst at"),
         rows=rows,
     )
 
@@ -137,7 +137,7 @@ def _slow_drift_table(proofs: Mapping[int, Evidence]) -> Table:
 def _lemma() -> Section:
     return Section(
         key="proof-lemma",
-        title="What Lemma 1 gives, and what it does not",
+        title="Lemma 1: a counterexample, and what remains",
         level=3,
         items=[Paragraph(text=words) for words in text.LEMMA],
     )
@@ -149,21 +149,21 @@ def _example(number: int, one: Evidence) -> list[Section]:
         ledger_section(one.ledger, key, f"Example {number}: the proof line by line", level=3),
         Section(
             key=f"{key}-bound",
-            title=f"Example {number}: V, its bound, and how far the bound is from what happens",
+            title=f"Example {number}: V, its bounds, and their conservatism",
             level=3,
             folded=True,
             items=[*_bound(key, one)],
         ),
         Section(
             key=f"{key}-steps",
-            title=f"Example {number}: every margin over time",
+            title=f"Example {number}: margins of all steps over time",
             level=3,
             folded=True,
             items=[*_margins(key, one)],
         ),
         Section(
             key=f"{key}-constants",
-            title=f"Example {number}: the constants of the proof",
+            title=f"Example {number}: constants of the proof",
             level=3,
             folded=True,
             items=[_constants(one)],

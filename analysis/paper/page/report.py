@@ -102,12 +102,12 @@ def _exchange(runs: _Runs) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",
-        title="Exchange of actuators",
+        title="Both controllers with either actuator",
         items=[
             Paragraph(
-                text="The paper's second claim: the controller need not know which actuator it "
-                "drives. Each example runs with the other one's actuator; the controller and its "
-                "parameters stay the same."
+                text="The paper's second claim is that the controller need not know which actuator "
+                "it drives. Each example is simulated with the actuator of the other one; the "
+                "controller and its parameters are unchanged."
             ),
             metric_table(
                 "With its own and with the other actuator.",

@@ -22,28 +22,28 @@ def sampling_section(record: pd.DataFrame) -> Section:
     limits = spec_ends(record)
     return Section(
         key="sampling",
-        title="On a computer",
+        title="Sampled implementation",
         items=[
             *(Paragraph(text=_sentence(limits, example, _ERROR)) for example in _TITLES),
             Figure(
                 key="sampling-errors",
                 caption=f"Largest {_ERROR} for t ≥ {TAIL:g} s against the sampling time, by "
-                "Euler's method; a cross is the last run that ends well, the line what is asked.",
+                "Euler's method. Cross: the last run that meets the spec; line: the spec.",
                 description=" ".join(_sentence(limits, example, "|y − yd|") for example in _TITLES),
                 figure=sampling_errors(record, _TITLES, BAND),
             ),
             _table(limits),
             Paragraph(
-                text="These are runs of a kept record, 13 to 21 for each entry of the table; two "
-                "of them are run again for this page and agree to 1e-3. The command that makes all "
-                "of them again, in a checkout: python campaign/sampling_runs.py"
+                text="These are recorded runs, 13 to 21 for each entry of the table; two of them "
+                "were repeated for this page and agree to 1e-3. The command that repeats all of "
+                "them, in a checkout: python campaign/sampling_runs.py"
             ),
         ],
     )
 
 
 def _sentence(limits: pd.DataFrame, example: str, error: str) -> str:
-    """Say how far the paper's controller goes, and its rivals of the figure."""
+    """Say where the spec holds with the paper's controller, and with the others of the figure."""
     papers: Any = limits.loc[(example, "paper")]
     dt_text, delay, measured, given = (_text(papers, quantity) for quantity in QUANTITIES)
     rivals = [
@@ -53,7 +53,7 @@ def _sentence(limits: pd.DataFrame, example: str, error: str) -> str:
         f"{_TITLES[example]} with the paper's controller: {error} ≤ {BAND:g} for t ≥ {TAIL:g} s "
         f"and |u| ≤ {PEAK:g} hold up to a sampling time of {dt_text}. Sampled every 2 ms, they "
         f"hold with a delay of {delay}, or with measurements in steps of {measured}, or with u in "
-        f"steps of {given}. Longest sampling times of its rivals: {', '.join(rivals)}."
+        f"steps of {given}. Longest sampling times of other controllers: {', '.join(rivals)}."
     )
 
 
@@ -69,10 +69,10 @@ def _text(row: Any, quantity: Quantity) -> str:
 
 def _table(limits: pd.DataFrame) -> Table:
     return Table(
-        caption='Up to where each controller meets what is asked, to 4 to 7 %: "less than" '
-        "means that the least value that was tried violates it already, as it may in "
-        'continuous time, "or more" that none did. Delay and converters: sampled every 2 ms. A '
-        "run that diverges, or takes more than 60,000 steps, violates.",
+        caption="Largest values with which each controller meets the spec, to 4 to 7 %. Less "
+        "than: the least value that was tried violates it already, as continuous time may; or "
+        "more: none did. Delay and converters: sampled every 2 ms. A run that diverges, or takes "
+        "more than 60,000 steps, violates the spec.",
         columns=("example", "controller", *(q.title for q in QUANTITIES)),
         rows=[
             (_TITLES[example], label, *(_text(row, q) for q in QUANTITIES))

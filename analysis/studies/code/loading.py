@@ -66,7 +66,7 @@ def _loaded(name: str, path: Path, admits: Admits | None) -> ModuleType:
     top = path.parents[name.count(".") + (path.name == "__init__.py")]
     module.__dict__["__builtins__"] = vars(builtins) | {"__import__": _importer(name, top, admits)}
     try:
-        content = path.read_bytes()  # never what __pycache__ says of it, which others may have made
+        content = path.read_bytes()  # never __pycache__, which others may have made
         _FILES[name] = path, content
         exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
     except BaseException:

@@ -1,4 +1,4 @@
-"""What a study file says of every analysis, whatever its kind."""
+"""Keys of a study file that every kind of analysis has."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Ids = Annotated[tuple[Id, ...], BeforeValidator(_listed)]
 
 
 class Asked(Strict):
-    """What a study file says of every analysis; the schema of a kind adds its own keys.
+    """Keys of every analysis in a study file; the schema of a kind adds its own.
 
     Examples
     --------

@@ -85,7 +85,7 @@ def _faults(setup: Setup) -> dict[str, Fault]:
 def _faulty(
     build: Any, options: Mapping[str, Any], faults: Sequence[Fault]
 ) -> ct.InterconnectedSystem:
-    """Return the loop with all faults in it; which of them begin is said by parameters."""
+    """Return the loop with all faults in it; parameters say which of them begin."""
     return with_faults(build(**options), *faults)
 
 
@@ -258,7 +258,7 @@ def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
     }
     return finding_of(
         asked,
-        f"{words} Nominal values, one run each: nothing is said of other onsets or magnitudes.",
+        f"{words} Nominal values, one run each; other onsets and magnitudes were not examined.",
         **_answer(asked, bad),
         runs=len(effects),
         numbers=numbers,

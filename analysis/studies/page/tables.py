@@ -1,4 +1,4 @@
-"""Tables of results and quantities on a page, and what a figure says of a column."""
+"""Tables of results and quantities on a page, and columns in words."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The shapes that the JSON files of a run folder are validated against.
 
-A file may be whole and carry the right key, and yet be of another version or made by hand.
+A file may be intact and carry the right key, and yet be of another version or made by hand.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ class _Table(_File):
 
 
 class ContentsFile(_File):
-    """``contents.json``: the record that proves that a folder is whole."""
+    """``contents.json``: the record that proves that a folder is intact."""
 
     files: dict[_Place, _Digest]
     rows: dict[_Key, _Count]
