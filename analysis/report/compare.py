@@ -130,7 +130,7 @@ def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     claims = report["claims"]
     for name, claim in zip(_names([c["text"] for c in claims]), claims, strict=True):
         values |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
-    values |= _leaves("numbers", report["numbers"])
+    values |= placed_values("numbers", report["numbers"])
     for key, section in report["sections"].items():
         if key not in sections:
             continue
@@ -140,12 +140,16 @@ def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     return values
 
 
-def _leaves(where: str, value: object) -> dict[str, Any]:
-    if isinstance(value, dict):
-        return {k: v for n in value for k, v in _leaves(f"{where}.{n}", value[n]).items()}
-    if isinstance(value, list):
-        return {k: v for i, x in enumerate(value) for k, v in _leaves(f"{where}[{i}]", x).items()}
-    return {where: value}
+def placed_values(where: str, value: object) -> dict[str, Any]:
+    """Return what nested records hold, by its place; in a list by its key where it has one."""
+    if isinstance(value, Mapping):
+        parts = [(f"{where}.{name}", part) for name, part in value.items()]
+    elif isinstance(value, list):
+        keys = (x.get("key", i) if isinstance(x, Mapping) else i for i, x in enumerate(value))
+        parts = [(f"{where}[{key}]", part) for key, part in zip(keys, value, strict=True)]
+    else:
+        return {where: value}
+    return {place: leaf for at, part in parts for place, leaf in placed_values(at, part).items()}
 
 
 def _placeless(value: object) -> Any:

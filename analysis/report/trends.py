@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .changes import claim_changes
+from .compare import placed_values
 from .document import Claim, Table
 from .outline import claim_status, sort_key
 
@@ -17,6 +18,8 @@ NUMBERS = 8  # that are followed
 _PARTS = re.compile(
     r"\b(tables|running estimate|quantities|requirements|metrics|seed|rows|witness)\b"
 )
+
+_FINDING = re.compile(r"^study\.findings\[([^\]]*)\]")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,20 +156,9 @@ def _main(content: Mapping[str, Any]) -> dict[str, float]:
         for claim in content["claims"]
         if sort_key(claim.get("margin", ""))
     }
-    return numbers | {
-        name: value for name, value in _leaves("", content["numbers"]) if not _PARTS.search(name)
-    }
-
-
-def _leaves(where: str, value: Any) -> list[tuple[str, float]]:
-    """Return the numbers in nested records with their places; findings by their keys."""
-    if isinstance(value, Mapping):
-        return [leaf for key, part in value.items() for leaf in _leaves(f"{where}{key}.", part)]
-    if isinstance(value, list):
-        keys = [p.get("key", i) if isinstance(p, Mapping) else i for i, p in enumerate(value)]
-        parts = zip(keys, value, strict=True)
-        return [leaf for key, part in parts for leaf in _leaves(f"{where}{key}.", part)]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return []
-    short = re.sub(r"^study\.findings\.|\bnumbers\.", "", where.rstrip("."))
-    return [(short, float(value))]
+    for place, value in placed_values("", content["numbers"]).items():
+        name = re.sub(r"\bnumbers\.", "", _FINDING.sub(r"\1", place.removeprefix(".")))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number and not _PARTS.search(name):
+            numbers[name] = float(value)
+    return numbers

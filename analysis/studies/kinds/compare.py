@@ -241,14 +241,6 @@ def _answer(asked: Compare, comparison: Comparison) -> dict[str, str]:
     return vars(better_verdict(won, lost, adjusted, level, adjusted / p))
 
 
-def _runs(asked: Compare, setup: Setup) -> int:
-    return asked.runs * len(_options(asked, setup).options)
-
-
-def _largest(asked: Compare, quantities: int) -> int:
-    return asked.runs * len(asked.options)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     a, b = asked.better
     metric = next(iter(asked.metrics))
@@ -342,8 +334,8 @@ COMPARE = Kind(
     sources=(MCNEMAR_1947, EFRON, HOLM, CLOPPER),
     keywords=("keyword",),
     check=_check,
-    runs=_runs,
-    largest=_largest,
+    runs=lambda asked, setup: asked.runs * len(_options(asked, setup).options),
+    largest=lambda asked, quantities: asked.runs * len(asked.options),
     experiment=_experiment,
     measured=_measured,
     items=_items,

@@ -17,7 +17,7 @@ from ...robustness.statistics.guarantee import design_assumptions, rounded_down,
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Flag, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, finding_of
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.text import margin_text
 from ..result import Result
@@ -86,14 +86,6 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     )
 
 
-def _runs(asked: AskedDegradation, setup: Setup) -> int:
-    return len(asked.factors) * asked.runs
-
-
-def _largest(asked: AskedDegradation, quantities: int) -> int:
-    return asked.runs * len(asked.factors)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
@@ -146,9 +138,9 @@ DEGRADATION = Kind(
     ),
     sources=(CLOPPER,),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: len(asked.factors) * asked.runs,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.runs * len(asked.factors),
     measured=_measured,
     items=_items,
 )

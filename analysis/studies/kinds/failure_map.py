@@ -20,7 +20,7 @@ from ...robustness.stl.spec import violates
 from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, finding_of
+from ..kind import Ground, Kind, finding_of
 from ..page.tables import known
 from ..result import Result
 
@@ -88,14 +88,6 @@ def _run(asked: Map, ground: Ground) -> Finding:
     )
 
 
-def _runs(asked: Map, setup: Setup) -> int:
-    return asked.runs
-
-
-def _largest(asked: Map, quantities: int) -> int:
-    return max(asked.runs, (asked.cells + 1) ** 2)
-
-
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
     """Yield the map of margins over two quantities."""
     names = (finding.numbers["x"], finding.numbers["y"])
@@ -141,10 +133,10 @@ FAILURE_MAP = Kind(
         "or may do so between the corners."
     ),
     quantities=("x", "y"),
-    runs=_runs,
+    runs=lambda asked, setup: asked.runs,
     ends_early=True,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.runs, (asked.cells + 1) ** 2),
     items=_items,
     in_brief=True,
 )

@@ -154,10 +154,6 @@ def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
     return [((), NEVER), *((which, onset) for onset in asked.onsets for which in chosen)]
 
 
-def _runs(asked: Faults, setup: Setup) -> int:
-    return len(_cases(asked, setup))
-
-
 def _run(asked: Faults, ground: Ground) -> Finding | None:
     """Run the loop without a fault, with each, and with every two."""
     setup, faults = ground.setup, _faults(ground.setup)
@@ -295,10 +291,6 @@ def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:
     return {"answer": "refuted" if set(asked.tolerates) & set(violating["first"]) else "shown"}
 
 
-def _largest(asked: Faults, quantities: int) -> int:
-    return len(asked.onsets)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     """Return the least margin under the faults that are claimed to be tolerated."""
     effects = finding.tables["effects"]
@@ -420,8 +412,8 @@ FAULTS = Kind(
         "begin, and when, are parameters. Rows are nominal but for these."
     ),
     check=_check,
-    runs=_runs,
-    largest=_largest,
+    runs=lambda asked, setup: len(_cases(asked, setup)),
+    largest=lambda asked, quantities: len(asked.onsets),
     experiment=_experiment,
     measured=_measured,
     items=_items,

@@ -43,10 +43,6 @@ def _design(asked: Morris, space: Space, seed: int) -> Design:
     return morris(space, asked.trajectories, asked.levels, seed)
 
 
-def _largest(asked: Morris, quantities: int) -> int:
-    return max(asked.levels, asked.trajectories * (quantities + 2))
-
-
 def _run(asked: Morris, ground: Ground) -> Finding | None:
     design = _design(asked, ground.prepared.experiment.space, ground.seed)
     done = ground.run_design(design)
@@ -92,6 +88,6 @@ MORRIS = Kind(
     sources=(MORRIS_1991,),
     columns=("of",),
     design=_design,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.levels, asked.trajectories * (quantities + 2)),
     items=_items,
 )

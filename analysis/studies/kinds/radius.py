@@ -15,7 +15,7 @@ from ...robustness.search.radius import robustness_radius
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, finding_of
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text
@@ -83,14 +83,6 @@ def _no_small_violation(limit: float | None, upper: float, largest: float) -> di
     return {"answer": "not shown yet", "needs": needs}
 
 
-def _runs(asked: AskedRadius, setup: Setup) -> int:
-    return SIZES * asked.runs + asked.draws
-
-
-def _largest(asked: AskedRadius, quantities: int) -> int:
-    return max(asked.runs, asked.draws)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     measured = f"violation at size {n['upper']:.4g}"
@@ -139,10 +131,10 @@ RADIUS = Kind(
     ),
     sources=(HANSEN, AUGER, CLOPPER),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: SIZES * asked.runs + asked.draws,
     ends_early=True,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.runs, asked.draws),
     measured=_measured,
     items=_items,
 )

@@ -48,10 +48,6 @@ def _design(asked: Sobol, space: Space, seed: int) -> Design:
     return saltelli(space, asked.size, seed)
 
 
-def _largest(asked: Sobol, quantities: int) -> int:
-    return asked.size * (quantities + 2)
-
-
 def _run(asked: Sobol, ground: Ground) -> Finding | None:
     design = _design(asked, ground.prepared.experiment.space, ground.seed)
     done = ground.run_design(design)
@@ -100,6 +96,6 @@ SOBOL = Kind(
     sources=(SOBOL_2001, SALTELLI),
     columns=("of",),
     design=_design,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.size * (quantities + 2),
     items=_items,
 )

@@ -53,10 +53,6 @@ def _check(asked: Tornado, setup: Setup) -> None:
         raise ParameterError("'tornado' needs quantities that are no integers, got none")
 
 
-def _runs(asked: Tornado, setup: Setup) -> int:
-    return 1 + 2 * len(_numbers(setup.experiment.space))
-
-
 def _run(asked: Tornado, ground: Ground) -> Finding | None:
     """Differentiate the nominal run, then run every quantity at either end of its box."""
     prepared = ground.prepared
@@ -189,6 +185,6 @@ TORNADO = Kind(
     sources=(GRIEWANK,),
     columns=("of",),
     check=_check,
-    runs=_runs,
+    runs=lambda asked, setup: 1 + 2 * len(_numbers(setup.experiment.space)),
     items=_items,
 )

@@ -121,10 +121,6 @@ def _runs(asked: Tuning, setup: Setup) -> int:
     return int(search) + 2 * asked.runs
 
 
-def _largest(asked: Tuning, quantities: int) -> int:
-    return max(2 * asked.runs, int(asked.budget), asked.samples)
-
-
 def _run(asked: Tuning, ground: Ground) -> Finding | None:
     """Find gains, then run fresh rows with those of before and after."""
     prepared = prepare(_experiment(asked, ground.setup))
@@ -354,7 +350,7 @@ GAIN_TUNING = Kind(
     check=_check,
     runs=_runs,
     ends_early=True,
-    largest=_largest,
+    largest=lambda asked, quantities: max(2 * asked.runs, int(asked.budget), asked.samples),
     experiment=_experiment,
     measured=_measured,
     items=_items,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...robustness.search.worst_case import worst_case
 from ..file.asked import Varied
 from ..file.field_types import Flag, Number, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, finding_of
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_text, status_text
@@ -92,18 +92,6 @@ def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> di
         return {"answer": "refuted"}
     needs = "integrators that agree about the lowest margin"
     return {"answer": "not shown yet", "needs": needs}
-
-
-def _runs(asked: AskedWorstCase, setup: Setup) -> int:
-    return asked.runs
-
-
-def _largest(asked: AskedWorstCase, quantities: int) -> int:
-    return asked.runs
-
-
-def _witness(finding: Finding) -> tuple[Mapping[str, Any], float]:
-    return finding.numbers["witness"], finding.numbers["margin"]
 
 
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
@@ -178,10 +166,10 @@ WORST_CASE = Kind(
     ),
     sources=(HANSEN, AUGER, ZELLER),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: asked.runs,
     ends_early=True,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.runs,
     measured=_measured,
     items=_items,
-    witness=_witness,
+    witness=lambda finding: (finding.numbers["witness"], finding.numbers["margin"]),
 )
