@@ -30,7 +30,7 @@ from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 from .typography import plain_text
 
 RARE = ("ids", "links")
-DRAWN = ("figure", "time", "signals")  # curves are on the page only
+DRAWN = ("figure", "time", "signals", "bands")  # curves are on the page only
 _TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",

@@ -181,7 +181,7 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
         key=f"{key}-history",
         caption=f"The nominal run and the worst one that is known (margin {worst}).",
         description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
-        "figure above shows the same runs, the slider below reads their values.",
+        "figure above shows the same runs, the slider below shows their values.",
         time=kept.time,
         signals=both,
         shown=list(both)[: len(runs)],

@@ -108,7 +108,7 @@ def _interactive(number: int, run: CaseRun) -> History:
         caption=f"{text.TITLES[number]}: output y, reference yd, tracking error e, control input "
         "u, output of the actuator v, argument of the Nussbaum gain zeta.",
         description=f"Chart of {', '.join(names)} over {HORIZON:g} s; the figures above show the "
-        "same signals, the slider below reads their values.",
+        "same signals, the slider below shows their values.",
         time=run.time,
         signals={name: run.signals[name] for name in names},
         shown=("y", "yd", "e", "zeta"),
