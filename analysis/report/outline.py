@@ -41,19 +41,19 @@ LIGHTS = {
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them
-    "holds": "what was measured is within the limit",
-    "proved": "for everything that the claim speaks of, by rigorous computation",
+    "holds": "the result is within the limit",
+    "proved": "for all cases of the claim, by rigorous computation",
     "computed": "in closed form",
-    "checked": "at every sample of one simulated run, which proves nothing of others",
+    "checked": "at every sample of one simulated run, which proves nothing about others",
     "sampled": "found by simulated runs, at most with a stated confidence, which is not proof",
     "shown": "by simulated runs, at most with a stated confidence, which is not proof",
     "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
     "is wrong, and nothing of this report failed",
-    "not shown yet": "what was run neither shows nor refutes it",
-    "undecided": "what was run does not decide it",
+    "not shown yet": "the runs neither show nor refute it",
+    "undecided": "the runs do not decide it",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
-    "fails": "what was measured is beyond the limit",
+    "fails": "the result is beyond the limit",
 }
 ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
