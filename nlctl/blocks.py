@@ -258,10 +258,11 @@ class Block(OwnParameters):
 
         Without any it is the record itself, which was checked when it was made.
         """
-        spec, overrides = self.spec, self._own(params)
-        changed = any(v is not getattr(spec, k, overrides) for k, v in overrides.items())
-        if changed or not is_checked(spec):
-            spec = with_overrides(spec, overrides, self.name)
+        spec, values = self.spec, self._own(params)
+        if not is_checked(spec) or any(
+            v is not getattr(spec, k, values) for k, v in values.items()
+        ):
+            spec = with_overrides(spec, values, self.name)
         for kind in ("inputs", "outputs", "states"):
             had, has = getattr(self, f"n{kind}"), len(getattr(spec, kind))
             if had != has:
