@@ -258,11 +258,9 @@ class Block(OwnParameters):
 
         Without any it is the record itself, which was checked when it was made.
         """
-        spec, values = self.spec, self._own(params)
-        if not is_checked(spec) or any(
-            v is not getattr(spec, k, values) for k, v in values.items()
-        ):
-            spec = with_overrides(spec, values, self.name)
+        spec, given = self.spec, self._own(params)
+        if not is_checked(spec) or any(v is not getattr(spec, k, given) for k, v in given.items()):
+            spec = with_overrides(spec, given, self.name)
         for kind in ("inputs", "outputs", "states"):
             had, has = getattr(self, f"n{kind}"), len(getattr(spec, kind))
             if had != has:
