@@ -131,7 +131,7 @@ def ledger_summary(ledger: Ledger) -> str:
         f"violated: {corrected or 'none of the corrected statements'}",
     ]
     lines += [f"undecided: {open_}"] if open_ else []
-    lines += [f"false as the paper has it: {paper}"] if paper else []
+    lines += [f"false as printed: {paper}"] if paper else []
     return "\n".join(lines)
 
 

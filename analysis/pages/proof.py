@@ -25,7 +25,7 @@ CHECKED = (
 VIOLATED = (
     "Violated: statements of the proof in their corrected form that do not hold along this run."
 )
-FAILING = "False as the paper has it: statements as printed, or as the paper uses them."
+FAILING = "False as printed, or as the paper uses it."
 LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 _GROUPS = (  # of the ledger's lines, each a table of its own
     (("violated",), "corrected", VIOLATED),
@@ -49,7 +49,7 @@ def ledger_text(ledger: Ledger) -> str:
     count = Counter(line.status for line in ledger.lines)
     counts = ", ".join(f"{number} {status}" for status, number in count.items())
     return (
-        f"Corrected statements violated: {corrected or 'none'}. False as the paper has them: "
+        f"Corrected statements violated: {corrected or 'none'}. False as printed: "
         f"{paper or 'none'}. One run over {ledger.horizon:g} s; of {len(ledger.lines)} lines "
         f"{counts}. The constants hold on the box {formulas(str(ledger.constants.box))}."
     )

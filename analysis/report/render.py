@@ -32,10 +32,10 @@ from .typography import plain_text
 RARE = ("ids", "links")
 DRAWN = ("figure", "time", "signals", "bands")  # curves are on the page only
 _TITLES = {
-    "methods": "How it was found",
+    "methods": "Methods",
     "limits": "Limits of validity",
     "references": "References",
-    "provenance": "How to make this report again",
+    "provenance": "Reproducing this report",
 }
 
 

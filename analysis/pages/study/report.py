@@ -95,9 +95,7 @@ def study_sections(
 ) -> list[Section]:
     """Compose the sections of a study."""
     table = None if result.rows is None or not result.rows.done else result.rows.table
-    asked = [
-        Section(key="study_asked", title="What was asked", items=[*setup_items(result, published)])
-    ]
+    asked = [Section(key="study_asked", title="Setup", items=[*setup_items(result, published)])]
     asked += traceability(result, prefix)
     if published is not None and published.items:
         items = [*published.items]
@@ -111,7 +109,7 @@ def study_sections(
     if table is not None:
         key = "study_rows"  # no analysis is called that: keys of these have hyphens only
         rows = [*row_items(result, table, f"{prefix}{key}")]
-        asked.append(Section(key=key, title="How the runs ended", items=rows))
+        asked.append(Section(key=key, title="Outcomes of the runs", items=rows))
         asked += [
             _section(f, result, without_assumptions(f.sentence), prefix)
             for f in _statements(result)
@@ -205,7 +203,7 @@ def _brief(
     setup = [*setup_items(result, published)]
     if result.rows is not None and result.rows.done:
         setup += margin_items(result, result.rows.table, key)
-    title = "What was asked, and of which runs"
+    title = "Setup, and outcomes of the runs"
     yield Section(key=f"{key}-asked", title=title, items=setup, level=4, folded=True)
     for section in _assumed(result):
         yield replace(section, key=f"{key}-assumed", level=4, folded=True)

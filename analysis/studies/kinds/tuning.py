@@ -315,7 +315,7 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
 
 def _requirements_table(requirements: pd.DataFrame) -> Table:
     return Table(
-        caption="What was asked, on the samples that gains were found on: least margins, and the "
+        caption="Margins and cost on the samples that gains were found on: least margins, and the "
         "mean of a metric.",
         columns=("number", "before", "after"),
         rows=[(name, margin_text(row["before"]), margin_text(row["after"]))
