@@ -174,7 +174,7 @@ def _with_live(section: Section, item: Live) -> Section:
     if section.key != "run":
         return section
     items = [*section.items]
-    place = next(i for i, each in enumerate(items) if isinstance(each, Figure))
+    place = next(i for i, item_of_run in enumerate(items) if isinstance(item_of_run, Figure))
     return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
 
 

@@ -19,11 +19,8 @@ from nlctl.responses.time_response import as_response
 
 from ..report.document import Live
 from ..robustness.stl.formula import Always, And, Band, Eventually, Formula, Not
-from ..robustness.stl.limits import limits_of_requirements
-from ..robustness.stl.spec import Requirement
+from ..robustness.stl.spec import Requirement, limits_of_requirements
 from .study.histories import Histories
-
-__all__ = ["live_item", "live_numbers", "live_program"]
 
 _NODES = 240  # stretches of time of a band
 _LARGEST = 1e300  # instead of infinity, which JSON has not
@@ -95,7 +92,7 @@ def live_item(
 
 
 def live_numbers(program: WebProgram) -> dict[str, Any]:
-    """Return what ``report.json`` has of a page's run as it stands: the same numbers."""
+    """Return what ``report.json`` has of a page's reported run: the same numbers."""
     lane = program.run.lanes[0]
     ends = {
         name: [float(y.min()), float(y.max()), float(y[-1])] for name, y in program.signals.items()

@@ -77,7 +77,8 @@ def texts():
         for p in (ROOT / package).rglob("*.py")
     ]
     places += (ROOT / "analysis").rglob("*.html")
-    places += [p for p in (ROOT / "docs").rglob("*") if p.suffix in (".md", ".py", ".rst")]
+    pages = [p for p in (ROOT / "docs").rglob("*") if p.suffix in (".md", ".py", ".rst")]
+    places += [p for p in pages if "auto" not in p.parts]  # what Sphinx makes of scripts
     names = ("README", "ARCHITECTURE", "AGENTS", "RELEASING", "SECURITY")
     places += [ROOT / f"{name}.md" for name in names]  # CONTRIBUTING.md lists bad words
     for path in sorted(places):

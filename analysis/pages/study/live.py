@@ -19,8 +19,6 @@ from ..live import live_item, live_numbers, live_program
 from .histories import Histories
 from .loop import loop_of
 
-__all__ = ["with_study_live"]
-
 
 def with_study_live(
     report: Report,
@@ -39,8 +37,8 @@ def with_study_live(
     diagram: Any = loop_of(prepared).diagram
     row: pd.DataFrame = as_table(space, [nominal(space)])
     given = {
-        what: {name: values[0] for name, values in each.items()}
-        for what, each in arguments(space, row).items()
+        what: {name: values[0] for name, values in value.items()}
+        for what, value in arguments(space, row).items()
     }
     response = input_output_response(
         diagram, experiment.timepts, experiment.inputs, given["initial_state"],

@@ -19,7 +19,7 @@ from ...native.diagram.parameters import Slot
 _MOST = 8  # handles, where the author names none
 _OF_STATES = 2
 _FAULT = ("onset", "duration")  # what the record of every fault has
-_CLOSE = 8192 / 2  # switches of functions of time in a run that a page tells apart
+_CLOSE = 8192 / 2  # switches of functions of time in a run that a page distinguishes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,13 +36,13 @@ class Handle:
     place : int
         Where it stands among all of its kind.
     value, low, high : float
-        As it stands, and the ends of its slider.
+        As reported, and the ends of its slider.
     unit, meaning : str
     fault : str
         Name of the block of a fault whose onset it is: a switch, which sets the onset to the
         value, or to a time that no run reaches.
     is_on : bool
-        Whether that fault happens in the run as it stands.
+        Whether that fault happens in the reported run.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def handles(
         A name may have a range: ``"plant.a=0:3"``.  That of a fault's block stands for its onset
         and its value.
     p, x0 : ndarray
-        Parameters and initial states of the run as it stands.
+        Parameters and initial states of the reported run.
     u : ndarray of shape (inputs, m)
         Its inputs.
     span : tuple of 2 floats
@@ -142,13 +142,13 @@ class _Reader:
 
     def few(self) -> Iterator[Handle]:
         """Return faults, a few initial states, and the first number of each block."""
-        found: dict[Handle, None] = {}
+        moved: dict[Handle, None] = {}
         for name in (*self.faults, *list(self.states)[:_OF_STATES], *self._firsts()):
             with contextlib.suppress(UsageError):  # not one that a page can move
-                found |= dict.fromkeys(self.named(name))
-            if len(found) >= _MOST:
+                moved |= dict.fromkeys(self.named(name))
+            if len(moved) >= _MOST:
                 break
-        return iter(found)
+        return iter(moved)
 
     def _firsts(self) -> Iterator[str]:
         """Yield the first numbers of all blocks, then the second ones."""
@@ -243,9 +243,9 @@ class _Reader:
     ) -> None:
         """Refuse a number by which another one of the program moves, or that rules forbid."""
         clocks = {
-            each.offset
+            slot.offset
             for k in range(len(self.compiled.schedule.samplings))
-            for each in self.compiled.program.layout[len(self.compiled.schedule.nodes) + k].values()
+            for slot in self.compiled.program.layout[len(self.compiled.schedule.nodes) + k].values()
         }
         if place in clocks:
             raise ParameterError(

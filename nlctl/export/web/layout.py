@@ -21,8 +21,8 @@ _SIZES = {"ptr": 8, "i64": 8, "double": 8, "i8": 1, "i1": 1}
 
 def laid_out_as_here(text: str) -> str:
     """Return IR whose records lie on the stack as on a machine of 64 bits."""
-    if found := _UNKNOWN.search(text):
-        raise CompileError(f"the integrators' IR has what no page can hold: {found[0]}")
+    if unknown_record := _UNKNOWN.search(text):
+        raise CompileError(f"the integrators' IR has what no page can hold: {unknown_record[0]}")
     text = _ALLOCA.sub(lambda m: _ADDRESS.sub("i64", m[0]), text)
     count = iter(range(len(text)))
     return _STORE.sub(lambda m: _parts_stored(m[1], m[2], m[3], next(count)), text)

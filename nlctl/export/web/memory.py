@@ -81,7 +81,7 @@ def _entries(path: str, record: Any, symbols: Mapping[int, str]) -> Iterator[tup
             yield "address", symbols[data_address(value)]
         else:
             yield "number", int(row[0])
-        yield from (("number", int(each)) for each in row[1:])
+        yield from (("number", int(code)) for code in row[1:])
 
 
 def _table(path: str, entries: list[tuple[str, Any]]) -> str:

@@ -62,7 +62,7 @@ class WebProgram:
     run : Run
         The same run in this process, from the same memory; it has ended.
     p, x0, u : ndarray
-        Parameters, initial states, and the inputs' samples of the run as it stands.
+        Parameters, initial states, and the inputs' samples of the reported run.
     digest : str
         A key of the program and its numbers.
 
@@ -203,9 +203,9 @@ def _laid_out(
         compiled, times, u, start[:, None], p[:, None], settings, variations(compiled, times)
     )
     task, work = run.task, run.work
-    found = compiled.lowered.conditions
+    conditions = compiled.lowered.conditions
     timed = task.timed
-    if found.of_time:
+    if conditions.of_time:
         jumps = np.full((1, _BREAKS), np.inf)
         jumps[0, : timed.jumps.shape[1]] = timed.jumps[0, :_BREAKS]
         timed = with_fields(timed, jumps=jumps)
@@ -237,14 +237,14 @@ def _host(run: Run, p: np.ndarray, timed: TimedProgram) -> str:
         for name in ("rhs", "out", *samples, *(["reset"] if run.machine.resets else []))
     ]
     rooms = {"live.t": 1, "live.c": timed.rows, "live.s": timed.size}
-    own = [
+    defined = [
         f"@{name} = global [{rows} x double] zeroinitializer, align 64"
         for name, rows in rooms.items()
     ]
     values = ", ".join(f"i64 {v}" for v in p.view(np.int64).tolist()) or "i64 0"
-    own.append(f"@live.p = global [{max(p.size, 1)} x i64] [{values}], align 64")
+    defined.append(f"@live.p = global [{max(p.size, 1)} x i64] [{values}], align 64")
     memory = memory_text({"task": run.task, "work": run.work}, functions, filled)
-    return "\n".join([HOST, *declared, *own, memory])
+    return "\n".join([HOST, *declared, *defined, memory])
 
 
 def _read_of(text: str) -> list[str]:
@@ -277,7 +277,7 @@ def _facts(
 
 
 def _check_end(run: Run, what: str) -> None:
-    """Refuse a loop whose run as it stands does not reach its last time."""
+    """Refuse a loop whose run does not reach its last time."""
     status = int(run.lanes["status"][0])
     if status != Status.OK:
         reason = Status(status).name.lower() if status >= 0 else "too many events"

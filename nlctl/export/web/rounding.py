@@ -19,11 +19,11 @@ def rounding_alike(text: str) -> str:
     """Return the IR of a program, with every product and every sum rounded."""
     text = text.replace("preserve_allcc ", "")  # x86 alone has it
     text = re.sub(r"\bcontract ", "", text)
-    found = [match.groups() for match in _FUSED.finditer(text)]
+    fused = [match.groups() for match in _FUSED.finditer(text)]
     text = _FUSED.sub("", text)
-    for _, name, suffix in found:
+    for _, name, suffix in fused:
         text = text.replace(f"@llvm.{name}.{suffix}(", f"@page.{name}.{suffix}(")
-    return text + "".join(_written(*each) for each in found)
+    return text + "".join(_written(*operands) for operands in fused)
 
 
 def _written(kind: str, name: str, suffix: str) -> str:

@@ -44,9 +44,9 @@ class TimedProgram:
     size: int
 
 
-def timed_program(found: Equations, layout: Any) -> TimedProgram:
+def timed_program(equations: Equations, layout: Any) -> TimedProgram:
     """Return what a diagram has of functions of time alone."""
-    conditions, graph = found.conditions, found.graph
+    conditions, graph = equations.conditions, equations.graph
     stores: list[Store] = []
 
     def stored(expr: Expr) -> tuple[int, int]:
@@ -55,11 +55,13 @@ def timed_program(found: Equations, layout: Any) -> TimedProgram:
         stores.extend(split(Store(array="s", row=begin, expr=graph.number(expr), size=size)))
         return begin, begin + size
 
-    levels = max((stored(_level(graph, each))[1] for each in conditions.of_time), default=0)
+    levels = max(
+        (stored(_level(graph, condition))[1] for condition in conditions.of_time), default=0
+    )
     waves = tuple(tuple(stored(slope) for slope in wave) for wave in conditions.waves)
     pulses = tuple(stored(term) for term in conditions.pulses)
-    wanted, exact, _ = rewritten(graph, {"timed": stores})
-    functions, rows = planned(wanted, {"timed": SAMPLE}, length(layout))
+    values, exact, _ = rewritten(graph, {"timed": stores})
+    functions, rows = planned(values, {"timed": SAMPLE}, length(layout))
     named = {"timed.prepare": functions["prepare"], "timed": functions["timed"]}
     return TimedProgram(
         text=program_text(named, 1, exact), rows=max(rows, 1), levels=levels, waves=waves,
