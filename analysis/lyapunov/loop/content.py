@@ -18,7 +18,7 @@ from nlctl.diagrams import places
 
 from ...loop_record import facts_and_unseen, text_key, value_text
 
-__all__ = ["LoopContent", "Remembered", "loop_content"]
+__all__ = ["UNKNOWN", "LoopContent", "Remembered", "loop_content"]
 
 _MOST = 1024  # checks that are remembered
 _RECORDS = ("spec", "current_spec")
@@ -33,6 +33,11 @@ class LoopContent:
     # of all that python-control computes of it with the parameters of the run; empty where no
     # key sees everything
     key: str
+    # of its functions, and of what kinds of values they get; empty where `key` is
+    functions: str = ""
+
+
+UNKNOWN = LoopContent(facts={}, key="")
 
 
 class Remembered:
@@ -59,7 +64,12 @@ def loop_content(
     facts, unseen = facts_and_unseen(loop)
     is_seen = not unseen and all(_is_plain(place.system) for place in places(loop))
     values = {name: value_text(value) for name, value in (params or {}).items()}
-    return LoopContent(facts=facts, key=text_key(repr((facts, values))) if is_seen else "")
+    if not is_seen:
+        return LoopContent(facts=facts, key="")
+    kinds = {n: v if type((params or {})[n]) is not float else "float" for n, v in values.items()}
+    return LoopContent(
+        facts=facts, key=text_key(repr((facts, values))), functions=text_key(repr((facts, kinds)))
+    )
 
 
 def _is_plain(system: Any) -> bool:
