@@ -9,7 +9,16 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ConeLimit", "at_least", "at_most", "minimizer", "symmetric_basis", "upper_triangle"]
+__all__ = [
+    "ConeLimit",
+    "at_least",
+    "at_most",
+    "equal",
+    "minimizer",
+    "semidefinite",
+    "symmetric_basis",
+    "upper_triangle",
+]
 
 _SOLVED = ("Solved", "AlmostSolved")
 
@@ -34,13 +43,29 @@ def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
     return ConeLimit(A, b, partial(_nonnegative, len(b)))
 
 
+def equal(A: np.ndarray, b: np.ndarray) -> ConeLimit:
+    """Return A x = b, row by row.
+
+    Shapes: `A` (k, n), `b` (k,).
+    """
+    return ConeLimit(A, b, partial(_zero, len(b)))
+
+
+def semidefinite(A: np.ndarray, b: np.ndarray, size: int) -> ConeLimit:
+    """Return that b - A x, a matrix as a vector with its norm, has no negative eigenvalue.
+
+    Shapes: `A` (m (m + 1)/2, n), `b` (m (m + 1)/2,), for m = `size`.
+    """
+    return ConeLimit(A, b, partial(_semidefinite, size))
+
+
 def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
     """Return sum x_i M_i >= low, of symmetric matrices.
 
     Shapes: `parts` n of (m, m), `low` (m, m).
     """
     A = np.column_stack([-upper_triangle(part) for part in parts])
-    return ConeLimit(A, -upper_triangle(low), partial(_semidefinite, len(low)))
+    return semidefinite(A, -upper_triangle(low), len(low))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:
@@ -82,6 +107,10 @@ def minimizer(
     solution = clarabel.DefaultSolver(upper, q, A, b, cones, settings).solve()
     status = str(solution.status)
     return (np.array(solution.x) if status in _SOLVED else None), status
+
+
+def _zero(size: int, clarabel: Any) -> Any:
+    return clarabel.ZeroConeT(size)
 
 
 def _nonnegative(size: int, clarabel: Any) -> Any:
