@@ -57,6 +57,63 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
 
 
+def of_triangle(
+    graph: Graph,
+    a: Any,
+    b: Any,
+    trans: Any = 0,
+    lower: Any = False,
+    unit_diagonal: Any = False,
+    overwrite_b: object = False,
+    check_finite: object = True,
+) -> Tracer:
+    """Return the solution of equations with a triangular matrix, as SciPy's `solve_triangular`."""
+    matrix, right = traced(graph, a), traced(graph, b)
+    if trans not in (0, 1, "N", "T"):
+        raise Untraceable("a matrix that is transposed and conjugated")
+    if trans in (1, "T"):
+        matrix, lower = matrix.T, not lower
+    rows, n = _square(graph, matrix), len(matrix)
+    places = [*range(n)][:: -1 if lower else 1]
+    columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
+    for i in range(n if unit_diagonal else 0):
+        rows[i][i] = traced(graph, 1.0)
+    _guard(graph, [rows[i][i] for i in range(n)])
+    found = substituted([[*(rows[i][j] for j in places), *columns[i]] for i in places])
+    x = [found[places[i]] for i in range(n)]
+    return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+
+
+def of_cholesky(
+    graph: Graph, c_and_lower: Any, b: Any, overwrite_b: object = False, check_finite: object = True
+) -> Tracer:
+    """Return the solution of equations from the factor of `cho_factor`."""
+    c, lower = c_and_lower
+    first = of_triangle(graph, c, b, trans=0 if lower else 1, lower=lower)
+    return of_triangle(graph, c, first, trans=1 if lower else 0, lower=lower)
+
+
+def of_triangles(
+    graph: Graph,
+    lu_and_piv: Any,
+    b: Any,
+    trans: Any = 0,
+    overwrite_b: object = False,
+    check_finite: object = True,
+) -> Tracer:
+    """Return the solution of equations from the factors of `lu_factor`."""
+    lu, pivots = lu_and_piv
+    exchanges = constant_value(traced(graph, pivots))
+    if trans != 0 or not isinstance(exchanges, np.ndarray):
+        raise Untraceable("factors that are transposed, or whose exchanges depend on the state")
+    order = [*range(len(exchanges))]
+    for i, j in enumerate(map(int, exchanges)):
+        order[i], order[j] = order[j], order[i]
+    right = traced(graph, b)[order]
+    first = of_triangle(graph, lu, right, lower=True, unit_diagonal=True)
+    return of_triangle(graph, lu, first)
+
+
 @of(np.linalg.solve)
 def _solve(graph: Graph, a: Any, b: Any) -> Tracer:
     """Return the solution of linear equations."""

@@ -12,6 +12,7 @@ from ..arrays import Tracer, concatenated, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
+from .linear_algebra import of_cholesky, of_triangle, of_triangles
 from .reductions import norm_of, prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, of
@@ -28,6 +29,9 @@ def enter_scipy() -> None:
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
+    for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
+        enter([getattr(linalg, name)], solution)
+    enter([linalg.solve_triangular], of_triangle)
     for name, formula_of in _FORMULAS.items():
         enter([getattr(special, name)], _with_facade(formula_of))
     for name in ("erf", "erfc"):
@@ -120,8 +124,27 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
+def ndtr(np: Facade, x: Any) -> Any:
+    """The distribution function of the normal distribution."""
+    return 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x)
+
+
+def huber(np: Facade, delta: Any, r: Any) -> Any:
+    """r^2 / 2 up to |r| = delta, linear beyond."""
+    size = np.abs(r)
+    near = np.where(size <= delta, 0.5 * r * r, delta * (size - 0.5 * delta))
+    return np.where(delta < 0.0, math.inf, near)
+
+
+def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
+    """As huber, and smooth."""
+    share = r / np.where(delta == 0.0, 1.0, delta)
+    found = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
+    return np.where(delta < 0.0, math.inf, found)
+
+
 _FORMULAS = {
-    "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy, "xlog1py": xlog1py,
+    "ndtr": ndtr, "huber": huber, "pseudo_huber": pseudo_huber, "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy, "xlog1py": xlog1py,
     "softmax": softmax, "logsumexp": logsumexp,
 }  # fmt: skip
 
