@@ -103,7 +103,7 @@ def of_triangles(
 ) -> Tracer:
     """Return the solution of equations from the factors of `lu_factor`."""
     lu, pivots = lu_and_piv
-    exchanges = constant_value(traced(graph, pivots))
+    exchanges = pivots if isinstance(pivots, np.ndarray) else constant_value(traced(graph, pivots))
     if trans != 0 or not isinstance(exchanges, np.ndarray):
         raise Untraceable("factors that are transposed, or whose exchanges depend on the state")
     order = [*range(len(exchanges))]

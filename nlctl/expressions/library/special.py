@@ -124,6 +124,11 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
+def exp10(np: Facade, x: Any) -> Any:
+    """10^x."""
+    return np.power(10.0, x)
+
+
 def ndtr(np: Facade, x: Any) -> Any:
     """The distribution function of the normal distribution."""
     return 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x)
@@ -144,7 +149,9 @@ def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
 
 
 _FORMULAS = {
-    "ndtr": ndtr, "huber": huber, "pseudo_huber": pseudo_huber, "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy, "xlog1py": xlog1py,
+    "exp10": exp10, "ndtr": ndtr, "huber": huber, "pseudo_huber": pseudo_huber,
+    "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy,
+    "xlog1py": xlog1py,
     "softmax": softmax, "logsumexp": logsumexp,
 }  # fmt: skip
 

@@ -318,6 +318,7 @@ def _functions_in(given: list[KnownValue]) -> Any:
     parts = [element(v) for v in given]
     kinds = OneOf | Instance | Bound | Local | FunctionType
     found = [v for v in parts if isinstance(v.known, kinds)]
+    found = [v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in found]
     return ListOf(tuple(found)) if found else UNKNOWN_VALUE
 
 
