@@ -93,7 +93,7 @@ def _comparisons(content: LoopContent, points: list[_Point]) -> list[str]:
 def _step(given: Any, understood: Any, comparisons: list[str], count: int) -> int:
     """Return the step from a point that is still to be compared to the next."""
     if comparisons[0] in _AGREED:
-        return count
+        return max(count, 1)
     return _COUNT if comparisons[1] in _AGREED and _has_same_blocks(given, understood) else 1
 
 
