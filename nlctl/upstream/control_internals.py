@@ -88,16 +88,16 @@ def _signals_now(
     python-control's first pass has inputs of 0, and it multiplies every output by every element of
     its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls a loop.
     """
-    found = _settled_signals(system, t, x, u)
-    if found is not None:
-        return found
+    signals = _settled_signals(system, t, x, u)
+    if signals is not None:
+        return signals
     try:
         return system._compute_static_io(t, x, u)
     except RuntimeError:
-        found = _signals_by_passes(system, t, x, u)
-        if found is None:
+        signals = _signals_by_passes(system, t, x, u)
+        if signals is None:
             raise
-        return found
+        return signals
 
 
 def _settled_signals(
@@ -112,13 +112,13 @@ def _settled_signals(
     count, outputs = system.connect_map.shape[1], np.zeros(sum(system.connect_map.shape))
     before: list[bytes | None] = [None] * len(places)
     for _ in range(len(places) + 1):
-        for i, (part, states, given, own) in enumerate(places):
+        for i, (part, states, given, places_of_outputs) in enumerate(places):
             asked = inputs[given].tobytes()
             if asked != before[i]:
                 answer = _settled_outputs(part, t, x[states], inputs[given])
                 if answer is None:
                     return None
-                outputs[own], before[i] = answer, asked
+                outputs[places_of_outputs], before[i] = answer, asked
         now = system.connect_map @ outputs[:count] + outside
         if (inputs == now).all():
             outputs[count:] = inputs
@@ -130,8 +130,8 @@ def _settled_signals(
 def _settled_outputs(part: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray | None:
     if not _is_plain_diagram(part):
         return part._out(t, x, u).reshape(-1)
-    found = _settled_signals(part, t, x, u)
-    return None if found is None else part.output_map @ found[1]
+    signals = _settled_signals(part, t, x, u)
+    return None if signals is None else part.output_map @ signals[1]
 
 
 def _places_of_parts(system: Any) -> Iterator[tuple[Any, slice, slice, slice]]:

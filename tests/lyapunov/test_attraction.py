@@ -10,7 +10,7 @@ from scipy.linalg import solve_continuous_lyapunov
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
 from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
-from nlctl.analysis.lyapunov.attraction.squares import Condition, positive_where
+from nlctl.analysis.lyapunov.attraction.squares import PositiveCondition, positive_where
 from nlctl.errors import ParameterError
 
 KHALIL = [[1.5, -0.5], [-0.5, 1.0]]
@@ -269,7 +269,7 @@ def test_sums_of_squares_prove_what_is_positive_alone(c):
         "Motzkin": x**4 * y**2 + x**2 * y**4 - 3 * x**2 * y**2 + 1 + fmpq(*c.as_integer_ratio()),
     }
     for name, p in ways.items():
-        found, _ = positive_where([Condition(parts=[p])], 1)
+        found, _ = positive_where([PositiveCondition(parts=[p])], 1)
         assert (found is not None and found[0] > 0) == (name == "square" and c > 0)
 
 

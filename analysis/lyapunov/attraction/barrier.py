@@ -253,10 +253,10 @@ def barrier(
     whole = not np.isfinite(box.cell).any()
     motion = motion_of("barrier", system, box, params, is_finite=not whole)
     find = safe_everywhere if whole else _in_the_box
-    found = find(motion, box, start, unsafe, degree, max_boxes)
+    polynomial = find(motion, box, start, unsafe, degree, max_boxes)
     return Barrier(
-        names=motion.names, box=box, holds=not found["reason"],
-        seconds=time.perf_counter() - begun, **found,
+        names=motion.names, box=box, holds=not polynomial["reason"],
+        seconds=time.perf_counter() - begun, **polynomial,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from nlctl.native.enclosures.boxes import expressions_of
 
 from ...intervals.box import Box
 from .motion import StateRates
-from .squares import Condition, monomial_terms, polynomials_of, positive_where
+from .squares import PositiveCondition, monomial_terms, polynomials_of, positive_where
 
 __all__ = ["inequality_of", "safe_everywhere"]
 
@@ -23,10 +23,10 @@ _DECAYS = ((1, 1), (1, 3), (3, 1), (1, 10), (10, 1))  # k of B' + k B < 0
 
 def inequality_of(function: Callable[[Any], Any], sides: int) -> Expr:
     """Return the expression of a set, which is where it is not negative."""
-    found = expressions_of(function, sides)[1]
-    if len(found) != 1:
-        raise Untraceable(f"one number has to be >= 0 in a set, not {len(found)}")
-    return found[0]
+    numbers = expressions_of(function, sides)[1]
+    if len(numbers) != 1:
+        raise Untraceable(f"one number has to be >= 0 in a set, not {len(numbers)}")
+    return numbers[0]
 
 
 def safe_everywhere(
@@ -45,15 +45,15 @@ def safe_everywhere(
     terms = monomial_terms(len(rates), degree)
     parts = [ring.from_dict({term: 1}) for term in terms]
     along = [sum((p.derivative(i) * f for i, f in enumerate(rates)), p * 0) for p in parts]
-    apart = [Condition(parts=[-p for p in parts], where=begins)]
-    apart += [Condition(parts=parts, where=where) for where in bad]
-    found, reason = None, ""
+    apart = [PositiveCondition(parts=[-p for p in parts], where=begins)]
+    apart += [PositiveCondition(parts=parts, where=where) for where in bad]
+    coefficients, reason = None, ""
     for k in _DECAYS:
         falls = [-slope - fmpq(*k) * p for p, slope in zip(parts, along, strict=True)]
-        found, reason = positive_where([*apart, Condition(parts=falls)], len(parts))
-        if found is not None:
+        coefficients, reason = positive_where([*apart, PositiveCondition(parts=falls)], len(parts))
+        if coefficients is not None:
             break
-    numbers = [float(c.p) / float(c.q) for c in found or [fmpq(0)] * len(parts)]
+    numbers = [float(c.p) / float(c.q) for c in coefficients or [fmpq(0)] * len(parts)]
     return {
         "middle": np.zeros(len(rates)), "half": np.ones(len(rates)), "terms": tuple(terms),
         "coefficients": np.array(numbers), "reason": reason and f"{reason}: raise degree",

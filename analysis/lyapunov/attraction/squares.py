@@ -9,6 +9,7 @@ the equation is put into Q, and Q is positive definite if its leading minors are
 from __future__ import annotations
 
 import itertools
+import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,9 +23,10 @@ from nlctl.native.enclosures.scalars import scalar_expressions
 
 from ..convex import ConeLimit, at_most, equal, minimizer, semidefinite
 
-__all__ = ["Condition", "Term", "monomial_terms", "polynomials_of", "positive_where"]
+__all__ = ["PositiveCondition", "Term", "monomial_terms", "polynomials_of", "positive_where"]
 
 Term = tuple[int, ...]
+_SUMS = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
 _PARTS = 1 << 20  # of 1, to which numbers are rounded
 _ENOUGH = 1e-7  # least eigenvalue of a proposal
 
@@ -38,27 +40,26 @@ def monomial_terms(variables: int, degree: int) -> list[Term]:
 def polynomials_of(results: Sequence[Expr], ring: fmpq_mpoly_ctx) -> list[fmpq_mpoly]:
     """Return expressions of the leaves ``x[0], x[1], ...`` as polynomials of a ring's variables."""
     _, results = scalar_expressions(results)
-    made: dict[Expr, fmpq_mpoly] = {}
+    polynomials: dict[Expr, fmpq_mpoly] = {}
     for node in needed(results):
-        parts = [made[arg] for arg in node.args]
-        if node.op == "const":
-            made[node] = ring.constant(fmpq(*float(node.data).as_integer_ratio()))
+        parts = [polynomials[arg] for arg in node.args]
+        if node.op == "const" and np.isfinite(node.data):
+            polynomials[node] = ring.constant(fmpq(*float(node.data).as_integer_ratio()))
         elif node.op == "leaf":
-            made[node] = ring.gen(node.data[1])
+            polynomials[node] = ring.gen(node.data[1])
         elif node.op == "neg":
-            made[node] = -parts[0]
-        elif node.op in ("add", "sub", "mul"):
-            a, b = parts
-            made[node] = {"add": a + b, "sub": a - b, "mul": a * b}[node.op]
+            polynomials[node] = -parts[0]
+        elif node.op in _SUMS:
+            polynomials[node] = _SUMS[node.op](*parts)
         elif node.op == "div" and parts[1].is_constant() and parts[1] != 0:
-            made[node] = parts[0] / parts[1].leading_coefficient()
+            polynomials[node] = parts[0] / parts[1].leading_coefficient()
         else:
             raise Untraceable(f"'{node.op}' is in no polynomial")
-    return [made[result] for result in results]
+    return [polynomials[result] for result in results]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Condition:
+class PositiveCondition:
     """A polynomial sum c_i p_i that is to be positive wherever others are not negative.
 
     The c_i are unknown.
@@ -100,19 +101,19 @@ class _Program:
     size: int
     grams: list[list[_Gram]] = field(default_factory=list)
 
-    def add(self, condition: Condition) -> None:
+    def add(self, condition: PositiveCondition) -> None:
         """Take up the squares of a condition; the last one of them stands alone."""
         ring, n = condition.parts[0].context(), condition.parts[0].context().nvars()
-        found = []
+        grams = []
         for g in condition.where:
             half = (condition.degree - int(g.total_degree())) // 2
             if half >= 0:
-                found.append(self._gram(monomial_terms(n, half), g))
-        products = (gram.product(k) for gram in found for k in range(len(gram.pairs)))
+                grams.append(self._gram(monomial_terms(n, half), g))
+        products = (gram.product(k) for gram in grams for k in range(len(gram.pairs)))
         support = {m for p in (*condition.parts, *products) for m in p.to_dict()}
         basis = _that_may_occur(monomial_terms(n, condition.degree // 2), support)
-        found.append(self._gram(basis, ring.constant(1)))
-        self.grams.append(found)
+        grams.append(self._gram(basis, ring.constant(1)))
+        self.grams.append(grams)
 
     def _gram(self, basis: list[Term], factor: fmpq_mpoly) -> _Gram:
         pairs = [*zip(*map(list, np.tril_indices(len(basis))), strict=True)]
@@ -122,13 +123,13 @@ class _Program:
 
 
 def positive_where(
-    conditions: Sequence[Condition], coefficients: int
+    conditions: Sequence[PositiveCondition], coefficients: int
 ) -> tuple[list[fmpq] | None, str]:
     """Return coefficients for which all conditions are proved to hold, or None and why not."""
     program = _Program(coefficients=coefficients, size=coefficients)
     for condition in conditions:
         program.add(condition)
-    if any(not found[-1].basis or any(found[-1].basis[0]) for found in program.grams):
+    if any(not grams[-1].basis or any(grams[-1].basis[0]) for grams in program.grams):
         return None, "no square has the constant that is needed"
     limits = [_bounded(program)]
     for condition, grams in zip(conditions, program.grams, strict=True):
@@ -139,11 +140,11 @@ def positive_where(
     x, status = minimizer(np.zeros((len(towards), len(towards))), towards, limits)
     if x is None or not x[-1] > _ENOUGH:
         return None, f"no sums of squares were found ({status})"
-    found = [fmpq(round(v * _PARTS), _PARTS) for v in x]
+    solution = [fmpq(round(v * _PARTS), _PARTS) for v in x]
     for condition, grams in zip(conditions, program.grams, strict=True):
-        if not _is_proved(condition, grams, found):
+        if not _is_proved(condition, grams, solution):
             return None, "rounded to fractions they are no sums of squares"
-    return found[:coefficients], ""
+    return solution[:coefficients], ""
 
 
 def _that_may_occur(basis: list[Term], support: Iterable[Term]) -> list[Term]:
@@ -168,7 +169,7 @@ def _bounded(program: _Program) -> ConeLimit:
     return at_most(A, np.ones(2 * n + 1))
 
 
-def _equation(program: _Program, condition: Condition, grams: Sequence[_Gram]) -> ConeLimit:
+def _equation(program: _Program, condition: PositiveCondition, grams: Sequence[_Gram]) -> ConeLimit:
     """Every coefficient of what is left of the condition without its squares is 0."""
     rows: dict[Term, int] = {}
     entries = [(i, part) for i, part in enumerate(condition.parts)]
@@ -195,27 +196,29 @@ def _definite(program: _Program, gram: _Gram) -> ConeLimit:
     return semidefinite(A, np.zeros(count), len(gram.basis))
 
 
-def _is_proved(condition: Condition, grams: Sequence[_Gram], found: Sequence[fmpq]) -> bool:
+def _is_proved(
+    condition: PositiveCondition, grams: Sequence[_Gram], solution: Sequence[fmpq]
+) -> bool:
     """Whether the equation holds with positive definite Q, the last of which takes what is left."""
     left = sum(
-        (c * p for c, p in zip(found, condition.parts, strict=False)), condition.parts[0] * 0
+        (c * p for c, p in zip(solution, condition.parts, strict=False)), condition.parts[0] * 0
     )
     for gram in grams:
         for k in range(len(gram.pairs)):
-            left += found[gram.first + k] * gram.product(k)
+            left += solution[gram.first + k] * gram.product(k)
     *others, last = grams
     places: dict[Term, list[int]] = {}
     for k, (i, j) in enumerate(last.pairs):
         term = tuple(a + b for a, b in zip(last.basis[i], last.basis[j], strict=True))
         places.setdefault(term, []).append(k)
-    numbers = [*found[last.first : last.first + len(last.pairs)]]
+    numbers = [*solution[last.first : last.first + len(last.pairs)]]
     for term, value in left.to_dict().items():
         if term not in places:
             return False
         k = places[term][0]
         numbers[k] += value / (1 if last.pairs[k][0] == last.pairs[k][1] else 2)
     return _is_definite(last, numbers) and all(
-        _is_definite(g, found[g.first : g.first + len(g.pairs)]) for g in others
+        _is_definite(g, solution[g.first : g.first + len(g.pairs)]) for g in others
     )
 
 

@@ -13,7 +13,7 @@ from nlctl.blocks import block
 from nlctl.diagrams import initial_state, interconnect, overridden, state_names
 
 from ..bounds.starts import Sides, Starts, read_starts
-from .content import UNKNOWN, LoopContent, loop_content
+from .content import UNREAD_CONTENT, LoopContent, loop_content
 from .external_inputs import bound_of_inputs
 from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
@@ -51,7 +51,7 @@ def read_checked(
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
     """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
-    content = UNKNOWN
+    content = UNREAD_CONTENT
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         content = loop_content(loop, params)
         loop = overridden(loop, params)

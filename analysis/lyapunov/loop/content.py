@@ -18,7 +18,7 @@ from nlctl.diagrams import places
 
 from ...loop_record import facts_and_unseen, text_key, value_text
 
-__all__ = ["UNKNOWN", "LoopContent", "Remembered", "loop_content"]
+__all__ = ["UNREAD_CONTENT", "LoopContent", "Remembered", "loop_content"]
 
 _MOST = 1024  # checks that are remembered
 _RECORDS = ("spec", "current_spec")
@@ -37,7 +37,7 @@ class LoopContent:
     functions: str = ""
 
 
-UNKNOWN = LoopContent(facts={}, key="")
+UNREAD_CONTENT = LoopContent(facts={}, key="")
 
 
 class Remembered:

@@ -22,7 +22,7 @@ from nlctl.diagrams.points import PointFunction, PointValues, agree, explained, 
 from nlctl.errors import DiagramError, UsageError
 
 from ...loop_record import array_text, text_key
-from .content import UNKNOWN, LoopContent, Remembered
+from .content import UNREAD_CONTENT, LoopContent, Remembered
 
 __all__ = ["check_same", "points_around"]
 
@@ -53,7 +53,7 @@ def check_same(
     points: Iterable[_Point],
     params: Mapping[str, Any] | None = None,
     read_params: Mapping[str, Any] | None = None,
-    content: LoopContent = UNKNOWN,
+    content: LoopContent = UNREAD_CONTENT,
 ) -> None:
     """Compare a loop with the proof's reading of it, at points; `content` is of the loop."""
     points = list(points)

@@ -79,8 +79,8 @@ def of_triangle(
     for i in range(n if unit_diagonal else 0):
         rows[i][i] = traced(graph, 1.0)
     _guard(graph, [rows[i][i] for i in range(n)])
-    found = substituted([[*(rows[i][j] for j in places), *columns[i]] for i in places])
-    x = [found[places[i]] for i in range(n)]
+    solution = substituted([[*(rows[i][j] for j in places), *columns[i]] for i in places])
+    x = [solution[places[i]] for i in range(n)]
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
 
 

@@ -144,8 +144,8 @@ def huber(np: Facade, delta: Any, r: Any) -> Any:
 def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
     """As huber, and smooth."""
     share = r / np.where(delta == 0.0, 1.0, delta)
-    found = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
-    return np.where(delta < 0.0, math.inf, found)
+    smooth = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
+    return np.where(delta < 0.0, math.inf, smooth)
 
 
 _FORMULAS = {
