@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, traced
-from ..elimination import eliminated, substituted
+from ..elimination import eliminated, is_zero, substituted
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
 from .table import Facade, constant_value, of
@@ -16,7 +16,9 @@ from .table import Facade, constant_value, of
 __all__: list[str] = []
 
 _Rows = list[list[Any]]
-_LARGEST = 12  # rows of a matrix that depends on the state
+_LARGEST = 20  # rows of a matrix that depends on the state
+_SPARSE = 12  # ... that has more zeros than others, up to which numbers are written out
+_MOST = 1200  # n^2 times columns of any matrix for which they are
 
 
 def _rows(graph: Graph, matrix: Any) -> _Rows:
@@ -51,10 +53,42 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     right = traced(graph, b)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
     rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
+    if _has_long_rows(rows):
+        return _solved_by_rows(graph, rows, right.ndim)
     triangular, pivots = eliminated(Facade(graph), rows)
     _guard(graph, pivots)
     x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+
+
+def _has_long_rows(rows: _Rows) -> bool:
+    """Whether rows are computed as arrays: zeros, which save work, are not seen then."""
+    n = len(rows)
+    zeros = sum(is_zero(v) for row in rows for v in row[:n])
+    return n > _SPARSE if 2 * zeros > n * n else n * n * len(rows[0]) > _MOST
+
+
+def _solved_by_rows(graph: Graph, rows: _Rows, ndim: int) -> Tracer:
+    """Return the solution by the same elimination of whole rows: n^2 expressions, not n^3."""
+    np_, n = Facade(graph), len(rows)
+    long = [traced(graph, row).as_long() for row in rows]
+    for i in range(n):
+        for k in range(i + 1, n):
+            larger = np_.abs(long[k][i]) > np_.abs(long[i][i])
+            long[i], long[k] = (
+                np_.where(larger, long[k], long[i]),
+                np_.where(larger, long[i], long[k]),
+            )
+        for k in range(i + 1, n):
+            long[k] = long[k] - (long[k][i] / long[i][i]) * long[i]
+    _guard(graph, [long[i][i] for i in range(n)])
+    x: list[Any] = [None] * n
+    for i in reversed(range(n)):
+        rest = long[i][n:]
+        for j in range(i + 1, n):
+            rest = rest - long[i][j] * x[j]
+        x[i] = rest / long[i][i]
+    return traced(graph, [v[0] for v in x] if ndim == 1 else [list(v) for v in x])
 
 
 def of_triangle(

@@ -252,3 +252,9 @@ def ufunc_reduce(t, x, u, params):
         + np.add.outer(x, x).diagonal() * 0.1
         + u[0]
     )
+
+
+@engineered(12)
+def solve_twelve(t, x, u, params):
+    M = np.diag(3 + np.cos(x)) + 0.1 * np.outer(np.sin(x), x)
+    return np.linalg.solve(M, -x + u[0])
