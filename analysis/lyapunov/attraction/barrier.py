@@ -135,9 +135,9 @@ class _SetInBox:
     @property
     def at(self) -> Callable[[np.ndarray], np.ndarray] | None:
         """The values of the expression at points, of shape (points, states)."""
-        if self.inside is None:
+        if (inside := self.inside) is None:
             return None
-        return lambda x: np.resize(evaluate_expressions([self.inside], {"x": x.T})[0], len(x))
+        return lambda x: np.resize(evaluate_expressions([inside], {"x": x.T})[0], len(x))
 
 
 @dataclass(kw_only=True)
