@@ -4,21 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-
-__all__ = [
-    "ConeLimit",
-    "at_least",
-    "at_most",
-    "equal",
-    "minimizer",
-    "semidefinite",
-    "symmetric_basis",
-    "upper_triangle",
-]
 
 _SOLVED = ("Solved", "AlmostSolved")
 
@@ -36,11 +24,8 @@ class ConeLimit:
 
 
 def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
-    """Return A x <= b, row by row.
-
-    Shapes: `A` (k, n), `b` (k,).
-    """
-    return ConeLimit(A, b, partial(_nonnegative, len(b)))
+    """Return A x <= b, row by row; shapes: `A` (k, n), `b` (k,)."""
+    return ConeLimit(A, b, lambda clarabel: clarabel.NonnegativeConeT(len(b)))
 
 
 def equal(A: np.ndarray, b: np.ndarray) -> ConeLimit:
@@ -48,7 +33,7 @@ def equal(A: np.ndarray, b: np.ndarray) -> ConeLimit:
 
     Shapes: `A` (k, n), `b` (k,).
     """
-    return ConeLimit(A, b, partial(_zero, len(b)))
+    return ConeLimit(A, b, lambda clarabel: clarabel.ZeroConeT(len(b)))
 
 
 def semidefinite(A: np.ndarray, b: np.ndarray, size: int) -> ConeLimit:
@@ -56,23 +41,19 @@ def semidefinite(A: np.ndarray, b: np.ndarray, size: int) -> ConeLimit:
 
     Shapes: `A` (m (m + 1)/2, n), `b` (m (m + 1)/2,), for m = `size`.
     """
-    return ConeLimit(A, b, partial(_semidefinite, size))
+    return ConeLimit(A, b, lambda clarabel: clarabel.PSDTriangleConeT(size))
 
 
 def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
-    """Return sum x_i M_i >= low, of symmetric matrices.
-
-    Shapes: `parts` n of (m, m), `low` (m, m).
-    """
+    """Return sum x_i M_i >= low, of symmetric matrices."""
+    # Shapes: `parts` n of (m, m), `low` (m, m).
     A = np.column_stack([-upper_triangle(part) for part in parts])
     return semidefinite(A, -upper_triangle(low), len(low))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:
-    """Return a symmetric matrix as a vector with its norm: columns, and sqrt(2) off the diagonal.
-
-    Shapes: `M` (m, m), result (m (m + 1)/2,).
-    """
+    """Return a symmetric matrix as a vector with its norm: columns, sqrt(2) off the diagonal."""
+    # Shapes: `M` (m, m), result (m (m + 1)/2,).
     column, row = np.tril_indices(len(M))
     return np.where(row == column, 1.0, np.sqrt(2.0)) * M[row, column]
 
@@ -90,10 +71,8 @@ def symmetric_basis(m: int) -> list[np.ndarray]:
 def minimizer(
     P: np.ndarray, q: np.ndarray, limits: Sequence[ConeLimit]
 ) -> tuple[np.ndarray | None, str]:
-    """Return the x of the smallest x^T P x / 2 + q^T x, None where none is found, and the status.
-
-    Shapes: `P` (n, n), not negative, `q` and x (n,).
-    """
+    """Return the x of the smallest x^T P x / 2 + q^T x, None without one, and the status."""
+    # Shapes: `P` (n, n), not negative, `q` and x (n,).
     import clarabel as untyped
     from scipy import sparse
 
@@ -107,15 +86,3 @@ def minimizer(
     solution = clarabel.DefaultSolver(upper, q, A, b, cones, settings).solve()
     status = str(solution.status)
     return (np.array(solution.x) if status in _SOLVED else None), status
-
-
-def _zero(size: int, clarabel: Any) -> Any:
-    return clarabel.ZeroConeT(size)
-
-
-def _nonnegative(size: int, clarabel: Any) -> Any:
-    return clarabel.NonnegativeConeT(size)
-
-
-def _semidefinite(size: int, clarabel: Any) -> Any:
-    return clarabel.PSDTriangleConeT(size)

@@ -29,8 +29,6 @@ from .everywhere import inequality_of, safe_everywhere
 from .motion import StateRates, motion_of
 from .squares import Term, monomial_terms
 
-__all__ = ["BARRIER", "Barrier", "barrier"]
-
 _STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
 _ROUNDS = 60  # proposals for each of them
@@ -463,8 +461,5 @@ def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
 
 
 BARRIER = ProofKind(
-    name="barrier",
-    about="starts and states that are unsafe",
-    result=Barrier,
-    find="barrier",
+    name="barrier", about="starts and states that are unsafe", result=Barrier, find="barrier"
 )
