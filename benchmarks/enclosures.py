@@ -3,7 +3,7 @@
 Boxes a second for V' < 0 of a pendulum, and `certify` of both examples with a known sign: the same
 claims, first on python-flint's balls alone, then with machine code.  What the code needs is made
 before, as by an earlier proof.  A loop that was certified before is compared with python-control's
-own at one point, one with other gains at all of them.  Then sets of solutions of ARCH-COMP's
+own at one point, one with other gains at four.  Then sets of solutions of ARCH-COMP's
 nonlinear systems; with ``--long`` also the one that takes minutes.
 """
 

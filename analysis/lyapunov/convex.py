@@ -28,11 +28,27 @@ def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
     return ConeLimit(A, b, lambda clarabel: clarabel.NonnegativeConeT(len(b)))
 
 
+def equal(A: np.ndarray, b: np.ndarray) -> ConeLimit:
+    """Return A x = b, row by row.
+
+    Shapes: `A` (k, n), `b` (k,).
+    """
+    return ConeLimit(A, b, lambda clarabel: clarabel.ZeroConeT(len(b)))
+
+
+def semidefinite(A: np.ndarray, b: np.ndarray, size: int) -> ConeLimit:
+    """Return that b - A x, a matrix as a vector with its norm, has no negative eigenvalue.
+
+    Shapes: `A` (m (m + 1)/2, n), `b` (m (m + 1)/2,), for m = `size`.
+    """
+    return ConeLimit(A, b, lambda clarabel: clarabel.PSDTriangleConeT(size))
+
+
 def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
     """Return sum x_i M_i >= low, of symmetric matrices."""
     # Shapes: `parts` n of (m, m), `low` (m, m).
     A = np.column_stack([-upper_triangle(part) for part in parts])
-    return ConeLimit(A, -upper_triangle(low), lambda clarabel: clarabel.PSDTriangleConeT(len(low)))
+    return semidefinite(A, -upper_triangle(low), len(low))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:

@@ -56,11 +56,11 @@ def eliminated(
     for i in range(n):
         _bring_up(np, rows, i, exchanges)
         for k in range(i + 1, n):
-            if _is_zero(rows[k][i]):
+            if is_zero(rows[k][i]):
                 continue
             factor = rows[k][i] / rows[i][i]
             below = [
-                b if _is_zero(a) else b - factor * a
+                b if is_zero(a) else b - factor * a
                 for a, b in zip(rows[i][i + 1 :], rows[k][i + 1 :], strict=True)
             ]
             rows[k] = [*rows[k][: i + 1], *below]
@@ -70,7 +70,7 @@ def eliminated(
 def _bring_up(np: Any, rows: list[list[Any]], i: int, exchanges: list[Any] | None) -> None:
     """Exchange row i with the one that has the first of the largest entries in column i."""
     for k in range(i + 1, len(rows)):
-        if _is_zero(rows[k][i]):
+        if is_zero(rows[k][i]):
             continue
         larger = np.abs(rows[k][i]) > np.abs(rows[i][i])
         pairs = list(zip(rows[i][i:], rows[k][i:], strict=True))
@@ -81,7 +81,7 @@ def _bring_up(np: Any, rows: list[list[Any]], i: int, exchanges: list[Any] | Non
             exchanges.append(larger)
 
 
-def _is_zero(value: object) -> bool:
+def is_zero(value: object) -> bool:
     """Whether an entry is known to be 0."""
     entry = getattr(value, "only", None)
     return entry is not None and entry.op == "const" and entry.data == 0.0
@@ -94,7 +94,7 @@ def substituted(rows: list[list[Any]]) -> list[list[Any]]:
     for i in range(n - 1, -1, -1):
         rest = rows[i][n:]
         for j in range(i + 1, n):
-            if not _is_zero(rows[i][j]):
+            if not is_zero(rows[i][j]):
                 rest = [r - rows[i][j] * v for r, v in zip(rest, x[j], strict=True)]
         x[i] = [r / rows[i][i] for r in rest]
     return x

@@ -3,12 +3,14 @@
 import control as ct
 import numpy as np
 import pytest
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 import nlctl
 from nlctl.analysis.intervals.machine import only_balls
 from nlctl.analysis.lyapunov import Box, barrier, prove_decrease, region_of_attraction
+from nlctl.analysis.lyapunov.attraction.squares import PositiveCondition, positive_where
 from nlctl.errors import ParameterError
 
 KHALIL = [[1.5, -0.5], [-0.5, 1.0]]
@@ -26,6 +28,11 @@ def cube(x):
 
 def square_box(n, reach):
     return Box.of(**{f"x{i + 1}": (-reach, reach) for i in range(n)})
+
+
+def pendulum_rates(x):
+    """No polynomials."""
+    return x[1], -np.sin(x[0])
 
 
 def rates_of(function):
@@ -195,3 +202,86 @@ def test_what_is_met_has_no_barrier():
     found = barrier(lambda x: (x[1], -x[0]), square_box(2, 3.0), start=start, unsafe=unsafe)
     assert found.status == "undecided"
     assert str(found).startswith("undecided: ")
+
+
+EVERYWHERE = Box.of(x1=(-np.inf, np.inf), x2=(-np.inf, np.inf))
+
+
+def saddles(x):
+    """Prajna and Jadbabaie (2004): saddles at +- sqrt(3) around a focus at 0."""
+    return x[1], -x[0] + x[0] ** 3 / 3 - x[1]
+
+
+def disc(middle, square):
+    """What is not negative within a circle."""
+    return lambda x: square - (x[0] - middle[0]) ** 2 - (x[1] - middle[1]) ** 2
+
+
+@pytest.mark.parametrize(
+    ("start", "unsafe"),
+    [
+        (disc((1.5, 0.0), 0.25), disc((-1.0, -1.0), 0.16)),
+        (Box.of(x1=(1.0, 2.0), x2=(-0.5, 0.5)), Box.of(x1=(-1.4, -0.6), x2=(-1.4, -0.6))),
+    ],
+    ids=["discs", "boxes"],
+)
+def test_prajnas_example_is_safe(start, unsafe):
+    """For all time, from both sides of a saddle, by a polynomial of degree four in all of space."""
+    found = barrier(saddles, EVERYWHERE, start=start, unsafe=unsafe, degree=4)
+    assert (found.status, found.arithmetic) == ("proved", "rational numbers")
+    rng = np.random.default_rng(0)
+    for angle in rng.uniform(0, 2 * np.pi, 12):
+        x = 1.5 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)
+        far = lambda t, y: 10.0 - np.abs(y).max()  # noqa: E731
+        far.terminal = True
+        run = solve_ivp(rates_of(saddles), (0, 10), x, rtol=1e-8, events=far)
+        assert max(found.value(state) for state in run.y.T) < 1e-9
+        assert found.value((-1 + 0.4 * np.cos(angle), -1 + 0.4 * np.sin(angle))) > 0
+
+
+@pytest.mark.parametrize(
+    ("unsafe", "degree"),
+    [(disc((0.0, 0.0), 0.01), 4), (disc((1.2, 0.0), 0.16), 4), (disc((-1.0, -1.0), 0.16), 1)],
+    ids=["met", "overlapping", "degree"],
+)
+def test_what_has_no_barrier_in_space_is_undecided(unsafe, degree):
+    """The focus is met, starts are unsafe, a line does not separate."""
+    start = disc((1.5, 0.0), 0.25)
+    found = barrier(saddles, EVERYWHERE, start=start, unsafe=unsafe, degree=degree)
+    assert found.status == "undecided"
+
+
+def test_sets_by_functions_in_a_box():
+    """The same of a disc as of the box around it."""
+    found = barrier(
+        oscillator, square_box(2, 3.0), start=disc((1.0, 0.0), 0.02), unsafe=lambda x: -0.95 - x[0]
+    )
+    assert found.status == "proved"
+
+
+@pytest.mark.parametrize("c", [-0.5, 0.0, 0.01, 0.5])
+def test_sums_of_squares_prove_what_is_positive_alone(c):
+    """x^4 - 2 x^2 + 1 + c is (x^2 - 1)^2 + c; Motzkin's form is positive and no sum of squares."""
+    ring = fmpq_mpoly_ctx.get(("x", "y"), Ordering.lex)
+    x, y = ring.gen(0), ring.gen(1)
+    ways = {
+        "square": x**4 - 2 * x**2 + 1 + fmpq(*c.as_integer_ratio()),
+        "Motzkin": x**4 * y**2 + x**2 * y**4 - 3 * x**2 * y**2 + 1 + fmpq(*c.as_integer_ratio()),
+    }
+    for name, p in ways.items():
+        found, _ = positive_where([PositiveCondition(parts=[p])], 1)
+        assert (found is not None and found[0] > 0) == (name == "square" and c > 0)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"system": pendulum_rates}, "polynomials"),
+        ({"box": Box.of(x1=(-np.inf, np.inf), x2=(-1, 1))}, "all finite or all infinite"),
+        ({"start": lambda x: (x[0], x[1])}, "one number"),
+    ],
+)
+def test_barriers_in_space_name_what_is_wrong(change, message):
+    given = {"system": saddles, "box": EVERYWHERE, "start": disc((1.5, 0.0), 0.25)} | change
+    with pytest.raises(ParameterError, match=message):
+        barrier(given.pop("system"), given.pop("box"), **given)

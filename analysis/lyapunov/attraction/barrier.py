@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -15,7 +15,8 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.errors import ParameterError
 from nlctl.expressions.derivatives import tangents
-from nlctl.expressions.graph import Expr, Graph
+from nlctl.expressions.evaluate import evaluate_expressions
+from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.upstream.numba_internals import is_jit_disabled
@@ -24,7 +25,9 @@ from nlctl.wording import counted
 from ...intervals.box import Box
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
+from .everywhere import inequality_of, safe_everywhere
 from .motion import StateRates, motion_of
+from .squares import Term, monomial_terms
 
 _STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
@@ -33,7 +36,7 @@ _SAMPLES = 300  # in each set
 _POOL = 20_000  # points of the box among which a proposal is looked for mistakes first
 _BAND = 0.02  # of the largest |B|, within which it counts as 0 there
 _ADDED = 40  # of these in a round
-_Term = tuple[int, ...]
+_StateFunction = Callable[[Any], Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +66,7 @@ class Barrier(ProofResult):
     names: tuple[str, ...]
     middle: np.ndarray
     half: np.ndarray
-    terms: tuple[_Term, ...]
+    terms: tuple[Term, ...]
     coefficients: np.ndarray
     box: Box
     arithmetic: str = "floats rounded outwards"
@@ -92,17 +95,47 @@ class Barrier(ProofResult):
     def __str__(self) -> str:
         if not self.holds:
             return f"undecided: {self.reason}"
-        return f"safe for all time: proved on {counted(self.boxes, 'box', 'boxes')}"
+        how = f"on {counted(self.boxes, 'box', 'boxes')}" if self.boxes else "by sums of squares"
+        return f"safe for all time: proved {how}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Claim:
-    """Numbers that are not positive at once on a box, and which samples a refutation adds to."""
+    """Numbers that are not positive at once on a box, and which samples a refutation adds to.
+
+    `matters` says at which points the others than B are positive.
+    """
 
     code: BoxCode
     box: Box
     kind: str
     what: str
+    matters: Callable[[np.ndarray], np.ndarray] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SetInBox:
+    """A set: a box, or where an expression of the states is not negative there."""
+
+    box: Box
+    inside: Expr | None = None
+
+    @staticmethod
+    def of(one: Any, box: Box) -> _SetInBox:
+        """Read a set that somebody has given."""
+        if not callable(one):
+            return _SetInBox(box=one)
+        try:
+            return _SetInBox(box=box, inside=inequality_of(one, len(box.names)))
+        except Untraceable as error:
+            raise ParameterError(f"barrier needs sets that can be read: {error}") from None
+
+    @property
+    def at(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """The values of the expression at points, of shape (points, states)."""
+        if (inside := self.inside) is None:
+            return None
+        return lambda x: np.resize(evaluate_expressions([inside], {"x": x.T})[0], len(x))
 
 
 @dataclass(kw_only=True)
@@ -111,7 +144,7 @@ class _Problem:
 
     motion: StateRates
     box: Box
-    terms: tuple[_Term, ...]
+    terms: tuple[Term, ...]
     middle: np.ndarray
     half: np.ndarray
     claims: list[_Claim] = field(default_factory=list)
@@ -130,29 +163,32 @@ def barrier(
     system: Any,
     box: Box,
     *,
-    start: Box,
-    unsafe: Box | Sequence[Box] = (),
+    start: Box | _StateFunction,
+    unsafe: Box | _StateFunction | Sequence[Box | _StateFunction] = (),
     degree: int = 2,
     params: Mapping[str, Any] | None = None,
     max_boxes: int = 1_000_000,
 ) -> Barrier:
     """Prove that nothing from a set of starts gets where it must not, or leaves a box.
 
-    A polynomial B is proposed by linear programs on samples, B' + k B < 0 being linear in its
-    coefficients: of points where the last proposal was 0 and rose.  What refutes a proposal
-    becomes a sample of the next.  Proved is less than what is
-    proposed: B <= 0 at the starts, B > 0 in what is unsafe and where trajectories leave the box,
-    and B' < 0 where B = 0.
+    In a box a polynomial B is proposed by linear programs on samples, B' + k B < 0 being linear in
+    its coefficients: of points where the last proposal was 0 and rose.  What refutes a proposal
+    becomes a sample of the next.  Proved is less than what is proposed: B <= 0 at the starts, B > 0
+    in what is unsafe and where trajectories leave the box, and B' < 0 where B = 0.
+
+    Where every side of the box is infinite, nothing is left: rates and sets have to be polynomials,
+    and B <= 0, B > 0 and B' + k B < 0 everywhere are found as sums of squares, by one semidefinite
+    program for each k that is tried, and proved by rational numbers.
 
     Parameters
     ----------
     system : control.InputOutputSystem or callable
         A diagram, whose external inputs are 0; or ``function((x1, ..., xn)) -> (x1', ..., xn')``.
     box : Box
-        Where it is to stay, with a side for every state in their order.
-    start : Box
-        Initial states.
-    unsafe : Box or sequence of Box, optional
+        Where it is to stay, with a side for every state in their order; or all of them infinite.
+    start : Box or callable
+        Initial states: a box, or where ``function((x1, ..., xn))`` is not negative.
+    unsafe : Box, callable or sequence of these, optional
         What is not to be met, besides the outside of `box`.
     degree : int, optional
         Of the polynomial; even ones enclose sets.
@@ -169,8 +205,9 @@ def barrier(
     Raises
     ------
     ParameterError
-        If the rates cannot be read or a box has other sides; if `degree` is below 1, or `start`
-        does not lie in the box.
+        If the rates or a set cannot be read, a box has other sides, or some infinite ones; if
+        `degree` is below 1, `start` does not lie in the box, or there is no polynomial where the
+        box is infinite.
     CompileError
         If the diagram cannot be compiled.
 
@@ -178,6 +215,7 @@ def barrier(
     --------
     A damped oscillator from around (1, 0) never comes to x1 < -0.95:
 
+    >>> import numpy as np
     >>> from nlctl.analysis.lyapunov import Box, barrier
     >>> found = barrier(
     ...     lambda x: (x[1], -x[0] - x[1]),
@@ -187,70 +225,111 @@ def barrier(
     ... )
     >>> print(found.status)
     proved
+
+    From a disc around (1.5, 0), and so from both sides of a saddle, never to one around (-1, -1)
+    (Prajna and Jadbabaie, 2004):
+
+    >>> whole = Box.of(x1=(-np.inf, np.inf), x2=(-np.inf, np.inf))
+    >>> found = barrier(
+    ...     lambda x: (x[1], -x[0] + x[0] ** 3 / 3 - x[1]),
+    ...     whole,
+    ...     start=lambda x: 0.25 - (x[0] - 1.5) ** 2 - x[1] ** 2,
+    ...     unsafe=lambda x: 0.16 - (x[0] + 1) ** 2 - (x[1] + 1) ** 2,
+    ...     degree=4,
+    ... )
+    >>> print(found)
+    safe for all time: proved by sums of squares
     """
     box = of_type("barrier", "box", box, Box, "Box.of(x1=(-1, 1))")
-    start = of_type("barrier", "start", start, Box, "Box.of(x1=(-1, 1))")
     degree = integer("barrier", "degree", degree, at_least=1)
     max_boxes = integer("barrier", "max_boxes", max_boxes, at_least=1)
-    unsafe = [unsafe] if isinstance(unsafe, Box) else list(unsafe)
+    unsafe = [unsafe] if isinstance(unsafe, Box) or callable(unsafe) else list(unsafe)
     _check_boxes(box, start, unsafe)
     if is_jit_disabled():
         raise ParameterError("barrier needs machine code: unset NUMBA_DISABLE_JIT")
     begun = time.perf_counter()
-    problem = _problem(motion_of("barrier", system, box, params), box, start, unsafe, degree)
+    whole = not np.isfinite(box.cell).any()
+    motion = motion_of("barrier", system, box, params, is_finite=not whole)
+    find = safe_everywhere if whole else _in_the_box
+    polynomial = find(motion, box, start, unsafe, degree, max_boxes)
+    return Barrier(
+        names=motion.names, box=box, holds=not polynomial["reason"],
+        seconds=time.perf_counter() - begun, **polynomial,
+    )  # fmt: skip
+
+
+def _check_boxes(box: Box, start: Any, unsafe: Sequence[Any]) -> None:
+    for name, one in (("start", start), *(("unsafe", u) for u in unsafe)):
+        if callable(one):
+            continue
+        of_type("barrier", name, one, Box, "Box.of(x1=(-1, 1)) or a function of the states")
+        if one.names != box.names or not np.all(np.isfinite(one.cell)):
+            raise ParameterError(
+                f"barrier needs {name} with the finite sides {', '.join(box.names)}, got {one}"
+            )
+    if np.isfinite(box.cell).any() and not np.isfinite(box.cell).all():
+        raise ParameterError(
+            f"barrier needs a box with sides all finite or all infinite, got {box}"
+        )
+    if callable(start):
+        return
+    within = zip(box.cell, start.cell, strict=True)
+    if not all(a <= c and d <= b for (a, b), (c, d) in within):
+        raise ParameterError(f"barrier needs start inside of the box, got {start} and {box}")
+
+
+def _in_the_box(
+    motion: StateRates, box: Box, start: Any, unsafe: Sequence[Any], degree: int, max_boxes: int
+) -> dict[str, Any]:
+    problem = _problem(motion, box, start, unsafe, degree)
     coefficients, boxes, reason = np.zeros(len(problem.terms)), 0, ""
     for k in _RATES:
         coefficients, n, reason = _attempt(problem, k, max_boxes)
         boxes += n
         if not reason:
             break
-    return Barrier(
-        names=problem.motion.names, middle=problem.middle, half=problem.half, terms=problem.terms,
-        coefficients=coefficients, holds=not reason, reason=reason, boxes=boxes, box=box,
-        seconds=time.perf_counter() - begun,
-    )  # fmt: skip
-
-
-def _check_boxes(box: Box, start: Box, unsafe: Sequence[Any]) -> None:
-    for name, one in (("start", start), *(("unsafe", u) for u in unsafe)):
-        of_type("barrier", name, one, Box, "Box.of(x1=(-1, 1))")
-        if one.names != box.names or not np.all(np.isfinite(one.cell)):
-            raise ParameterError(
-                f"barrier needs {name} with the finite sides {', '.join(box.names)}, got {one}"
-            )
-    within = zip(box.cell, start.cell, strict=True)
-    if not all(a <= c and d <= b for (a, b), (c, d) in within):
-        raise ParameterError(f"barrier needs start inside of the box, got {start} and {box}")
+    return {
+        "middle": problem.middle, "half": problem.half, "terms": problem.terms,
+        "coefficients": coefficients, "reason": reason, "boxes": boxes,
+    }  # fmt: skip
 
 
 def _problem(
-    motion: StateRates, box: Box, start: Box, unsafe: Sequence[Box], degree: int
+    motion: StateRates, box: Box, start: Any, unsafe: Sequence[Any], degree: int
 ) -> _Problem:
     n = motion.order
-    powers = itertools.product(range(degree + 1), repeat=n)
-    terms = tuple(sorted((p for p in powers if sum(p) <= degree), key=lambda p: (sum(p), p)))
+    terms = tuple(monomial_terms(n, degree))
     low, high = np.array(box.low), np.array(box.high)
     problem = _Problem(
         motion=motion, box=box, terms=terms, middle=0.5 * (low + high), half=0.5 * (high - low)
     )
-    graph, rates, leaves = motion.in_graph(more=len(terms))
+    sets = [_SetInBox.of(one, box) for one in (start, *unsafe)]
+    also = [one.inside for one in sets if one.inside is not None]
+    graph, (*rates,), leaves = motion.in_graph(more=len(terms), also=also)
+    inside = iter(rates[n:])
     B, rate = _polynomial(graph, rates, leaves, problem)
     op, margin, sides = graph.op, graph.const(_STRICT), n + len(terms)
     code = lambda *exprs: enclosed(list(exprs), sides, fixed=len(terms))  # noqa: E731
-    above, below = B, op("sub", margin, B)
+    below = op("sub", margin, B)
     rises = op("add", rate, margin)
     band = [op("add", B, margin), below]
     claims = problem.claims
-    claims.append(_Claim(code=code(above), box=start, kind="start", what="B <= 0 at the starts"))
-    claims += [
-        _Claim(code=code(below), box=u, kind="unsafe", what="B > 0 in what is unsafe")
-        for u in unsafe
-    ]
+
+    for i, one in enumerate(sets):
+        within = [] if one.inside is None else [op("add", next(inside), margin)]
+        kind, what = (
+            ("unsafe", "B > 0 in what is unsafe") if i else ("start", "B <= 0 at the starts")
+        )
+        wrong = code(below if i else B, *within)
+        claims.append(_Claim(code=wrong, box=one.box, kind=kind, what=what, matters=one.at))
     for i, end in itertools.product(range(n), (0, 1)):
+        speed, sign = (lambda x, i=i: motion.at(x)[:, i]), 1 if end else -1
         outwards = op("add", rates[i] if end else op("neg", rates[i]), margin)
-        face = _face(box, i, end)
-        what = f"B > 0 where {motion.names[i]} leaves the box"
-        claims.append(_Claim(code=code(below, outwards), box=face, kind="unsafe", what=what))
+        claims.append(_Claim(
+            code=code(below, outwards), box=_face(box, i, end), kind="unsafe",
+            what=f"B > 0 where {motion.names[i]} leaves the box",
+            matters=lambda x, speed=speed, sign=sign: sign * speed(x),
+        ))  # fmt: skip
     claims.append(
         _Claim(code=code(rises, *band), box=box, kind="inside", what="B' < 0 where B = 0")
     )
@@ -291,12 +370,10 @@ def _first_samples(problem: _Problem) -> None:
     for claim in problem.claims[:-1]:
         corners = np.array(list(itertools.islice(itertools.product(*claim.box.cell), 64)))
         low, high = np.array(claim.box.low), np.array(claim.box.high)
-        points = rng.uniform(low, high, (_SAMPLES, len(low)))
-        points = np.concatenate([corners, points])
-        if claim.code.rows.results == 2:  # of a face
-            i = int(np.argmin(high - low))
-            outwards = 1 if low[i] == problem.box.high[i] else -1
-            points = points[outwards * problem.motion.at(points)[:, i] >= 0]
+        count = _SAMPLES if claim.matters is None else _POOL
+        points = np.concatenate([corners, rng.uniform(low, high, (count, len(low)))])
+        if claim.matters is not None:
+            points = points[claim.matters(points) >= 0][:_SAMPLES]
         samples[claim.kind].append(points)
     problem.samples = {kind: np.concatenate(parts) for kind, parts in samples.items()}
     problem.pool = rng.uniform(problem.box.low, problem.box.high, (_POOL, problem.motion.order))
@@ -343,7 +420,7 @@ def _decided(claim: _Claim, coefficients: np.ndarray, max_boxes: int) -> BoxVerd
     return decide_claim(claim.code, low, high, 0.0, max_boxes=max_boxes)
 
 
-def _monomials(z: np.ndarray, terms: Sequence[_Term]) -> np.ndarray:
+def _monomials(z: np.ndarray, terms: Sequence[Term]) -> np.ndarray:
     """Return the terms at points, shape (points, terms)."""
     return np.stack([np.prod(z ** np.array(term), axis=1) for term in terms], axis=1)
 

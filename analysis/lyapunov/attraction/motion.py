@@ -36,9 +36,12 @@ class StateRates:
         """Number of states."""
         return len(self.names)
 
-    def in_graph(self, more: int = 0) -> tuple[Graph, list[Expr], list[Expr]]:
-        """Return a graph with the rates, and the leaves of states and of so many more sides."""
-        graph, rates = with_leaves(self.rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
+    def in_graph(
+        self, more: int = 0, also: Sequence[Expr] = ()
+    ) -> tuple[Graph, list[Expr], list[Expr]]:
+        """Return a graph with the rates and others, and the leaves of states and more sides."""
+        exprs = (*self.rates, *also)
+        graph, rates = with_leaves(exprs, lambda g, leaf: g.leaf("x", leaf.data[1], None))
         leaves = [graph.leaf("x", i, None) for i in range(self.order + more)]
         return graph, rates, leaves
 
@@ -70,7 +73,12 @@ class StateRates:
 
 
 def motion_of(
-    who: str, system: Any, box: Box, params: Mapping[str, Any] | None = None
+    who: str,
+    system: Any,
+    box: Box,
+    params: Mapping[str, Any] | None = None,
+    *,
+    is_finite: bool = True,
 ) -> StateRates:
     """Return the rates of a diagram or of a function as expressions."""
     try:
@@ -94,6 +102,6 @@ def motion_of(
             f"{who} needs a side of the box for each of {', '.join(names)}, got "
             f"{', '.join(box.names)}, and as many rates, got {len(rates)}"
         )
-    if not np.all(np.isfinite(box.cell)):
+    if is_finite and not np.all(np.isfinite(box.cell)):
         raise ParameterError(f"{who} needs a box with finite sides, got {box}")
     return StateRates(names=tuple(names), rates=tuple(rates))

@@ -21,7 +21,7 @@ from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Sides, Starts, read_starts
-from .content import LoopContent, loop_content
+from .content import UNREAD_CONTENT, LoopContent, loop_content
 from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
 from .same_loop import check_same, points_around
@@ -90,11 +90,11 @@ def read_checked(
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
     """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
-    content = LoopContent(facts={}, key="")
+    content = UNREAD_CONTENT
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         content = loop_content(loop, params)
         loop = overridden(loop, params)
-    roles = read_roles(loop, pieces, content.key)
+    roles = read_roles(loop, pieces, content.functions)
     disturbance = bound_of_inputs(roles, inputs or {}, loop)
     for part, records in kinds.items():
         if part in roles.places:  # a network may be left out
@@ -108,7 +108,7 @@ def read_checked(
     )
     again = joined_again(loop, roles, lambda part, spec, name: block(spec, name))
     understood = interconnect(again, name=str(loop.name))
-    check_same(loop, understood, _compared_at(loop, begins), params, content=content.key)
+    check_same(loop, understood, _compared_at(loop, begins), params, content=content)
     return CheckedLoop(
         roles=roles, disturbance=disturbance, starts=begins, content=content, given=loop,
         understood=understood,

@@ -31,6 +31,11 @@ class LoopContent:
     # of all that python-control computes of it with the parameters of the run; empty where no
     # key sees everything
     key: str
+    # of its functions, and of what kinds of values they get; empty where `key` is
+    functions: str = ""
+
+
+UNREAD_CONTENT = LoopContent(facts={}, key="")
 
 
 class Remembered:
@@ -57,7 +62,12 @@ def loop_content(
     facts, unseen = facts_and_unseen(loop)
     is_seen = not unseen and all(_is_plain(place.system) for place in places(loop))
     values = {name: value_text(value) for name, value in (params or {}).items()}
-    return LoopContent(facts=facts, key=text_key(repr((facts, values))) if is_seen else "")
+    if not is_seen:
+        return LoopContent(facts=facts, key="")
+    kinds = {n: v if type((params or {})[n]) is not float else "float" for n, v in values.items()}
+    return LoopContent(
+        facts=facts, key=text_key(repr((facts, values))), functions=text_key(repr((facts, kinds)))
+    )
 
 
 def _is_plain(system: Any) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, traced
-from ..elimination import eliminated, substituted
+from ..elimination import eliminated, is_zero, substituted
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
 from .table import Facade, constant_value, of
@@ -16,7 +16,9 @@ from .table import Facade, constant_value, of
 __all__: list[str] = []
 
 _Rows = list[list[Any]]
-_LARGEST = 12  # rows of a matrix that depends on the state
+_LARGEST = 20  # rows of a matrix that depends on the state
+_SPARSE = 12  # ... that has more zeros than others, up to which numbers are written out
+_MOST = 1200  # n^2 times columns of any matrix for which they are
 
 
 def _rows(graph: Graph, matrix: Any) -> _Rows:
@@ -36,20 +38,114 @@ def _square(graph: Graph, matrix: Any) -> _Rows:
     return rows
 
 
-def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
-    """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
-    right = traced(graph, b)
-    columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
-    rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
-    triangular, pivots = eliminated(Facade(graph), rows)
+def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
+    """Note that NumPy raises an error for a singular matrix."""
     for pivot in pivots:
         guard = elementwise(graph, "ne", pivot, 0.0).only
         if guard.op != "const":
             graph.guards.append(guard)
         elif not guard.data:
             raise Untraceable("a singular matrix")
+
+
+def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
+    """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
+    right = traced(graph, b)
+    columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
+    rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
+    if _has_long_rows(rows):
+        return _solved_by_rows(graph, rows, right.ndim)
+    triangular, pivots = eliminated(Facade(graph), rows)
+    _guard(graph, pivots)
     x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+
+
+def _has_long_rows(rows: _Rows) -> bool:
+    """Whether rows are computed as arrays: zeros, which save work, are not seen then."""
+    n = len(rows)
+    zeros = sum(is_zero(v) for row in rows for v in row[:n])
+    return n > _SPARSE if 2 * zeros > n * n else n * n * len(rows[0]) > _MOST
+
+
+def _solved_by_rows(graph: Graph, rows: _Rows, ndim: int) -> Tracer:
+    """Return the solution by the same elimination of whole rows: n^2 expressions, not n^3."""
+    np_, n = Facade(graph), len(rows)
+    long = [traced(graph, row).as_long() for row in rows]
+    for i in range(n):
+        for k in range(i + 1, n):
+            larger = np_.abs(long[k][i]) > np_.abs(long[i][i])
+            long[i], long[k] = (
+                np_.where(larger, long[k], long[i]),
+                np_.where(larger, long[i], long[k]),
+            )
+        for k in range(i + 1, n):
+            long[k] = long[k] - (long[k][i] / long[i][i]) * long[i]
+    _guard(graph, [long[i][i] for i in range(n)])
+    x: list[Any] = [None] * n
+    for i in reversed(range(n)):
+        rest = long[i][n:]
+        for j in range(i + 1, n):
+            rest = rest - long[i][j] * x[j]
+        x[i] = rest / long[i][i]
+    return traced(graph, [v[0] for v in x] if ndim == 1 else [list(v) for v in x])
+
+
+def of_triangle(
+    graph: Graph,
+    a: Any,
+    b: Any,
+    trans: Any = 0,
+    lower: Any = False,
+    unit_diagonal: Any = False,
+    overwrite_b: object = False,
+    check_finite: object = True,
+) -> Tracer:
+    """Return the solution of equations with a triangular matrix, as SciPy's `solve_triangular`."""
+    matrix, right = traced(graph, a), traced(graph, b)
+    if trans not in (0, 1, "N", "T"):
+        raise Untraceable("a matrix that is transposed and conjugated")
+    if trans in (1, "T"):
+        matrix, lower = matrix.T, not lower
+    rows, n = _square(graph, matrix), len(matrix)
+    places = [*range(n)][:: -1 if lower else 1]
+    columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
+    for i in range(n if unit_diagonal else 0):
+        rows[i][i] = traced(graph, 1.0)
+    _guard(graph, [rows[i][i] for i in range(n)])
+    solution = substituted([[*(rows[i][j] for j in places), *columns[i]] for i in places])
+    x = [solution[places[i]] for i in range(n)]
+    return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+
+
+def of_cholesky(
+    graph: Graph, c_and_lower: Any, b: Any, overwrite_b: object = False, check_finite: object = True
+) -> Tracer:
+    """Return the solution of equations from the factor of `cho_factor`."""
+    c, lower = c_and_lower
+    first = of_triangle(graph, c, b, trans=0 if lower else 1, lower=lower)
+    return of_triangle(graph, c, first, trans=1 if lower else 0, lower=lower)
+
+
+def of_triangles(
+    graph: Graph,
+    lu_and_piv: Any,
+    b: Any,
+    trans: Any = 0,
+    overwrite_b: object = False,
+    check_finite: object = True,
+) -> Tracer:
+    """Return the solution of equations from the factors of `lu_factor`."""
+    lu, pivots = lu_and_piv
+    exchanges = pivots if isinstance(pivots, np.ndarray) else constant_value(traced(graph, pivots))
+    if trans != 0 or not isinstance(exchanges, np.ndarray):
+        raise Untraceable("factors that are transposed, or whose exchanges depend on the state")
+    order = [*range(len(exchanges))]
+    for i, j in enumerate(map(int, exchanges)):
+        order[i], order[j] = order[j], order[i]
+    right = traced(graph, b)[order]
+    first = of_triangle(graph, lu, right, lower=True, unit_diagonal=True)
+    return of_triangle(graph, lu, first)
 
 
 @of(np.linalg.solve)

@@ -12,6 +12,7 @@ from ..arrays import Tracer, concatenated, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
+from .linear_algebra import of_cholesky, of_triangle, of_triangles
 from .reductions import norm_of, prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, of
@@ -26,6 +27,9 @@ def enter_scipy() -> None:
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
+    for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
+        enter([getattr(linalg, name)], solution)
+    enter([linalg.solve_triangular], of_triangle)
     for name, formula_of in _FORMULAS.items():
         enter([getattr(special, name)], _with_facade(formula_of))
     for name in ("erf", "erfc"):
@@ -93,7 +97,35 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
+def exp10(np: Facade, x: Any) -> Any:
+    """10^x."""
+    return np.power(10.0, x)
+
+
+def ndtr(np: Facade, x: Any) -> Any:
+    """The distribution function of the normal distribution."""
+    return 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x)
+
+
+def huber(np: Facade, delta: Any, r: Any) -> Any:
+    """r^2 / 2 up to |r| = delta, linear beyond."""
+    size = np.abs(r)
+    near = np.where(size <= delta, 0.5 * r * r, delta * (size - 0.5 * delta))
+    return np.where(delta < 0.0, math.inf, near)
+
+
+def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
+    """As huber, and smooth."""
+    share = r / np.where(delta == 0.0, 1.0, delta)
+    smooth = np.where(delta == 0.0, 0.0, delta * delta * (np.sqrt(1.0 + share * share) - 1.0))
+    return np.where(delta < 0.0, math.inf, smooth)
+
+
 _FORMULAS = {
+    "exp10": exp10,
+    "ndtr": ndtr,
+    "huber": huber,
+    "pseudo_huber": pseudo_huber,
     "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
     "logit": lambda np, x: np.log(x / (1.0 - x)),
     "log_expit": lambda np, x: -1.0 * np.logaddexp(0.0, -1.0 * x),

@@ -325,6 +325,8 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), [base], {})
             return result if not result.own else FRESH
+        if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
+            return captured(getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does

@@ -318,6 +318,9 @@ def _functions_in(given: list[KnownValue]) -> Any:
     parts = [element(v) for v in given]
     kinds = OneOf | Instance | Bound | Local | FunctionType
     functions = [v for v in parts if isinstance(v.known, kinds)]
+    functions = [
+        v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
+    ]
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 
 

@@ -80,7 +80,7 @@ def _pairs(code: types.CodeType) -> tuple[tuple[str, str], ...]:
     """Return words of a code object that stand next to each other."""
     words = (word for _, word in _words(code))
     near = ((a, b) for a, b in itertools.pairwise(words) if isinstance(a, str))
-    return tuple((a, b) for a, b in near if isinstance(b, str))
+    return tuple(dict.fromkeys((a, b) for a, b in near if isinstance(b, str)))
 
 
 def _cells(function: types.FunctionType) -> dict[str, Any]:

@@ -9,7 +9,12 @@ from __future__ import annotations
 from ..machine.machine_code import kept
 
 _PART, _TINY = 2.0**-51, 2.0**-1070
-AS_NUMPY = {"nogil": True, "error_model": "numpy", "no_cpython_wrapper": True}
+AS_NUMPY = {
+    "nogil": True,
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
 
 
 @kept(**AS_NUMPY)
@@ -43,6 +48,13 @@ def add_product(s, a, b, c, d):
 
 
 @kept(**AS_NUMPY)
+def write_into(a, b):
+    """Write one array into another: a[:] = b takes five times as long to compile."""
+    for i in range(b.size):
+        a.flat[i] = b.flat[i]
+
+
+@kept(**AS_NUMPY)
 def power_of_time(h, k, s):
     """Write [0, h]^k for k > 0 to s, and return bounds of h^k."""
     low = high = h
@@ -57,7 +69,7 @@ def matrix_product(x, y, z):
     """Write the product of matrices of intervals, each of shape (n, m, 2), to z."""
     for i in range(x.shape[0]):
         for j in range(y.shape[1]):
-            z[i, j] = 0.0
+            z[i, j, 0] = z[i, j, 1] = 0.0
             for k in range(y.shape[0]):
                 add_product(z[i, j], x[i, k, 0], x[i, k, 1], y[k, j, 0], y[k, j, 1])
 

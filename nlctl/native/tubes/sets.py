@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from ..machine.machine_code import kept
-from .intervals import AS_NUMPY, add_image, add_product, down, matrix_product, up
+from .intervals import AS_NUMPY, add_image, add_product, down, matrix_product, up, write_into
 
 _ROUNDED = 1e-13  # of all terms of a sum of less than 800
 _UP = 1.0 + 1e-12  # what sums of sizes may be rounded by
@@ -26,7 +26,7 @@ _UP = 1.0 + 1e-12  # what sums of sizes may be rounded by
 @kept(**AS_NUMPY)
 def box_of_set(c, P, even, B, r, box):
     """Write the box around a set."""
-    box[:] = c
+    write_into(box, c)
     for i in range(P.shape[0]):
         low, high = 0.0, 0.0
         for a in range(P.shape[1]):
@@ -39,7 +39,7 @@ def box_of_set(c, P, even, B, r, box):
 @kept(**AS_NUMPY)
 def sizes(P, degrees, by_degree, whole):
     """Write the sums of the coefficients' sizes, of each degree and of all."""
-    by_degree[:] = 0.0
+    by_degree.fill(0.0)
     for i in range(P.shape[0]):
         for a in range(P.shape[1]):
             by_degree[i, degrees[a]] += abs(P[i, a]) * _UP
@@ -74,7 +74,7 @@ def next_polynomials(J, H, P, table, error):
                 left[k] += beyond * abs(middle)
                 for a in range(P.shape[1]):
                     carried[k, a] += middle * square[a]
-    P[:] = carried
+    write_into(P, carried)
     for k in range(n):
         around = left[k] * _UP + 1e-300
         error[k, 0], error[k, 1] = down(error[k, 0] - around), up(error[k, 1] + around)
@@ -83,7 +83,7 @@ def next_polynomials(J, H, P, table, error):
 @kept(**AS_NUMPY)
 def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     """Multiply polynomials, and return how large the product is beyond their degree at most."""
-    product[:] = 0.0
+    product.fill(0.0)
     for f in range(products.shape[0]):
         product[products[f, 2]] += p[products[f, 0]] * q[products[f, 1]]
     beyond, degree = 0.0, p_sizes.size - 1
@@ -101,7 +101,7 @@ def slopes_within(J, H, box, middle, K):
     n = middle.size
     for k in range(n):
         for i in range(n):
-            K[k, i] = J[k, i]
+            K[k, i, 0], K[k, i, 1] = J[k, i, 0], J[k, i, 1]
             for j in range(n):
                 first, last = down(box[j, 0] - middle[j]), up(box[j, 1] - middle[j])
                 add_product(K[k, i], H[k, i, j, 0], H[k, i, j, 1], first, last)
@@ -128,9 +128,9 @@ def next_errors(K, error, at, c, B, r):
     for i in range(n):  # 0 stays among them, so that m + P(s) is in the set
         r[i, 0], r[i, 1] = min(errors[i, 0], 0.0), max(errors[i, 1], 0.0)
         if not errors[i, 0] <= errors[i, 1]:
-            r[i] = math.nan
+            r[i, 0] = r[i, 1] = math.nan
     for i in range(n):
-        c[i] = at[i]
+        c[i, 0] = c[i, 1] = at[i]
     add_left_out(B, transposed, whole, c)
 
 
@@ -162,8 +162,9 @@ def renewed(c, P, even, B, r, most):
         return False
     columns, Q, rotated = np.empty((n, 2 * n)), np.empty_like(B), np.empty_like(B)
     for j in range(n):
-        columns[:, j] = P[:, j]
-        columns[:, n + j] = B[:, j, 0] * (r[j, 1] - r[j, 0]) * 0.5
+        for i in range(n):
+            columns[i, j] = P[i, j]
+            columns[i, n + j] = B[i, j, 0] * (r[j, 1] - r[j, 0]) * 0.5
     orthogonal(columns, Q)
     transposed = np.ascontiguousarray(Q.transpose(1, 0, 2))
     matrix_product(transposed, B, rotated)
@@ -179,7 +180,7 @@ def renewed(c, P, even, B, r, most):
             up(box[i, 1] + _ROUNDED * rounded),
         )
     add_left_out(Q, transposed, whole, c)
-    P[:] = 0.0
+    P.fill(0.0)
     for i in range(n):
         middle = 0.5 * box[i, 0] + 0.5 * box[i, 1]
         half = max(up(box[i, 1] - middle), up(middle - box[i, 0]))
@@ -188,8 +189,8 @@ def renewed(c, P, even, B, r, most):
             around = _ROUNDED * abs(P[k, i]) + 1e-300
             add_product(c[k], Q[k, i, 0], Q[k, i, 1], middle, middle)
             c[k, 0], c[k, 1] = down(c[k, 0] - around), up(c[k, 1] + around)
-    B[:] = Q
-    r[:] = 0.0
+    write_into(B, Q)
+    r.fill(0.0)
     return True
 
 
@@ -212,10 +213,11 @@ def orthogonal(columns, B):
         left = 0.0
         if best >= 0:
             taken[best] = 1.0
-            v[:] = columns[:, best]
+            for i in range(n):
+                v[i] = columns[i, best]
             left = _without(v, B, place)
         while not left > 1e-12 * scale and unit < n:  # a direction that nothing has yet
-            v[:] = 0.0
+            v.fill(0.0)
             v[unit], unit = 1.0, unit + 1
             left = _without(v, B, place)
             left = left if left > 0.5 / math.sqrt(n) else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..enclosures.address import call_enclosure
 from ..machine.machine_code import kept
-from .intervals import AS_NUMPY, down, interval_product, power_of_time, up
+from .intervals import AS_NUMPY, down, interval_product, power_of_time, up, write_into
 
 _TRIES = 2  # of what the rest may be, for one step size
 
@@ -25,14 +25,15 @@ def coefficients(code, places, folds, box, orders, k, read, first):
     # Shapes: `box` (4n, 2, lanes), `k` (orders + 1, rows, 2, lanes).
     rows, kept_rows, _, o, w, x, _ = places
     call_enclosure(code[0], box, first)
-    k[0] = first[:rows]
-    read[o : o + kept_rows] = first[rows:]
-    read[x : x + box.shape[0]] = box
+    write_into(k[0], first[:rows])
+    write_into(read[o : o + kept_rows], first[rows:])
+    write_into(read[x : x + box.shape[0]], box)
     for order in range(1, orders + 1):
-        read[w] = order
-        read[w + 1, 0], read[w + 1, 1] = down(1.0 / order), up(1.0 / order)
-        read[w + 2] = 1.0 if order == 1 else 0.0
-        read[:rows] = k[order - 1]
+        read[w].fill(order)
+        read[w + 1, 0].fill(down(1.0 / order))
+        read[w + 1, 1].fill(up(1.0 / order))
+        read[w + 2].fill(1.0 if order == 1 else 0.0)
+        write_into(read[:rows], k[order - 1])
         _sum_products(folds, order, k, read)
         call_enclosure(code[1], read, k[order])
 
@@ -43,7 +44,8 @@ def _sum_products(folds, order, k, read):
     for f in range(folds.shape[0]):
         left, right, at = folds[f]
         least, most = read[at, 0], read[at, 1]
-        least[:], most[:] = 0.0, 0.0
+        least.fill(0.0)
+        most.fill(0.0)
         for j in range(1, order):
             a, b = k[j, left, 0], k[j, left, 1]
             c, d = k[order - j, right, 0], k[order - j, right, 1]
@@ -58,7 +60,7 @@ def fill_lanes(box, middle, lanes):
     # Shapes: `lanes` (groups, 4n, 2, lanes).
     n, lane, width = middle.size, 0, lanes.shape[3]
     pairs = n * (n + 1) // 2
-    lanes[:] = 0.0
+    lanes.fill(0.0)
     for lane in range(lanes.shape[0] * width):
         g, at = lane // width, lane % width
         for i in range(n):
@@ -67,11 +69,13 @@ def fill_lanes(box, middle, lanes):
     lane = 0
     for i in range(n):
         for j in range(i + 1):
-            lanes[lane // width, n + i, :, lane % width] = 1.0
-            lanes[lane // width, 2 * n + j, :, lane % width] = 1.0
+            for end in range(2):
+                lanes[lane // width, n + i, end, lane % width] = 1.0
+                lanes[lane // width, 2 * n + j, end, lane % width] = 1.0
             lane += 1
     for i in range(n):
-        lanes[(pairs + i) // width, n + i, :, (pairs + i) % width] = 1.0
+        for end in range(2):
+            lanes[(pairs + i) // width, n + i, end, (pairs + i) % width] = 1.0
 
 
 @kept(**AS_NUMPY)
@@ -87,10 +91,12 @@ def flow_derivatives(lanes, at, J, H):
                     H[k, i, j, end] = H[k, j, i, end] = value
             lane += 1
     for k in range(n):
-        at[k] = lanes[lane // width, k, :, lane % width]
+        for end in range(2):
+            at[k, end] = lanes[lane // width, k, end, lane % width]
     for i in range(n):
         for k in range(n):
-            J[k, i] = lanes[(lane + i) // width, n + k, :, (lane + i) % width]
+            for end in range(2):
+                J[k, i, end] = lanes[(lane + i) // width, n + k, end, (lane + i) % width]
 
 
 @kept(**AS_NUMPY)
@@ -116,7 +122,7 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
     power_of_time(h, order + 1, power)
     rows = lanes.shape[1]
     for g in range(lanes.shape[0]):
-        pad[g] = 0.0
+        pad[g].fill(0.0)
         for i in range(rows):
             for lane in range(lanes.shape[3]):
                 size = max(-k[g, order, i, 0, lane], k[g, order, i, 1, lane]) * h**order
@@ -124,7 +130,7 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
                 pad[g, i, 0, lane], pad[g, i, 1, lane] = -around, around
         is_held = False
         for _ in range(_TRIES):
-            rest[g] = 0.0
+            rest[g].fill(0.0)
             add_up(k[g], order, span, rest[g], lanes[g])
             _widen(lanes[g], pad[g])
             coefficients(code, places, folds, lanes[g], order + 1, ky[g], read, first)
@@ -133,7 +139,7 @@ def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, f
                 break
         if not is_held:
             return False
-        rest[g] = ky[g, order + 1, :rows]
+        write_into(rest[g], ky[g, order + 1, :rows])
     return True
 
 

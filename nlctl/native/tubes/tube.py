@@ -11,7 +11,16 @@ import numpy as np
 
 from ..enclosures.writer import LANES
 from ..machine.machine_code import kept
-from .intervals import AS_NUMPY, add_image, add_product, down, interval_product, power_of_time, up
+from .intervals import (
+    AS_NUMPY,
+    add_image,
+    add_product,
+    down,
+    interval_product,
+    power_of_time,
+    up,
+    write_into,
+)
 from .series import SeriesCode
 from .sets import box_of_set, next_errors, next_polynomials, renewed, slopes_within
 from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_step
@@ -137,7 +146,7 @@ def integrated(
         if first_numbers:
             matter(P, table, box, weight)
         first_numbers = not renewed(c, P, table[1], B, r, _NEW) and first_numbers
-        begin[:] = end
+        write_into(begin, end)
         box_of_set(c, P, table[1], B, r, end)
         range_over_step(ky[0], h, begin, end, over)
         write_limits(over, early / duration, up(late + h) / duration, low, high)
@@ -174,8 +183,8 @@ def first_set(box, count):
     c, r = np.zeros((n, 2)), np.zeros((n, 2))
     P, B = np.zeros((n, count)), np.zeros((n, n, 2))
     for i in range(n):
-        c[i] = 0.5 * box[i, 0] + 0.5 * box[i, 1]
-        B[i, i] = 1.0
+        c[i, 0] = c[i, 1] = 0.5 * box[i, 0] + 0.5 * box[i, 1]
+        B[i, i, 0] = B[i, i, 1] = 1.0
         if box[i, 0] < box[i, 1]:
             P[i, i] = max(up(box[i, 1] - c[i, 0]), up(c[i, 0] - box[i, 0]))
     return c, P, B, r

@@ -67,6 +67,24 @@ def test_other_values_are_compared_again(change, compared):
     assert len(compared) - before > 1
 
 
+def test_the_same_gains_with_more_values_are_compared_at_fewer_points(compared):
+    """The functions and the wiring are what was compared at all of them."""
+    certify(example(), params={"law.beta": 2.1})
+    before = len(compared)
+    found = certify(example(), params={"law.beta": 2.2})
+    assert len(compared) - before == 4
+    assert found.C_0 == certify(nlctl.paper.example_1(controller=known_sign(beta=2.2))).C_0
+
+
+def test_another_wiring_with_other_values_is_compared_and_refused():
+    for beta in (2.1, 2.2):
+        certify(example(), params={"law.beta": beta})
+    loop = example()
+    rewired(loop)
+    with pytest.raises((DiagramError, AttributeError)):
+        certify(loop, params={"law.beta": 2.3})
+
+
 def swapped_output(loop):
     actuator = block(loop, "actuator")
     code = actuator.spec.output.__code__

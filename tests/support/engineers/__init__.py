@@ -7,5 +7,5 @@ from engineers.entry import ENTRIES, Entry, system
 __all__ = ["ENTRIES", "Entry", "system"]
 
 for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "elementary", "language",
-               "objects", "models"):  # fmt: skip
+               "objects", "models", "everyday", "toolbox", "habits", "plants"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")
