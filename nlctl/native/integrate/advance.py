@@ -251,7 +251,8 @@ def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
-    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
+    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays
+    or is needed.
     """
     lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
@@ -259,6 +260,8 @@ def advance(rhs, point, along, task, w, rounds):
     for _ in range(rounds):
         if task.taylor.highest:
             taylor.expand(task, lanes, w)
+            if lanes[0].status == METHOD:
+                return
         if not _chosen(task, lanes, w) or is_full(task, lanes, w) or log_is_full(task, lanes, w):
             return
         if lanes[0].stiff and task.stiff.derivatives == UNKNOWN:

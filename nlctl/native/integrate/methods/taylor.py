@@ -25,7 +25,7 @@ from ..evaluate import input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
-from ..state import INNER, RUNNING
+from ..state import INNER, METHOD, RUNNING, STIFF
 
 FIRST_TURN = 20  # steps after which it is judged whether this method pays
 SLOPES = 2  # slopes at both ends of a step
@@ -97,6 +97,9 @@ def expand(task, lanes, w):
     call_expansion(series[_EXPANSION], w.t, w.x, w.u, taylor.u_rate, task.taylor.c, taylor.terms)
     call_growth(series[_GROWTH], w.x, task.taylor.c, taylor.terms, taylor.largest)
     for j in range(lanes.size):
+        lane = lanes[j]
+        if taylor.expanded[j] == 0 and lane.status == RUNNING and _lacks_terms(task, w, j):
+            lane.status = METHOD if task.alone else STIFF
         if taylor.expanded[j] == 0 and task.fixed == 0.0:
             h = _length(task.taylor.highest, taylor.largest, j)
             if h > 0.0:
@@ -104,6 +107,25 @@ def expand(task, lanes, w):
             if _begins_at_jump(task, lanes[j], taylor.terms, j):
                 lanes[j].h = _shortest(task)
         taylor.expanded[j] = 1
+
+
+@numba.njit(**INNER)
+def _lacks_terms(task, w, j):
+    """Whether a lane's coefficients are not finite where its states and their rates are.
+
+    As those of the root of t at 0, or where intermediate values overflow: for the explicit pair.
+    """
+    taylor, lacks, total = w.taylor, False, 0.0
+    for i in range(taylor.largest.shape[0]):
+        total += taylor.largest[i, j]
+    if np.isfinite(total):
+        return False
+    for i in range(w.x.shape[0]):
+        if not np.isfinite(taylor.terms[0, i, j] + taylor.terms[1, i, j]):
+            return False
+        for k in range(2, task.taylor.highest + 1):
+            lacks |= not np.isfinite(taylor.terms[k, i, j])
+    return lacks
 
 
 @numba.njit(**INNER)
