@@ -14,9 +14,10 @@ import numpy as np
 from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
-from .events.crossing import NOTHING, crossed_before, crossing, left_to_other_side
+from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
 from .events.functions import begin_next, has_events
+from .events.kinks import crossed_before, look_at_kinks
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -273,6 +274,8 @@ def advance(rhs, point, along, task, w, rounds):
         if rows.memory.size:
             _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
+        if rows.watched < rows.switching and task.fixed == 0.0:
+            look_at_kinks(rhs, task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
         if rows.memory.size:
