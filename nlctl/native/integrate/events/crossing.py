@@ -16,7 +16,7 @@ import numpy as np
 
 from ..control import shorten
 from ..state import INNER, is_stiff
-from .location import AGAIN, CLEAR, EVENT, REFUSED
+from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK
 
 NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
@@ -149,10 +149,12 @@ def _across(task, lane, w, j):
     if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
         shorten(lane, 1.0)
         return REFUSED
-    for i in range(task.rows.declared, task.rows.switching):
+    for i in range(task.rows.switching):
         if crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
-            lane.misses = 0
-            return EVENT
+            kink = task.rows.bending <= i < task.rows.declared
+            if not (kink and abs(w.events.g[i, j]) <= SMALL_KINK * task.atol):
+                lane.misses = 0
+                return EVENT
     lane.misses += 1
     return CLEAR
 

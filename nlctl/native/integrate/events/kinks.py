@@ -56,7 +56,7 @@ def look_at_kinks(rhs, task, lanes, w, found):
 @numba.njit(**INNER)
 def _any_crossed(task, w, g, j):
     """Whether a guard, or what the run watches, is crossed by values within a step."""
-    for i in range(task.rows.watched, task.rows.switching):  # noqa: SIM110
+    for i in range(task.rows.watched, task.rows.switching):
         if crossed(task, w, i, g[i, j], j):
             return True
     return False
