@@ -111,10 +111,7 @@ def expand(task, lanes, w):
 
 @numba.njit(**INNER)
 def _lacks_terms(task, w, j):
-    """Whether a lane's coefficients are not finite where its states and their rates are.
-
-    As those of the root of t at 0, or where intermediate values overflow: for the explicit pair.
-    """
+    """Whether coefficients are not finite where states and rates are, as of sqrt(t) at 0."""
     taylor, lacks, total = w.taylor, False, 0.0
     for i in range(taylor.largest.shape[0]):
         total += taylor.largest[i, j]
@@ -210,16 +207,9 @@ def taylor_attempt(rhs, task, lanes, w):
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g, w.memories.m)
     call_judge(
-        series[_JUDGE],
-        w.h,
-        w.x,
-        w.x_new,
-        w.ahead.dx,
-        dx,
-        task.taylor.c,
-        w.taylor.terms,
+        series[_JUDGE], w.h, w.x, w.x_new, w.ahead.dx, dx, task.taylor.c, w.taylor.terms,
         w.taylor.largest,
-    )
+    )  # fmt: skip
     _look_inside(rhs, task, lanes, w)
     for j in range(lanes.size):
         w.error[j], w.rate[j], w.inside.resolved[j] = _error(task, w, j), 0.0, np.inf
@@ -334,9 +324,7 @@ def _error(task, w, j):
     In a step with an event the right-hand side has changed before the end: the last term counts.
     """
     defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
-    if (
-        w.inside.looked[j] != 0.0
-    ):  # on another side inside of the step: a shorter one is to be tried
+    if w.inside.looked[j] != 0.0:  # on another side inside: a shorter step is to be tried
         return (0.9 / min(w.inside.foreseen[j], 0.8)) ** task.pair.order + 0.0 * (defect + term)
     for i in range(task.rows.switching):
         if _meets(task, w, i, w.events.g[i, j], j):
@@ -489,9 +477,8 @@ def _defect(task, w, dx, j):
     """Return a lane's defect times the step over the tolerance, with dx at what is looked at."""
     largest = 0.0
     for i in range(w.x.shape[0]):
-        slope = _value_and_slope(
-            task.taylor.highest, w.inside.looked[j] * w.h[j], w.taylor.terms, i, j
-        )[1]
+        at = w.inside.looked[j] * w.h[j]
+        slope = _value_and_slope(task.taylor.highest, at, w.taylor.terms, i, j)[1]
         defect = abs(w.h[j] * (dx[i, j] - slope))
         part = defect / (task.atol + task.rtol * abs(w.ahead.x[i, j]))
         largest = part if part > largest or part != part else largest
