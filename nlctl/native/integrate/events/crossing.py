@@ -94,7 +94,7 @@ def _shortened(lane, beyond):
 def _is_behind(task, lane, w, j):
     """Whether the step just tried ends behind a condition."""
     for i in range(task.rows.declared, task.rows.switching):
-        if crossed(task, w, i, w.events.g[i, j], j) or (
+        if has_crossed(task, w, i, w.events.g[i, j], j) or (
             _leaves(task, lane, w, i, j) and w.events.g[i, j] != 0
         ):
             return True
@@ -150,7 +150,7 @@ def _across(task, lane, w, j):
         shorten(lane, 1.0)
         return REFUSED
     for i in range(task.rows.switching):
-        if crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
+        if has_crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
             kink = task.rows.bending <= i < task.rows.declared
             if not (kink and abs(w.events.g[i, j]) <= SMALL_KINK * task.atol):
                 lane.misses = 0
@@ -186,7 +186,7 @@ def left_to_other_side(task, w, i, j):
 
 
 @numba.njit(**INNER)
-def crossed(task, w, i, end, j):
+def has_crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
@@ -279,7 +279,7 @@ def _foreseen(task, lane, w, bad, j):
         now, end = w.events.g_low[i, j], w.events.g_high[i, j]
         leads_away = lane.low > 0.0 and abs(now) > abs(w.events.g_start[i, j])
         right = (lane.right_high or lane.low == 0.0) and not leads_away
-        if crossed(task, w, i, end, j) and right:
+        if has_crossed(task, w, i, end, j) and right:
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)

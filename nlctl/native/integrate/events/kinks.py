@@ -12,7 +12,7 @@ import numba
 from ..control import shorten
 from ..methods.dense import events_at_parts
 from ..state import INNER
-from .crossing import bracket, crossed, next_try
+from .crossing import bracket, has_crossed, next_try
 from .location import AGAIN, EVENT, first_root
 
 _NEWTON = 2  # secants towards a kink
@@ -57,7 +57,7 @@ def look_at_kinks(rhs, task, lanes, w, found):
 def _any_crossed(task, w, g, j):
     """Whether a guard, or what the run watches, is crossed by values within a step."""
     for i in range(task.rows.watched, task.rows.switching):
-        if crossed(task, w, i, g[i, j], j):
+        if has_crossed(task, w, i, g[i, j], j):
             return True
     return False
 
