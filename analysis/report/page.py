@@ -22,45 +22,41 @@ from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric
 from .typography import pieces, plain_text
 
-__all__ = [
-    "PARTS",
-    "check_gallery_folder",
-    "check_report_folder",
-    "fill",
-    "generator",
-    "to_bytes",
-    "write_files",
-]
-
 UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
 
-def fill(template: str, *, interactive: bool = False, **content: object) -> str:
+def fill(template: str, *, interactive: bool = False, live: bool = False, **content: object) -> str:
     """Return a template filled in, with the page's style and script, and the policy for them.
 
-    An interactive page has uPlot (MIT licence) in them, and what draws its charts.
+    An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one what
+    runs its loops, and may make code of WebAssembly.
     """
     style, script = font_face() + _own("templates/report.css"), _own("templates/report.js")
     if interactive:
         style += _own(f"{UPLOT}/uPlot.min.css") + "\n" + _own("templates/history.css")
         licence = f"\n/*\n{_own(f'{UPLOT}/LICENSE')}\n*/\n"
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
+    if live:
+        style += _own("templates/live.css")
+        parts = (_own(f"templates/{name}.js") for name in ("live_engine", "live"))
+        script += "\n{\n" + "\n".join(parts) + "}\n"  # with names of their own
     page = _environment().get_template(template)
     text = page.render(
         style=Markup(style),
         script=Markup(script),
-        policy=_policy(style, script),
+        policy=_policy(style, script, live=live),
         generator=generator(template),
         **content,
     )
     return text.translate(CONTROL)
 
 
-def _policy(style: str, script: str) -> str:
+def _policy(style: str, script: str, *, live: bool = False) -> str:
     """Return the content policy: this style, this script, pictures and fonts in the page."""
+    code = " 'wasm-unsafe-eval'" * live  # of WebAssembly alone: nothing else is made code of
     return (
-        f"default-src 'none'; style-src '{_digest(style)}'; script-src '{_digest(script)}'; "
+        f"default-src 'none'; style-src '{_digest(style)}'; script-src '{_digest(script)}'{code}; "
         "img-src data:; font-src data:; base-uri 'none'; form-action 'none'"
     )
 
@@ -114,7 +110,7 @@ HEAD = 4096  # bytes of a page in which its generator stands
 
 
 def generator(template: str) -> str:
-    """Return what the page of a template says of who made it."""
+    """Return the generator that a page names."""
     return f"nlctl {Path(template).stem}"
 
 
@@ -125,7 +121,7 @@ def check_report_folder(folder: str | os.PathLike[str]) -> None:
         folder / n for n in ("index.html", "report.json", "report.pdf", "signals.json")
     )
     is_own = _maker(page) == generator("report.html")
-    others = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
+    others = [p for p, is_ours in ((page, is_own), (content, _is_report(content))) if not is_ours]
     others += [] if is_own else others_of_page
     _refuse([path for path in others if path.exists()], "take another folder with --out")
 
@@ -149,10 +145,10 @@ def _maker(page: Path) -> str:
     """Return who made a page; nothing if it does not say, or cannot be read."""
     try:
         with page.open("rb") as file:
-            found = MADE.search(file.read(HEAD).decode(errors="replace"))
+            match = MADE.search(file.read(HEAD).decode(errors="replace"))
     except OSError:
         return ""
-    return found[1] if found else ""
+    return match[1] if match else ""
 
 
 def _is_report(path: Path) -> bool:

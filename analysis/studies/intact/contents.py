@@ -1,0 +1,167 @@
+"""Whether a run folder is intact: one sealed record of every file, which every reader checks first.
+
+``contents.json`` is written last, when a run ends, and removed when it continues.  It says which
+files there are, with a key of each, how many rows and which columns each table has, which analyses
+are expected, and which page was made of them: whatever a copy lost, a disk damaged or somebody
+edited is named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from nlctl.wording import counted
+
+from ...robustness.runs.parquet import parquet
+from ..file.schema import keyed
+from ..result import Result
+from ..sealed import RunFolderError, file_digest, write_json
+from .shapes import ContentsFile, shaped
+
+CONTENTS = "contents.json"
+_LONGEST = 200  # characters of names in a message
+_AT_TOP = ("study.toml", "run.json", "results.json")
+REMEDY = "continue the run with --resume, which makes it again, or take an intact copy"
+
+
+def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> None:
+    """Write what was found, from the origin with that key, and the record of the folder then."""
+    write_json(result.folder / "results.json", result.plain() | {"origin": key})
+    folder, done = result.folder, [finding.key for finding in result.findings]
+    files = list(_parts(folder, keyed(result.study)))
+    digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in files}
+    is_same = before is not None and before["files"] == digests
+    content = {
+        "files": digests,
+        "rows": _rows(folder, files),
+        "tables": _tables(folder, files),
+        "analyses": list(keyed(result.study)),
+        "done": done,
+        "complete": result.complete,
+        "page": before["page"] if before is not None and is_same else {},
+    }
+    write_json(folder / CONTENTS, content)
+
+
+def unseal(folder: Path) -> dict[str, Any] | None:
+    """Take the record away, before anything in the folder changes; return it if it was intact."""
+    try:
+        before = sealed_record(folder)
+    except RunFolderError:
+        before = None
+    (folder / CONTENTS).unlink(missing_ok=True)
+    return before
+
+
+def _parts(folder: Path, keys: Iterable[str]) -> Iterator[Path]:
+    """Yield the files that a run has written and that readers read."""
+    yield from (path for name in _AT_TOP if (path := folder / name).exists())
+    for key in ("rows", *keys):
+        yield from sorted(p for p in (folder / key).rglob("*") if is_part(p))
+
+
+def is_part(path: Path) -> bool:
+    """Whether a file may be one that readers read."""
+    hidden, damaged = path.name.startswith("."), path.suffix == ".damaged"
+    return not (hidden or damaged) and (path.is_symlink() or not path.is_dir())
+
+
+def _rows(folder: Path, files: Iterable[Path]) -> dict[str, int]:
+    """Return the number of rows that each part of a folder keeps in chunks."""
+    rows: dict[str, int] = {}
+    for path in files:
+        if path.parent.name == "chunks" and path.suffix == ".parquet":
+            part = path.relative_to(folder).parts[0]
+            rows[part] = rows.get(part, 0) + parquet().read_metadata(path).num_rows
+    return rows
+
+
+def _tables(folder: Path, files: Iterable[Path]) -> dict[str, Any]:
+    """Return the number of rows and the columns of every table in a folder."""
+    tables = {}
+    for path in files:
+        if path.suffix == ".parquet":
+            kept = parquet().read_metadata(path)
+            columns = kept.schema.to_arrow_schema().names
+            tables[path.relative_to(folder).as_posix()] = {
+                "rows": kept.num_rows,
+                "columns": columns,
+            }
+    return tables
+
+
+def check_intact(folder: Path) -> dict[str, Any]:
+    """Refuse a folder that is not what its run has written; return its record."""
+    content = sealed_record(folder)
+    for problem in problems_in(folder, content):
+        raise RunFolderError(f"{problem}: {REMEDY}")
+    return content
+
+
+def sealed_record(folder: Path) -> dict[str, Any]:
+    """Return what ``contents.json`` says, whether or not it is so."""
+    path = folder / CONTENTS
+    if (folder / "study.toml").exists() and not path.exists():
+        raise RunFolderError(
+            f"'{folder}' holds a run that has not come to an end, or that lost its '{CONTENTS}': "
+            "continue it with --resume"
+        )
+    if not path.exists():
+        raise RunFolderError(f"'{folder}' holds no run of a study: there is no '{CONTENTS}'")
+    return shaped(path, ContentsFile, "continue the run with --resume, which makes it again")
+
+
+def problems_in(folder: Path, content: dict[str, Any]) -> Iterator[str]:
+    """Yield what is not as the record says, one sentence each."""
+    parquet()
+    files = content["files"]
+    yield from (f"'{folder / n}' is missing in its record" for n in _AT_TOP if n not in files)
+    sound = []
+    for name, digest in files.items():
+        path = folder / name
+        try:
+            if file_digest(path) == digest:
+                sound.append(path)
+            else:
+                yield f"'{path}' is not as it was written"
+        except FileNotFoundError:
+            yield f"'{path}' is missing"
+        except OSError as error:
+            yield f"'{path}' cannot be read ({error.strerror or error})"
+    keys = {*content["done"], *content["analyses"]}
+    for path in _parts(folder, sorted(keys)):
+        if path.relative_to(folder).as_posix() not in files:
+            yield f"'{path}' was not written by the run"
+    if len(sound) == len(files):
+        yield from _contradictions(folder, content, sound)
+
+
+def _size(table: Mapping[str, Any] | None) -> str:
+    if table is None:
+        return "no table"
+    return f"{counted(table['rows'], 'row')} of {', '.join(table['columns'])[:_LONGEST]}"
+
+
+def _contradictions(folder: Path, content: dict[str, Any], files: list[Path]) -> Iterator[str]:
+    """Yield what the record says that cannot be, of files that are all as it says."""
+    place = f"'{folder / CONTENTS}'"
+    try:
+        rows, tables = _rows(folder, files), _tables(folder, files)
+    except (OSError, ValueError, NotImplementedError) as error:  # of pyarrow, which derives them
+        yield f"a table of '{folder}' cannot be read ({str(error).partition(chr(10))[0]})"
+        return
+    if rows != content["rows"]:
+        yield f"{place} counts other rows ({content['rows']}) than there are ({rows})"
+    recorded = content["tables"]
+    for name in dict.fromkeys([*recorded, *tables]):
+        if recorded.get(name) != tables.get(name):
+            expected, actual = (_size(where.get(name)) for where in (recorded, tables))
+            yield f"{place} says that '{name}' has {expected}, and it has {actual}"
+    expected, done = content["analyses"], content["done"]
+    if expected[: len(done)] != done or (content["complete"] and done != expected):
+        yield f"{place} names other analyses as done ({done}) than are expected ({expected})"
+    for key in done:
+        if f"{key}/finding.json" not in content["files"]:
+            yield f"'{folder / key / 'finding.json'}' is missing"
