@@ -68,11 +68,8 @@ def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     None if there are none: an equation was differentiated for an integer parameter that has
     another value now.  Opaque functions have differences in them.
     """
-    known = reading.cache.of(AlongCode)
     with _ONCE:
-        if not known:
-            known.append(_made(reading))
-    (made,) = known
+        made = reading.cache.found(AlongCode, lambda each: True, lambda: _made(reading))
     if not made.lowered.holds_for(p):
         return None
     c = np.zeros((made.lowered.size, DIRECTIONS))

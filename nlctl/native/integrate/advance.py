@@ -14,9 +14,10 @@ import numpy as np
 from .control import choose_method, choose_step, limit_step, next_step, rejected
 from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
-from .events.crossing import NOTHING, crossed_before, crossing, left_to_other_side
+from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
 from .events.functions import begin_next, has_events
+from .events.kinks import crossed_before, look_at_kinks
 from .events.location import (
     AGAIN,
     CLEAR,
@@ -107,10 +108,10 @@ def _accept(task, lanes, w, found, done, passed):
         if task.timed.opaque:
             lane.rests = _rests(task, w, j)
         if lane.across:
-            lane.left_zero = _left_zero(task, w, j)
+            lane.left_zero = _from_zero(task, w, False, j)
             lane.across, lane.cross = 0, 0.0
         else:
-            lane.left_zero = lane.left_zero and _left_zero(task, w, j)
+            lane.left_zero = lane.left_zero and _from_zero(task, w, False, j)
             next_step(lane, w.error[j], w.rate[j], task)
         if task.fixed == 0.0 and has_events(w):
             lane.h = min(lane.h, w.inside.resolved[j])
@@ -130,24 +131,15 @@ def _counted(task, lane, w, event, j):
     """Count an accepted step; where a condition stays exactly 0 its steps across stay wide."""
     misses = lane.misses
     step_accepted(lane, event)
-    if misses > 0 and _stays_at_zero(task, w, j):
+    if misses > 0 and _from_zero(task, w, True, j):
         lane.misses = misses  # what shorter ones add to a state is lost in rounding
 
 
 @numba.njit(**INNER)
-def _stays_at_zero(task, w, j):
-    """Whether a condition was exactly 0 where a step began and is so at its end."""
+def _from_zero(task, w, stays, j):
+    """Whether a step began where a condition was exactly 0, and it stays so, or has left that."""
     for i in range(task.rows.declared, task.rows.guarded):
-        if w.events.g_start[i, j] == 0.0 and w.events.g[i, j] == 0.0:
-            return True
-    return False
-
-
-@numba.njit(**INNER)
-def _left_zero(task, w, j):
-    """Whether a step has led away from where a condition was exactly 0."""
-    for i in range(task.rows.declared, task.rows.guarded):
-        if w.events.g_start[i, j] == 0.0 and w.events.g[i, j] != 0.0:
+        if w.events.g_start[i, j] == 0.0 and (w.events.g[i, j] == 0.0) == stays:
             return 1
     return 0
 
@@ -251,7 +243,8 @@ def advance(rhs, point, along, task, w, rounds):
     """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
 
     A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
-    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays.
+    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays
+    or is needed.
     """
     lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
@@ -259,6 +252,8 @@ def advance(rhs, point, along, task, w, rounds):
     for _ in range(rounds):
         if task.taylor.highest:
             taylor.expand(task, lanes, w)
+            if lanes[0].status == METHOD:
+                return
         if not _chosen(task, lanes, w) or is_full(task, lanes, w) or log_is_full(task, lanes, w):
             return
         if lanes[0].stiff and task.stiff.derivatives == UNKNOWN:
@@ -270,6 +265,8 @@ def advance(rhs, point, along, task, w, rounds):
         if rows.memory.size:
             _look_ahead(rhs, task, lanes, w)
         _judge(task, lanes, w, found)
+        if rows.watched < rows.switching and task.fixed == 0.0:
+            look_at_kinks(rhs, task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
         if rows.memory.size:
@@ -370,13 +367,16 @@ def _note_left(task, lane, w, located, j):
     declare is 0 as long as a memory is carried along: where it turns is no event.
     """
     events, rows = w.events, task.rows
-    for i in range(rows.bending, rows.guarded):
+    for i in range(rows.bending if rows.memory.size else 0, rows.guarded):
         if events.g_start[i, j] != 0.0 or not abs(events.g[i, j]) > 0.0:
             continue
         now, came = events.g[i, j], events.came[i, j]
         if came == 0.0 and i >= rows.watched and rows.ending[i - rows.watched]:
             continue
-        is_rounding = i < rows.declared and abs(now) <= SMALL_KINK * task.atol
+        if came == 0.0 and i < rows.bending:
+            continue
+        is_kink = rows.bending <= i < rows.declared
+        is_rounding = is_kink and abs(now) <= SMALL_KINK * task.atol
         if came == 0.0 or (came * now < 0.0 and not is_rounding):
             t = lane.t if located and came != 0.0 else lane.begun
             if _counts(task, lane, i, now):

@@ -13,7 +13,9 @@ differentiated in turn, as sin and cos.
 
 The sums are left to one loop, see `folds`; all else at an order k is a function like any other.
 What is affine in time, as are inputs between two break points, has no sums.  At a kink the side
-counts on which the solution goes on: that of the first coefficient that is not 0.
+counts on which the solution goes on: that of the first coefficient that is not 0.  A function of
+what is so large that it does not depend on it any more, as 1 / cosh(t)^2, is constant: coefficients
+of an argument that overflows are not asked for.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = (
     2,
 )  # rows of "w": k, 1 / k, and 1 for k = 1, otherwise 0
 _WEIGHT_ROWS = 3
+_LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that leaves nothing to tell
 ROOM = 8  # rows that sums of vectors take are a multiple of this
 
 
@@ -307,6 +310,7 @@ class _Reader:
         if b is not None:
             last = graph.op("mul", b, self.value(node))
             inner = graph.op("add", self._sum(b, ("node", node)), last)
+            inner = self._unless_flat(inner, under, graph.op("div", node, under))
             found = graph.op("sub", a, inner) if a else graph.op("neg", inner)
         reciprocal = self.value(graph.op("div", graph.const(1.0), under))
         return graph.op("mul", found, reciprocal) if found else None
@@ -326,7 +330,8 @@ class _Reader:
         found: Expr | None = None
         for i, (arg, term) in enumerate(zip(node.args, terms, strict=True)):
             if term is not None:
-                part = self._chained(arg, term, _steady(self.graph, self.partial(node, i), node))
+                derivative = _steady(self.graph, self.partial(node, i), node)
+                part = self._unless_flat(self._chained(arg, term, derivative), arg, derivative)
                 found = self.graph.op("add", found, part) if found and part else found or part
         return self.graph.op("mul", found, self.weight(RECIPROCAL_ROW)) if found else None
 
@@ -346,6 +351,18 @@ class _Reader:
         for factor in factors:
             found = graph.op("mul", factor, found) if factor else graph.op("neg", found)
         return found
+
+    def _unless_flat(self, part: Expr | None, arg: Expr, derivative: Expr) -> Expr | None:
+        """Return what follows from an argument, 0 where that is large and nothing follows."""
+        graph = self.graph
+        if part is None or not derivative.varies:
+            return part
+        large = graph.op("gt", graph.op("absolute", arg), graph.const(_LARGE))
+        tells = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
+        flat = graph.op("and", large, graph.op("not", tells))  # NaN tells nothing: inf * 0
+        zero = graph.const(0.0)
+        counts = self.value(graph.op("select", flat, zero, graph.const(1.0)))
+        return graph.op("select", graph.op("ne", counts, zero), part, zero)
 
     def _sum(self, a: Expr, b: Expr | _Key) -> Expr:
         """Return the sum over j = 1..k-1 of a_j b_{k-j}, of terms or of a node's coefficients."""

@@ -5,6 +5,9 @@ After that Taylor's method is tried.  It stays while it gets further than the ex
 the same work, both as measured in this run, one right after the other; the explicit pair is
 measured again from time to time, and that is also when it sees that the equations have become
 stiff.  Nothing rests on clocks: a run has the same numbers on every machine.
+
+Where coefficients are not finite although the rates are, as those of the root of t at 0, the
+explicit pair has its turn whatever the method.
 """
 
 from __future__ import annotations
@@ -70,10 +73,11 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
     lane["from_tried"] = lane["accepted"] + lane["rejected"]
     if run.task.taylor.highest:
         return _by_pair(run, settings)
+    alone = {"span": 0} if settings.method == "taylor" else {}  # nothing is compared
     lane["other_pace"] = lane["pace"]
     lane["span"] = FIRST_TURN
     if run.series is not None:  # it has had its turn before
-        taylor = with_fields(run.series.taylor, span=run.task.taylor.span)
+        taylor = with_fields(run.series.taylor, **{"span": run.task.taylor.span} | alone)
         run.work.taylor.expanded[:] = 0
         task = with_fields(run.task, taylor=taylor, pair=run.series.pair)
         return replace(run, task=task, work=with_stages(run.work, SLOPES))
@@ -81,6 +85,7 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
         task, terms = with_taylor(run.task, reading, p[:, None], settings)
     except ParameterError:  # there is what it cannot do
         return replace(run, task=with_fields(run.task, taylor=OTHER_METHOD))
+    task = with_fields(task, taylor=with_fields(task.taylor, **alone))
     arrays = new_terms(*terms, run.work.u.shape[0], 1)
     work = with_fields(with_stages(run.work, SLOPES), taylor=arrays)
     return replace(run, task=task, work=work, series=task)
@@ -103,9 +108,9 @@ def _by_pair(run: Run, settings: Settings) -> Run:
     if lane["span"] > FIRST_TURN:
         lane["span"], span = MEASURED, min(2 * span, _MOST)
     else:
-        lane["wait"] *= 2
+        lane["wait"] = max(2 * lane["wait"], MEASURED)
         lane["span"], span = lane["wait"], _SPAN
-    lane["h"] = lane["other_pace"]  # as it was when the pair was measured
+    lane["h"] = lane["other_pace"] or lane["h"]  # as it was when the pair was measured
     for name in ("tries", "seeks", "traces", "returns", "across", "cross"):
         lane[name] = 0  # what was being located is found again
     task = with_fields(

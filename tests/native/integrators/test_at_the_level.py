@@ -109,3 +109,36 @@ def test_a_pulse_of_a_ten_thousandth_of_the_run(how, width):
     )  # fmt: skip
     made = nlctl.input_output_response(loop, [0, 100], 0, 0, **how)
     assert made.states[0, -1] == pytest.approx(5 * width * np.sqrt(np.pi), rel=1e-4)
+
+
+def with_dropout(law):
+    """sin t through a law into a lag; the signal drops out from 1 s to 2.5 s."""
+    blocks = {
+        "source": ct.nlsys(None, lambda t, x, u, p: [np.sin(t)], inputs=0, outputs=["s"],
+                           name="source"),
+        "law": ct.nlsys(None, law, inputs=["s"], outputs=["u"], name="law"),
+        "plant": ct.ss(-1.0, 1.0, 1.0, 0.0, inputs="u", outputs="y", name="plant"),
+    }  # fmt: skip
+    fault = nlctl.Fault("source.s", "dropout", at=1.0, until=2.5)
+    return nlctl.with_faults(nlctl.interconnect(blocks, outputs=["y"]), fault)
+
+
+def declared(made):
+    """Times of the switching functions that the fault declares."""
+    return made.events["time"][made.events["block"].str.startswith("fault")].to_numpy()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("step", [0.25, 0.1])
+def test_steps_that_end_at_a_declared_break_point_note_it(method, step):
+    loop = with_dropout(lambda t, x, u, p: [u[0]])
+    made = nlctl.input_output_response(loop, [0, 4], 0, 0, method=method, step=step)
+    np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-9)
+
+
+@how
+def test_a_break_point_at_which_a_condition_jumps_is_noted_as_well(how):
+    """The input of both conditions jumps where the signal is back: 0.6 instead of 0."""
+    loop = with_dropout(lambda t, x, u, p: [np.where(u[0] * (u[0] + 0.3) > 0.2, 1.0, -0.1)])
+    made = nlctl.input_output_response(loop, [0, 4], 0, 0, **how)
+    np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-6)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..control import shorten
 from ..state import INNER, is_stiff
-from .location import AGAIN, CLEAR, EVENT, REFUSED
+from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK
 
 NOTHING = -2  # no condition lies in the step just tried
 BEFORE_CONDITION = 0.01  # of the relative tolerance, of a step: how close to one steps end
@@ -50,24 +50,8 @@ def crossing(task, lane, w, j):
     if not inside and lane.traces == 0:
         return NOTHING
     bad = inside or (task.fixed == 0.0 and _has_seen_a_jump(task, lane, w, j))
-    _bracket(task, lane, w, bad, j)
-    return _next_try(task, lane, w, bad, j)
-
-
-@numba.njit(**INNER)
-def crossed_before(task, lane, w, j):
-    """Look for guards and event functions in a step that is to end behind a break point.
-
-    Around a kink of theirs they may be on the other side for less than the step that led to it:
-    what comes first is located first, once a step.
-    """
-    if lane.returns == 0:
-        for i in range(task.rows.watched, task.rows.switching):
-            if _crossed(task, w, i, w.events.g[i, j], j):
-                lane.returns, lane.tries = 1, 0
-                _bracket(task, lane, w, True, j)
-                return _next_try(task, lane, w, True, j)
-    return EVENT
+    bracket(task, lane, w, bad, j)
+    return next_try(task, lane, w, bad, j)
 
 
 @numba.njit(**INNER)
@@ -110,7 +94,7 @@ def _shortened(lane, beyond):
 def _is_behind(task, lane, w, j):
     """Whether the step just tried ends behind a condition."""
     for i in range(task.rows.declared, task.rows.switching):
-        if _crossed(task, w, i, w.events.g[i, j], j) or (
+        if has_crossed(task, w, i, w.events.g[i, j], j) or (
             _leaves(task, lane, w, i, j) and w.events.g[i, j] != 0
         ):
             return True
@@ -165,10 +149,12 @@ def _across(task, lane, w, j):
     if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
         shorten(lane, 1.0)
         return REFUSED
-    for i in range(task.rows.declared, task.rows.switching):
-        if _crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
-            lane.misses = 0
-            return EVENT
+    for i in range(task.rows.switching):
+        if has_crossed(task, w, i, w.events.g[i, j], j) or left_to_other_side(task, w, i, j):
+            kink = task.rows.bending <= i < task.rows.declared
+            if not (kink and abs(w.events.g[i, j]) <= SMALL_KINK * task.atol):
+                lane.misses = 0
+                return EVENT
     lane.misses += 1
     return CLEAR
 
@@ -200,7 +186,7 @@ def left_to_other_side(task, w, i, j):
 
 
 @numba.njit(**INNER)
-def _crossed(task, w, i, end, j):
+def has_crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
@@ -208,7 +194,7 @@ def _crossed(task, w, i, end, j):
 
 
 @numba.njit(**INNER)
-def _bracket(task, lane, w, bad, j):
+def bracket(task, lane, w, bad, j):
     """Take the step just tried into the bracket of lengths: too long, or all on the near side.
 
     Of the near side the last two are kept, by which is foreseen where the condition lies: what a
@@ -240,7 +226,7 @@ def _bracket(task, lane, w, bad, j):
 
 
 @numba.njit(**INNER)
-def _next_try(task, lane, w, bad, j):
+def next_try(task, lane, w, bad, j):
     """Say what to try next, or take the step just tried, which ends right before a condition."""
     close = _close(task, lane)
     root = _foreseen(task, lane, w, bad, j)
@@ -293,7 +279,7 @@ def _foreseen(task, lane, w, bad, j):
         now, end = w.events.g_low[i, j], w.events.g_high[i, j]
         leads_away = lane.low > 0.0 and abs(now) > abs(w.events.g_start[i, j])
         right = (lane.right_high or lane.low == 0.0) and not leads_away
-        if _crossed(task, w, i, end, j) and right:
+        if has_crossed(task, w, i, end, j) and right:
             root = lane.low + (lane.high - lane.low) * min(max(now / (now - end), 0.0), 1.0)
         elif lane.low > 0.0:
             root = _extrapolated(lane, w, i, j)

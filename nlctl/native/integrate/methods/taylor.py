@@ -25,7 +25,7 @@ from ..evaluate import input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
-from ..state import INNER, RUNNING
+from ..state import INNER, METHOD, RUNNING, STIFF
 
 FIRST_TURN = 20  # steps after which it is judged whether this method pays
 SLOPES = 2  # slopes at both ends of a step
@@ -97,6 +97,9 @@ def expand(task, lanes, w):
     call_expansion(series[_EXPANSION], w.t, w.x, w.u, taylor.u_rate, task.taylor.c, taylor.terms)
     call_growth(series[_GROWTH], w.x, task.taylor.c, taylor.terms, taylor.largest)
     for j in range(lanes.size):
+        lane = lanes[j]
+        if taylor.expanded[j] == 0 and lane.status == RUNNING and _lacks_terms(task, w, j):
+            lane.status = METHOD if task.alone else STIFF
         if taylor.expanded[j] == 0 and task.fixed == 0.0:
             h = _length(task.taylor.highest, taylor.largest, j)
             if h > 0.0:
@@ -104,6 +107,22 @@ def expand(task, lanes, w):
             if _begins_at_jump(task, lanes[j], taylor.terms, j):
                 lanes[j].h = _shortest(task)
         taylor.expanded[j] = 1
+
+
+@numba.njit(**INNER)
+def _lacks_terms(task, w, j):
+    """Whether coefficients are not finite where states and rates are, as of sqrt(t) at 0."""
+    taylor, lacks, total = w.taylor, False, 0.0
+    for i in range(taylor.largest.shape[0]):
+        total += taylor.largest[i, j]
+    if np.isfinite(total):
+        return False
+    for i in range(w.x.shape[0]):
+        if not np.isfinite(taylor.terms[0, i, j] + taylor.terms[1, i, j]):
+            return False
+        for k in range(2, task.taylor.highest + 1):
+            lacks |= not np.isfinite(taylor.terms[k, i, j])
+    return lacks
 
 
 @numba.njit(**INNER)
@@ -188,16 +207,9 @@ def taylor_attempt(rhs, task, lanes, w):
         inputs_at(task, lanes, w)
     call_rhs(rhs, w.t, w.x_new, w.u, task.p, dx, w.events.g, w.memories.m)
     call_judge(
-        series[_JUDGE],
-        w.h,
-        w.x,
-        w.x_new,
-        w.ahead.dx,
-        dx,
-        task.taylor.c,
-        w.taylor.terms,
+        series[_JUDGE], w.h, w.x, w.x_new, w.ahead.dx, dx, task.taylor.c, w.taylor.terms,
         w.taylor.largest,
-    )
+    )  # fmt: skip
     _look_inside(rhs, task, lanes, w)
     for j in range(lanes.size):
         w.error[j], w.rate[j], w.inside.resolved[j] = _error(task, w, j), 0.0, np.inf
@@ -312,9 +324,7 @@ def _error(task, w, j):
     In a step with an event the right-hand side has changed before the end: the last term counts.
     """
     defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
-    if (
-        w.inside.looked[j] != 0.0
-    ):  # on another side inside of the step: a shorter one is to be tried
+    if w.inside.looked[j] != 0.0:  # on another side inside: a shorter step is to be tried
         return (0.9 / min(w.inside.foreseen[j], 0.8)) ** task.pair.order + 0.0 * (defect + term)
     for i in range(task.rows.switching):
         if _meets(task, w, i, w.events.g[i, j], j):
@@ -467,9 +477,8 @@ def _defect(task, w, dx, j):
     """Return a lane's defect times the step over the tolerance, with dx at what is looked at."""
     largest = 0.0
     for i in range(w.x.shape[0]):
-        slope = _value_and_slope(
-            task.taylor.highest, w.inside.looked[j] * w.h[j], w.taylor.terms, i, j
-        )[1]
+        at = w.inside.looked[j] * w.h[j]
+        slope = _value_and_slope(task.taylor.highest, at, w.taylor.terms, i, j)[1]
         defect = abs(w.h[j] * (dx[i, j] - slope))
         part = defect / (task.atol + task.rtol * abs(w.ahead.x[i, j]))
         largest = part if part > largest or part != part else largest
