@@ -52,8 +52,8 @@ def read_model(
         name=c_name(what if name is None else name), meaning=what,
         variables=tuple(all_variables(compiled, system, at, p, start, fixed)), places=at,
         continuous=tuple(i for i in range(rows["x"]) if i not in still), memory=program.memory,
-        sampled=program.sampled, guards=program.guards, jumping=program.jumping, parameters=p,
-        start=start, happenings=happenings, lowered=lowered, tolerance=tolerance,
+        sampled=program.sampled, declared=program.switching, guards=program.guards,
+        jumping=program.jumping, parameters=p, start=start, happenings=happenings, lowered=lowered, tolerance=tolerance,
         stop_time=stop_time,
     )  # fmt: skip
 

@@ -103,6 +103,8 @@ class Model:
         First value reference of each of these kinds.
     continuous, memory, sampled : tuple of int
         Places of states.
+    declared : int
+        Number of switching functions that blocks declare, the first of what switches.
     guards : tuple of int
         Of each guard the block that it belongs to.
     jumping : tuple of tuple
@@ -123,6 +125,7 @@ class Model:
     continuous: tuple[int, ...]
     memory: tuple[int, ...]
     sampled: tuple[int, ...]
+    declared: int
     guards: tuple[int, ...]
     jumping: tuple[tuple[int, int, int], ...]
     parameters: np.ndarray

@@ -49,7 +49,7 @@ def _header(model: Model, token: str) -> str:
         "SIGNS": rows["g"], "GUARDS": len(model.guards), "MEMORY": len(model.memory),
         "SAMPLED": len(model.sampled), "RESETS": resets, "SERIES": len(what.series),
         "MEETINGS": len(what.meetings), "BREAKS": len(what.breaks),
-        "INDICATORS": model.indicators,
+        "INDICATORS": model.indicators, "DECLARED": model.declared,
     }  # fmt: skip
     numbers = {
         "KNOWN_UNTIL": what.known_until, "LONGEST": what.longest, "TOLERANCE": model.tolerance,

@@ -12,6 +12,8 @@
 #define MOST_CROSSINGS 20000 /* in one step of co-simulation */
 #define MOST_STEPS 10000000
 #define STILL 1e-11         /* of a time: less is no progress */
+#define SOON 1e-11          /* of a time: right behind it */
+#define NOISE 1e-13         /* of a memory: less is rounding, and no movement */
 #define FIRST_GUARD (N_SIGNS - N_GUARDS)
 
 static int failed(Machine *s, const char *what)
@@ -142,20 +144,61 @@ static void movement(Machine *s, double t, const double x[], const double dx[], 
   for (int i = 0; i < N_STATES; ++i)
     ahead[i] = x[i] + (model_continuous[i] ? SHORT_TIME * dx[i] : 0.0);
   model_rates(seen(s, t + SHORT_TIME), ahead, s->u, s->c, rates, signs, moved);
-  for (int i = 0; i < N_MEMORY; ++i) moved[i] -= m[i];
+  for (int i = 0; i < N_MEMORY; ++i) {
+    moved[i] -= m[i];
+    if (fabs(moved[i]) <= NOISE * (1.0 + fabs(m[i]))) moved[i] = 0.0;
+  }
+}
+
+/* Up to which number a switching function is 0 but for rounding. */
+static double level(const Machine *s)
+{
+  double most = 1.0;
+  for (int i = 0; i < N_MEMORY; ++i) most = fmax(most, fabs(s->m[i]));
+  return 10.0 * NOISE * most;
 }
 
 static void see_sides(Machine *s)
 {
   evaluate(s);
-  for (int i = 0; i < N_SIGNS; ++i)
-    if (s->g[i] != 0.0) s->side[i] = s->g[i] > 0.0 ? 1.0 : -1.0;
+  double least = level(s);
+  for (int i = 0; i < N_SIGNS; ++i) { /* what blocks declare is 0 while a memory is carried along */
+    if (i < N_DECLARED && fabs(s->g[i]) <= least) s->side[i] = 0.0;
+    else if (s->g[i] != 0.0) s->side[i] = s->came[i] = s->g[i] > 0.0 ? 1.0 : -1.0;
+  }
   for (int i = 0; i < N_GUARDS; ++i) s->above[i] = s->g[FIRST_GUARD + i] >= 0.0;
   if (N_MEMORY) {
     double moved[N_MEMORY + 1];
     movement(s, s->t, s->x, s->dx, s->m, moved);
-    for (int i = 0; i < N_MEMORY; ++i)
-      if (moved[i] != 0.0) s->way[i] = moved[i] > 0.0 ? 1.0 : -1.0;
+    for (int i = 0; i < N_MEMORY; ++i) {
+      s->moves[i] = moved[i] != 0.0;
+      if (s->moves[i]) s->way[i] = moved[i] > 0.0 ? 1.0 : -1.0;
+    }
+  }
+}
+
+/* Memories that are about to reverse have done so when they are committed. */
+static void reverse(Machine *s)
+{
+  double moved[N_MEMORY + 1];
+  evaluate(s);
+  movement(s, s->t, s->x, s->dx, s->m, moved);
+  for (int i = 0; i < N_MEMORY; ++i)
+    if (s->way[i] * moved[i] < 0.0) s->way[i] = -s->way[i];
+}
+
+/* A memory that jumps, where an importer has stopped right before: what it becomes right behind. */
+static void leap(Machine *s)
+{
+  double ahead[N_STATES + 1], rates[N_STATES + 1], signs[N_SIGNS + 1], m[N_MEMORY + 1];
+  double soon = SOON * fmax(fabs(s->t), 1.0);
+  evaluate(s);
+  for (int k = 0; k < N_STATES; ++k) ahead[k] = s->x[k] + soon * s->dx[k];
+  model_rates(seen(s, s->t + soon), ahead, s->u, s->c, rates, signs, m);
+  for (int i = 0; i < N_MEMORY; ++i) {
+    if (!(fabs(m[i] - s->m[i]) > 1e-6 * (1.0 + fabs(s->m[i])))) continue;
+    s->x[model_memory[i]] = m[i];
+    machine_changed(s);
   }
 }
 
@@ -163,7 +206,7 @@ static void see_sides(Machine *s)
 static int falls_now(Machine *s, int i)
 {
   double ahead[N_STATES + 1], rates[N_STATES + 1], signs[N_SIGNS + 1], m[N_MEMORY + 1];
-  double soon = 1e-11 * fmax(fabs(s->t), 1.0);
+  double soon = SOON * fmax(fabs(s->t), 1.0);
   for (int k = 0; k < N_STATES; ++k) ahead[k] = s->x[k] + soon * s->dx[k];
   model_rates(seen(s, s->t + soon), ahead, s->u, s->c, rates, signs, m);
   return signs[FIRST_GUARD + i] < 0.0;
@@ -235,9 +278,11 @@ int machine_event(Machine *s)
                      "later one");
   unsigned which = due(s);
   machine_changed(s);
+  if (N_MEMORY && s->started) reverse(s);
   if (which && sample(s, which) < 0) return -1;
   for (int i = 0; i <= N_MEMORY && commit(s); ++i) continue;
   if (s->started) {
+    if (N_MEMORY) leap(s);
     jumped = jump(s);
     if (jumped < 0) return -1;
   }
@@ -251,14 +296,15 @@ int machine_completed(Machine *s)
   double before[N_STATES + 1];
   evaluate(s);
   if (check_rising(s) < 0) return -1;
+  for (int i = 0; i < N_GUARDS; ++i)
+    if (s->above[i] && s->g[FIRST_GUARD + i] < 0.0) return 1;
   memcpy(before, s->dx, sizeof before);
   if (commit(s)) {
     evaluate(s);
     for (int i = 0; i < N_STATES; ++i)
       if (model_continuous[i] && before[i] != s->dx[i]) return 1;
   }
-  for (int i = 0; i < N_GUARDS; ++i)
-    if (s->above[i] && s->g[FIRST_GUARD + i] < 0.0) return 1;
+  if (N_MEMORY) see_sides(s);
   return 0;
 }
 
@@ -267,6 +313,9 @@ void machine_indicators(Machine *s, double z[])
   evaluate(s);
   memcpy(z, s->g, N_SIGNS * sizeof(double));
   if (N_MEMORY) {
+    double least = level(s);
+    for (int i = 0; i < N_DECLARED; ++i)
+      if (s->side[i] == 0.0) z[i] -= 2.0 * least * s->came[i];
     movement(s, s->t, s->x, s->dx, s->m, z + N_SIGNS);
     for (int i = 0; i < N_MEMORY; ++i)
       if (z[N_SIGNS + i] == 0.0) z[N_SIGNS + i] = s->way[i] * DBL_MIN;
@@ -289,10 +338,23 @@ static int beyond(const Machine *s, const double g[])
   return 0;
 }
 
+/* Whether a memory that moves has stopped since `before`, which becomes `m`. */
+static int turns(const Machine *s, double before[], const double m[])
+{
+  int found = 0;
+  for (int i = 0; i < N_MEMORY; ++i) {
+    found |= s->moves[i] && s->way[i] * (m[i] - before[i]) <= 0.0;
+    before[i] = m[i];
+  }
+  return found;
+}
+
 /* A step of length h; returns whether anything that it has looked at is on another side. */
 static int attempt(const Machine *s, Trial *r, double h)
 {
   int over = 0;
+  double before[N_MEMORY + 1];
+  for (int i = 0; i < N_MEMORY; ++i) before[i] = s->x[model_memory[i]];
   for (int j = 1; j < STAGES; ++j) {
     for (int i = 0; i < N_STATES; ++i) {
       double sum = 0.0;
@@ -301,6 +363,7 @@ static int attempt(const Machine *s, Trial *r, double h)
     }
     model_rates(seen(s, s->t + model_nodes[j] * h), r->x, s->u, (double *)s->c, r->k[j], r->g, r->m);
     over |= beyond(s, r->g);
+    if (j != STAGES - 2) over |= turns(s, before, r->m);
   }
   r->error = 0.0;
   for (int i = 0; i < N_STATES; ++i) {
@@ -311,17 +374,6 @@ static int attempt(const Machine *s, Trial *r, double h)
     if (r->error < INFINITY && !(sum <= r->error)) r->error = isfinite(sum) ? sum : INFINITY;
   }
   return over;
-}
-
-/* Whether a memory is about to reverse at the end of a step. */
-static int reverses(Machine *s, Trial *r, double h)
-{
-  double moved[N_MEMORY + 1];
-  if (!N_MEMORY) return 0;
-  movement(s, s->t + h, r->x, r->k[STAGES - 1], r->m, moved);
-  for (int i = 0; i < N_MEMORY; ++i)
-    if (s->way[i] * moved[i] < 0.0) return 1;
-  return 0;
 }
 
 static void accept(Machine *s, const Trial *r, double t)
@@ -355,7 +407,7 @@ static int locate(Machine *s, Trial *r, double h)
   double low = 0.0, high = h, least = 4.0 * DBL_EPSILON * fmax(fabs(s->t), h);
   while (high - low > least) {
     double middle = 0.5 * (low + high);
-    if (attempt(s, r, middle) || reverses(s, r, middle)) high = middle;
+    if (attempt(s, r, middle)) high = middle;
     else low = middle;
   }
   if (low > 0.0) {
@@ -384,7 +436,7 @@ static int advance(Machine *s, double stop, int *crossings)
   memcpy(r.k[0], s->dx, sizeof r.k[0]);
   for (int tries = 0; tries < 200; ++tries) {
     int over = attempt(s, &r, h);
-    if (r.error < 1e3 && (over || (r.error <= 1.0 && reverses(s, &r, h)))) {
+    if (over && r.error < 1e3) {
       int found = locate(s, &r, h);
       if (++*crossings > MOST_CROSSINGS) return failed(s, "it switches over and over again");
       if (found <= 0) return found;

@@ -14,10 +14,12 @@ typedef struct {
   double x[N_STATES + 1], u[N_INPUTS + 1], y[N_OUTPUTS + 1], p[N_PARAMETERS + 1], c[N_ROOM + 1];
   double dx[N_STATES + 1], g[N_SIGNS + 1], m[N_MEMORY + 1];
   double index[N_SERIES + 1];     /* of the next instant of each series of samples */
-  double side[N_SIGNS + 1];       /* of what switches: 1, -1, or 0 if it is not known yet */
+  double side[N_SIGNS + 1];       /* of what switches: 1, -1, or 0 where it is 0 */
+  double came[N_SIGNS + 1];       /* the side on which it was last */
   double way[N_MEMORY + 1];       /* in which memories moved last */
   double rising[N_GUARDS + 1];    /* of guards that are to rise behind their jump, or NAN */
   int above[N_GUARDS + 1];        /* whether they were not negative when last seen */
+  int moves[N_MEMORY + 1];        /* whether they move now */
   int at_break;                   /* of the instants of conditions of t */
   int prepared, known, outputs_known, started, crowd;
   char message[240];              /* why something failed */
