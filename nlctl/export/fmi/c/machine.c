@@ -14,6 +14,7 @@
 #define STILL 1e-11         /* of a time: less is no progress */
 #define SOON 1e-11          /* of a time: right behind it */
 #define NOISE 1e-13         /* of a memory: less is rounding, and no movement */
+#define TURNED 2
 #define FIRST_GUARD (N_SIGNS - N_GUARDS)
 
 static int failed(Machine *s, const char *what)
@@ -141,12 +142,13 @@ static void movement(Machine *s, double t, const double x[], const double dx[], 
                      double moved[])
 {
   double ahead[N_STATES + 1], rates[N_STATES + 1], signs[N_SIGNS + 1];
+  double soon = s->last > 0.0 ? fmin(SHORT_TIME, 0.01 * s->last) : SHORT_TIME;
   for (int i = 0; i < N_STATES; ++i)
-    ahead[i] = x[i] + (model_continuous[i] ? SHORT_TIME * dx[i] : 0.0);
-  model_rates(seen(s, t + SHORT_TIME), ahead, s->u, s->c, rates, signs, moved);
+    ahead[i] = x[i] + (model_continuous[i] ? soon * dx[i] : 0.0);
+  model_rates(seen(s, t + soon), ahead, s->u, s->c, rates, signs, moved);
   for (int i = 0; i < N_MEMORY; ++i) {
     moved[i] -= m[i];
-    if (fabs(moved[i]) <= NOISE * (1.0 + fabs(m[i]))) moved[i] = 0.0;
+    if (fabs(moved[i]) <= 10.0 * NOISE * (1.0 + fabs(m[i]))) moved[i] = 0.0;
   }
 }
 
@@ -299,6 +301,7 @@ int machine_completed(Machine *s)
   for (int i = 0; i < N_GUARDS; ++i)
     if (s->above[i] && s->g[FIRST_GUARD + i] < 0.0) return 1;
   memcpy(before, s->dx, sizeof before);
+  if (N_MEMORY) reverse(s);
   if (commit(s)) {
     evaluate(s);
     for (int i = 0; i < N_STATES; ++i)
@@ -343,13 +346,14 @@ static int turns(const Machine *s, double before[], const double m[])
 {
   int found = 0;
   for (int i = 0; i < N_MEMORY; ++i) {
-    found |= s->moves[i] && s->way[i] * (m[i] - before[i]) <= 0.0;
+    int back = s->way[i] * (m[i] - before[i]) < -NOISE * (1.0 + fabs(m[i]));
+    found |= s->moves[i] && (back || m[i] == s->x[model_memory[i]]);
     before[i] = m[i];
   }
   return found;
 }
 
-/* A step of length h; returns whether anything that it has looked at is on another side. */
+/* A step of length h; returns what it has met: signs on another side, memories that turn. */
 static int attempt(const Machine *s, Trial *r, double h)
 {
   int over = 0;
@@ -363,7 +367,7 @@ static int attempt(const Machine *s, Trial *r, double h)
     }
     model_rates(seen(s, s->t + model_nodes[j] * h), r->x, s->u, (double *)s->c, r->k[j], r->g, r->m);
     over |= beyond(s, r->g);
-    if (j != STAGES - 2) over |= turns(s, before, r->m);
+    if (j != STAGES - 2 && turns(s, before, r->m)) over |= TURNED;
   }
   r->error = 0.0;
   for (int i = 0; i < N_STATES; ++i) {
@@ -401,22 +405,37 @@ static int cross(Machine *s, double h)
   return 0;
 }
 
+/* Whether a memory has moved by more than error control would see. */
+static int leads_far(const Machine *s, const Trial *r)
+{
+  double least = fmax(NOISE, 0.01 * s->tolerance);
+  for (int i = 0; i < N_MEMORY; ++i)
+    if (fabs(r->m[i] - s->x[model_memory[i]]) > least * (1.0 + fabs(r->m[i]))) return 1;
+  return 0;
+}
+
 /* Finds where the first sign changes in a step, and leads over that. */
 static int locate(Machine *s, Trial *r, double h)
 {
   double low = 0.0, high = h, least = 4.0 * DBL_EPSILON * fmax(fabs(s->t), h);
+  int met = 0, far = 0;
   while (high - low > least) {
     double middle = 0.5 * (low + high);
-    if (attempt(s, r, middle)) high = middle;
-    else low = middle;
+    int here = attempt(s, r, middle);
+    if (here) {
+      high = middle;
+      met = here;
+    } else low = middle;
   }
   if (low > 0.0) {
     (void)attempt(s, r, low);
     if (!(r->error <= 1.0)) return 1; /* too long a step to be trusted */
+    far = leads_far(s, r);
     accept(s, r, s->t + low);
     if (check_rising(s) < 0) return -1;
     commit(s);
   }
+  s->turned = met == TURNED && !far;
   return cross(s, high - low);
 }
 
@@ -433,6 +452,7 @@ static int advance(Machine *s, double stop, int *crossings)
   double room = stop - s->t, h = fmin(fmin(s->h, LONGEST), room);
   evaluate(s);
   see_sides(s);
+  for (int i = 0; s->turned && i < N_MEMORY; ++i) s->moves[i] = 0; /* it has been located */
   memcpy(r.k[0], s->dx, sizeof r.k[0]);
   for (int tries = 0; tries < 200; ++tries) {
     int over = attempt(s, &r, h);
@@ -443,6 +463,8 @@ static int advance(Machine *s, double stop, int *crossings)
     } else if (r.error <= 1.0) {
       double longer = h * factor(r.error);
       s->h = h < s->h ? fmax(s->h, longer) : longer;
+      s->turned = 0;
+      s->last = h;
       accept(s, &r, h < room ? s->t + h : stop);
       if (check_rising(s) < 0) return -1;
       commit(s);

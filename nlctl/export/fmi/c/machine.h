@@ -10,6 +10,7 @@ typedef struct {
   double next;   /* the next one, INFINITY if there is none */
   double h;      /* the step that the integrator tries next */
   double tolerance;
+  double last;   /* length of the last step, 0 in Model Exchange */
   double fell;   /* when a guard fell last */
   double x[N_STATES + 1], u[N_INPUTS + 1], y[N_OUTPUTS + 1], p[N_PARAMETERS + 1], c[N_ROOM + 1];
   double dx[N_STATES + 1], g[N_SIGNS + 1], m[N_MEMORY + 1];
@@ -22,6 +23,7 @@ typedef struct {
   int moves[N_MEMORY + 1];        /* whether they move now */
   int at_break;                   /* of the instants of conditions of t */
   int prepared, known, outputs_known, started, crowd;
+  int turned;                     /* a reversal of a memory has been located, and not passed */
   char message[240];              /* why something failed */
 } Machine;
 
