@@ -1,4 +1,4 @@
-"""What an FMU is made of: its variables, what happens in it at events, the plan of its equations."""
+"""What an FMU is made of: variables, what happens at events, the plan of its equations."""
 
 from __future__ import annotations
 

@@ -36,7 +36,11 @@ def token_of(text: dict[str, str]) -> str:
 
 
 def _uuid(digest: str) -> str:
-    return "{" + "-".join(digest[a:b] for a, b in ((0, 8), (8, 12), (12, 16), (16, 20), (20, 32))) + "}"
+    return (
+        "{"
+        + "-".join(digest[a:b] for a, b in ((0, 8), (8, 12), (12, 16), (16, 20), (20, 32)))
+        + "}"
+    )
 
 
 def _header(model: Model, token: str) -> str:

@@ -268,6 +268,14 @@ static int check_rising(Machine *s)
   return 0;
 }
 
+/* Conditions of t alone were solved from 0 to the exported stop time. */
+static int check_known(Machine *s, double t)
+{
+  if (isinf(KNOWN_UNTIL) || (s->t >= 0.0 && t <= KNOWN_UNTIL + rounding(t))) return 0;
+  return failed(s, "when conditions of t switch is known from 0 until stop_time alone: export "
+                   "with a later one");
+}
+
 int machine_event(Machine *s)
 {
   int jumped = 0;
@@ -275,9 +283,7 @@ int machine_event(Machine *s)
     begin_instants(s);
     machine_changed(s);
   }
-  if (s->t > KNOWN_UNTIL + rounding(s->t))
-    return failed(s, "when conditions of t switch is known until stop_time alone: export with a "
-                     "later one");
+  if (check_known(s, s->t) < 0) return -1;
   unsigned which = due(s);
   machine_changed(s);
   if (N_MEMORY && s->started) reverse(s);
@@ -297,7 +303,7 @@ int machine_completed(Machine *s)
 {
   double before[N_STATES + 1];
   evaluate(s);
-  if (check_rising(s) < 0) return -1;
+  if (check_known(s, s->t) < 0 || check_rising(s) < 0) return -1;
   for (int i = 0; i < N_GUARDS; ++i)
     if (s->above[i] && s->g[FIRST_GUARD + i] < 0.0) return 1;
   memcpy(before, s->dx, sizeof before);
@@ -479,6 +485,7 @@ static int advance(Machine *s, double stop, int *crossings)
 int machine_step(Machine *s, double end)
 {
   int crossings = 0;
+  if (check_known(s, end) < 0) return -1;
   for (int steps = 0; steps < MOST_STEPS; ++steps) {
     double stop = fmin(end, s->next), close = rounding(s->t);
     if (stop - s->t > close) {
