@@ -108,6 +108,7 @@ from .errors import (
     ZenoError,
 )
 from .faults import Fault, with_faults
+from .fmi import FMU
 from .native import (
     AlgebraicLoopError,
     AuditError,
@@ -150,6 +151,7 @@ from .sliding import IdealRelay
 from .sources import Chirp, Pulse, PulseTrain, Ramp, Sine, Square, Step, TimeTable
 
 __all__ = [
+    "FMU",
     "PID",
     "PID2",
     "AdaptiveDeadZoneInverse",
