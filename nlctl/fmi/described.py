@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from ..errors import ParameterError, UsageError
 from ..names import unknown
 
-KINDS = {"ModelExchange": "modelExchange", "CoSimulation": "coSimulation"}
+_KINDS = {"ModelExchange": "modelExchange", "CoSimulation": "coSimulation"}
 _NUMBERS = {
     *("Real", "Integer", "Boolean", "Enumeration", "Float64", "Float32", "Int8", "UInt8"),
     *("Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"),
@@ -52,21 +52,25 @@ class Described:
     @property
     def own(self) -> Any:
         """What it says of its kind: identifier and abilities."""
-        return getattr(self.whole, KINDS[self.kind])
+        return getattr(self.whole, _KINDS[self.kind])
 
 
-def described(path: str | os.PathLike[str], kind: str | None) -> Described:
+def read_description(path: str | os.PathLike[str], kind: str | None) -> Described:
     """Read the description of an FMU; what cannot be a block is refused."""
     fmpy = _fmpy()
     path = Path(path)
     if not path.is_file():
-        raise ParameterError(f"there is no FMU '{path}'")
+        raise ParameterError(f"there is not an FMU '{path}'")
+    try:
+        root = _root(path)
+    except Exception as error:  # whatever zip files and XML may have
+        raise ParameterError(f"'{path.name}' is not an FMU: {error}") from error
+    if root.get("fmiVersion", "").startswith("1."):
+        raise UsageError(f"'{path.name}' is an FMU of FMI 1.0: 2.0 and 3.0 are supported")
     try:
         whole = fmpy.read_model_description(str(path))
     except Exception as error:  # whatever FMPy and its parser raise
-        raise ParameterError(f"'{path.name}' is no valid FMU: {error}") from error
-    if whole.fmiVersion == "1.0":
-        raise UsageError(f"'{path.name}' is an FMU of FMI 1.0: 2.0 and 3.0 are supported")
+        raise ParameterError(f"'{path.name}' is not a valid FMU: {error}") from error
     kind = _kind(path, whole, kind)
     if fmpy.platform not in fmpy.supported_platforms(str(path)):
         raise UsageError(
@@ -75,8 +79,14 @@ def described(path: str | os.PathLike[str], kind: str | None) -> Described:
         )
     made = _of_description(path, whole, kind)
     if kind == "ModelExchange":
-        _check_events(made)
+        _check_events(made, root)
     return made
+
+
+def _root(path: Path) -> Any:
+    """Return its description as XML."""
+    with zipfile.ZipFile(path) as archive:
+        return ElementTree.fromstring(archive.read("modelDescription.xml"))
 
 
 def _fmpy() -> Any:
@@ -91,15 +101,15 @@ def _fmpy() -> Any:
 
 def _kind(path: Path, whole: Any, kind: str | None) -> str:
     """Return which of its kinds is meant: Model Exchange if it has that."""
-    there = [name for name, key in KINDS.items() if getattr(whole, key) is not None]
+    there = [name for name, key in _KINDS.items() if getattr(whole, key) is not None]
     if kind is None and there:
         return there[0]
     if kind in there:
         return kind
-    if kind in KINDS or kind is None:
+    if kind in _KINDS or kind is None:
         raise UsageError(f"'{path.name}' has no {kind or 'Model Exchange, and no Co-Simulation'}: "
                          f"it has {' and '.join(there) or 'neither'}")  # fmt: skip
-    raise unknown("kind", str(kind), KINDS, "of FMUs")
+    raise unknown("kind", str(kind), _KINDS, "of FMUs")
 
 
 def _of_description(path: Path, whole: Any, kind: str) -> Described:
@@ -121,7 +131,7 @@ def _of_description(path: Path, whole: Any, kind: str) -> Described:
         v for v in of("parameter")
         if v.type in _REALS and v.start is not None and not getattr(v, "dimensions", None)
     ]  # fmt: skip
-    own = getattr(whole, KINDS[kind])
+    own = getattr(whole, _KINDS[kind])
     states: Sequence[Any] = ()
     if kind == "ModelExchange":
         states = [u.variable.derivative for u in whole.derivatives]
@@ -132,15 +142,13 @@ def _of_description(path: Path, whole: Any, kind: str) -> Described:
     )  # fmt: skip
 
 
-def _check_events(made: Described) -> None:
+def _check_events(made: Described, root: Any) -> None:
     """Refuse in Model Exchange what a block cannot do."""
     if not made.keeps_states:
         raise UsageError(
             f"'{made.path.name}' cannot be a block in Model Exchange: its state cannot be read and "
             "written (canGetAndSetFMUState), which a step that is repeated needs"
         )
-    with zipfile.ZipFile(made.path) as archive:
-        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
     said = dict(getattr(root.find("ModelExchange"), "attrib", {}))
     if said.get("needsCompletedIntegratorStep") in ("true", "1") or said.get(
         "completedIntegratorStepNotNeeded"

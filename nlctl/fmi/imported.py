@@ -15,7 +15,7 @@ from ..equations import equation
 from ..errors import ParameterError, UsageError
 from ..params import param, record
 from ..sampling.system import sampled
-from .described import Described, described
+from .described import Described, read_description
 from .running import Running
 
 
@@ -60,11 +60,11 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
     Raises
     ------
     ParameterError
-        If there is no such file, it is no FMU, or a number is out of its bounds.
+        If there is no such file, it is not an FMU, or a number is out of its bounds.
     UnknownNameError
         If the kind is neither.
     UsageError
-        If it is not supported: FMI 1.0, no library for this platform, inputs that are no real
+        If it is not supported: FMI 1.0, no library for this platform, inputs other than real
         numbers, arrays, states that cannot be kept, accepted steps that it needs to be told of; or
         FMPy is not installed.
 
@@ -82,8 +82,8 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
     ... )  # doctest: +SKIP
     """
     start = number("FMU", "start", start)
-    of = described(path, kind)
-    name = name or of.own.modelIdentifier
+    of = read_description(path, kind)
+    name = str(name or of.own.modelIdentifier)
     running = Running(of, start)
     if of.kind == "ModelExchange":
         if dt is not None:

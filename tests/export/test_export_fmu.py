@@ -191,7 +191,9 @@ def halved(t, x, u, params):
 
 REFUSED = {
     "a transport delay": (
-        lambda: closed(nlctl.block(nlctl.TransportDelay(delay=0.1), "law", inputs="y", outputs="u")),
+        lambda: closed(
+            nlctl.block(nlctl.TransportDelay(delay=0.1), "law", inputs="y", outputs="u")
+        ),
         "transport delays",
     ),
     "an opaque function": (
@@ -199,7 +201,9 @@ REFUSED = {
         "a function of it is called",
     ),
     "an ideal relay": (
-        lambda: closed(nlctl.block(nlctl.IdealRelay(), "law", inputs={"u": "y"}, outputs={"v": "u"})),
+        lambda: closed(
+            nlctl.block(nlctl.IdealRelay(), "law", inputs={"u": "y"}, outputs={"v": "u"})
+        ),
         "block 'law' is an ideal relay",
     ),
     "jitter": (

@@ -17,9 +17,10 @@ from ...native.diagram.program import clocks_at
 from ...native.timed.ahead import ahead
 from ...sampling.clock import Clock, schedules
 from ...sliding.relay import SLIDING
+from ...wording import counted
 from ..words import c_name, check_written_out
 from .records import Happenings, Model
-from .variables import all_variables, places
+from .variables import all_variables, value_references
 
 _MOST_SERIES = 31  # of instants of samples: bits of a number
 
@@ -45,7 +46,7 @@ def read_model(
         )
     happenings = _happenings(compiled, p, stop_time, what)
     rows = lowered.rows
-    at = places(rows["x"], rows["u"], rows["y"], rows["g"] + len(program.memory), p.size)
+    at = value_references(rows["x"], rows["u"], rows["y"], rows["g"] + len(program.memory), p.size)
     fixed = _fixed(compiled)
     still = {*program.memory, *program.sampled}
     return Model(
@@ -53,8 +54,8 @@ def read_model(
         variables=tuple(all_variables(compiled, system, at, p, start, fixed)), places=at,
         continuous=tuple(i for i in range(rows["x"]) if i not in still), memory=program.memory,
         sampled=program.sampled, declared=program.switching, guards=program.guards,
-        jumping=program.jumping, parameters=p, start=start, happenings=happenings, lowered=lowered, tolerance=tolerance,
-        stop_time=stop_time,
+        jumping=program.jumping, parameters=p, start=start, happenings=happenings,
+        lowered=lowered, tolerance=tolerance, stop_time=stop_time,
     )  # fmt: skip
 
 
@@ -73,10 +74,11 @@ def _check(compiled: Compiled, what: str) -> None:
             f"'{what}' cannot be exported: block '{made.name}' is an ideal relay, whose sliding "
             "an importer does not know; nlctl.Relay has a hysteresis"
         )
-    if compiled.lowered.conditions.beyond:
+    beyond = compiled.lowered.conditions.beyond
+    if beyond:
         raise CompileError(
-            f"'{what}' cannot be exported: it has {compiled.lowered.conditions.beyond} conditions "
-            "more than are located"
+            f"'{what}' cannot be exported: it has {counted(beyond, 'condition')} more than are "
+            "located"
         )
 
 
@@ -127,8 +129,8 @@ def _series(
     largest = max((max(numbers) for numbers, _ in found), default=0)
     if len(found) > _MOST_SERIES or largest >= 2**40:
         raise CompileError(
-            f"'{what}' cannot be exported: its clocks have {len(found)} series of instants in "
-            f"parts of 1/{largest} s, more than its C counts; round their times"
+            f"'{what}' cannot be exported: its clocks have {counted(len(found), 'series', 'series')} "
+            f"of instants in parts of 1/{largest} s, more than its C counts; round their times"
         )
     meetings = tuple(
         sum(1 << k for k, (_, together) in enumerate(found) if together <= meeting)

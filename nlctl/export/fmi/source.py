@@ -45,23 +45,7 @@ def _uuid(digest: str) -> str:
 
 def _header(model: Model, token: str) -> str:
     """Return sizes, value references, and what the equations are called."""
-    rows, at, what = model.lowered.rows, model.places, model.happenings
-    resets = sum(end - begin for _, begin, end in model.jumping)
-    sizes = {
-        "STATES": rows["x"], "CONTINUOUS": len(model.continuous), "INPUTS": rows["u"],
-        "OUTPUTS": rows["y"], "PARAMETERS": len(model.parameters), "ROOM": rows["c"],
-        "SIGNS": rows["g"], "GUARDS": len(model.guards), "MEMORY": len(model.memory),
-        "SAMPLED": len(model.sampled), "RESETS": resets, "SERIES": len(what.series),
-        "MEETINGS": len(what.meetings), "BREAKS": len(what.breaks),
-        "INDICATORS": model.indicators, "DECLARED": model.declared,
-    }  # fmt: skip
-    numbers = {
-        "KNOWN_UNTIL": what.known_until, "LONGEST": what.longest, "TOLERANCE": model.tolerance,
-        "SHORT_TIME": _SHORT * model.stop_time,
-    }  # fmt: skip
-    lines = [f"#define N_{name} {size}" for name, size in sizes.items()]
-    lines += [f"#define OF_{kind.upper()} {first}u" for kind, first in at.items()]
-    lines += [f"#define {name} {c_number(value)}" for name, value in numbers.items()]
+    lines = _sizes(model)
     stages = len(TSIT5.c)
     return f"""\
 /* {comment(model.meaning)}: sizes, and the functions of its equations.  nlctl {__version__} */
@@ -99,6 +83,28 @@ void model_reset(double t, const double x[], const double u[], double c[], doubl
 
 #endif
 """
+
+
+def _sizes(model: Model) -> list[str]:
+    """Return sizes, value references and numbers as lines."""
+    rows, at, what = model.lowered.rows, model.places, model.happenings
+    resets = sum(end - begin for _, begin, end in model.jumping)
+    sizes = {
+        "STATES": rows["x"], "CONTINUOUS": len(model.continuous), "INPUTS": rows["u"],
+        "OUTPUTS": rows["y"], "PARAMETERS": len(model.parameters), "ROOM": rows["c"],
+        "SIGNS": rows["g"], "GUARDS": len(model.guards), "MEMORY": len(model.memory),
+        "SAMPLED": len(model.sampled), "RESETS": resets, "SERIES": len(what.series),
+        "MEETINGS": len(what.meetings), "BREAKS": len(what.breaks),
+        "INDICATORS": model.indicators, "DECLARED": model.declared,
+    }  # fmt: skip
+    numbers = {
+        "KNOWN_UNTIL": what.known_until, "LONGEST": what.longest, "TOLERANCE": model.tolerance,
+        "SHORT_TIME": _SHORT * model.stop_time,
+    }  # fmt: skip
+    lines = [f"#define N_{name} {size}" for name, size in sizes.items()]
+    lines += [f"#define OF_{kind.upper()} {first}u" for kind, first in at.items()]
+    lines += [f"#define {name} {c_number(value)}" for name, value in numbers.items()]
+    return lines
 
 
 def _source(model: Model) -> str:

@@ -15,16 +15,18 @@ from ...native import Compiled
 from ...params import Param, declared_params
 from .records import Bounds, Variable
 
-KINDS = ("states", "rates", "inputs", "outputs", "indicators", "parameters", "nothing")
+_KINDS = ("states", "rates", "inputs", "outputs", "indicators", "parameters", "nothing")
 STRUCTURED = re.compile(
     r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII
 )
 
 
-def places(states: int, inputs: int, outputs: int, indicators: int, count: int) -> dict[str, int]:
+def value_references(
+    states: int, inputs: int, outputs: int, indicators: int, count: int
+) -> dict[str, int]:
     """Return the first value reference of each kind; 0 is the time."""
     sizes = (states, states, inputs, outputs, indicators, count)
-    return dict(zip(KINDS, accumulate(sizes, initial=1), strict=True))
+    return dict(zip(_KINDS, accumulate(sizes, initial=1), strict=True))
 
 
 def is_structured(variables: Collection[Variable]) -> bool:
@@ -98,11 +100,12 @@ def _signals(diagram: Any, at: dict[str, int], known: set[str]) -> list[Variable
         for i, label in enumerate(getattr(diagram, f"{kind[:-1]}_labels") or ()):
             name = label if label not in known else f"{kind}.{label}"
             known.add(name)
-            more = {"initial": "calculated"} if kind == "outputs" else {"start": 0.0}
+            is_input = kind == "inputs"
             found.append(
                 Variable(
                     name=name, reference=at[kind] + i, causality=kind[:-1],
-                    variability="continuous", meaning=f"{kind[:-1]} of the diagram", **more,
+                    variability="continuous", meaning=f"{kind[:-1]} of the diagram",
+                    initial="" if is_input else "calculated", start=0.0 if is_input else None,
                 )
             )  # fmt: skip
     return found
