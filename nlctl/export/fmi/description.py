@@ -34,7 +34,7 @@ def build_description(model: Model, code: list[str]) -> str:
 
 
 def _rendered(template: str, **values: Any) -> str:
-    folder = files(__package__) / "templates"
+    folder = files("nlctl.export.fmi") / "templates"
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,

@@ -129,8 +129,8 @@ def _series(
     largest = max((max(numbers) for numbers, _ in found), default=0)
     if len(found) > _MOST_SERIES or largest >= 2**40:
         raise CompileError(
-            f"'{what}' cannot be exported: its clocks have {counted(len(found), 'series', 'series')} "
-            f"of instants in parts of 1/{largest} s, more than its C counts; round their times"
+            f"'{what}' cannot be exported: its clocks have instants in parts of 1/{largest} s, or "
+            f"{len(found)} different ones, more than its C counts; round their times"
         )
     meetings = tuple(
         sum(1 << k for k, (_, together) in enumerate(found) if together <= meeting)

@@ -20,7 +20,7 @@ _SHARED = ("instance.h", "machine.h", "machine.c")
 
 def sources(model: Model, version: int) -> dict[str, str]:
     """Return all files of C by their names, but for the headers of FMI."""
-    folder = files(__package__) / "c"
+    folder = files("nlctl.export.fmi") / "c"
     shared = {
         name: (folder / name).read_text(encoding="utf-8")
         for name in (*_SHARED, f"fmi{version}.c")
