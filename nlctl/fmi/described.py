@@ -60,7 +60,7 @@ def read_description(path: str | os.PathLike[str], kind: str | None) -> Describe
     fmpy = _fmpy()
     path = Path(path)
     if not path.is_file():
-        raise ParameterError(f"there is not an FMU '{path}'")
+        raise ParameterError(f"there is no file '{path}'")
     try:
         root = _root(path)
     except Exception as error:  # whatever zip files and XML may have

@@ -1,6 +1,7 @@
 """FMUs as blocks: the Reference FMUs move as published, and as their equations say."""
 
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -209,10 +210,11 @@ def test_what_is_not_supported_is_refused_by_name(reference_fmu, tmp_path, what)
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(ParameterError, match="there is no FMU"):
+    with pytest.raises(ParameterError, match="there is no file"):
         nlctl.FMU(tmp_path / "none.fmu")
 
 
+@pytest.mark.ci
 def test_exported_memories_are_refused_in_model_exchange(tmp_path):
     diagram, *_ = MODELS["backlash"]()
     path = nlctl.export.fmu(diagram, tmp_path / "m.fmu", name="m", platforms=["linux"])
@@ -234,8 +236,17 @@ def test_an_end_that_the_fmu_asks_for_is_an_error_by_name(reference_fmu):
 
 def test_a_study_may_not_name_it_untrusted(tmp_path):
     """Running a library is trusting it: study files name it only where their user allows it."""
-    from nlctl.analysis.studies.code.rule import Grant
+    from nlctl.analysis.studies.code.rule import Grant, check_defined, untrusted
 
     for reach in ("nlctl", "study"):
         grant = Grant(reach=reach, folder=tmp_path, study="")
-        assert grant.admits_module("nlctl.fmi.imported")
+        assert untrusted([(("loop",), "nlctl.fmi:FMU")], grant)
+        with pytest.raises(ParameterError):
+            check_defined(nlctl.FMU, "nlctl:FMU", grant)
+    check_defined(nlctl.FMU, "nlctl:FMU", Grant(reach="all", folder=tmp_path, study=""))
+
+
+def test_without_fmpy_it_is_said_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fmpy", None)
+    with pytest.raises(UsageError, match=r"nlctl\[export\]"):
+        nlctl.FMU(tmp_path / "none.fmu")
