@@ -12,7 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from nlctl import errors
+from nlctl.host.checkout import NLCTL_FOLDER
+from nlctl.host.rooms import face, public_names
 
 _GROUPS = (
     "plants",
@@ -68,10 +69,10 @@ def function_summaries() -> dict[str, dict[str, str]]:
 
 def paper_summaries() -> dict[str, str]:
     """Return the first line of each paper's module: ``{name: line}``."""
-    folder = Path(errors.__file__).parent / "papers"
     found = {}
-    for name in _public(ast.parse((folder / "__init__.py").read_bytes())):
-        said = ast.get_docstring(ast.parse((folder / f"{name}.py").read_bytes())) or ""
+    for name in public_names("papers"):
+        module = Path(NLCTL_FOLDER, "papers", f"{name}.py")
+        said = ast.get_docstring(ast.parse(module.read_bytes())) or ""
         found[name] = said.partition("\n")[0]
     return found
 
@@ -84,15 +85,13 @@ def making_function(name: str) -> Any:
 
 def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
     """Return what is chosen of the public names of a module, or of a package and its rooms."""
-    folder = Path(errors.__file__).parent / group
-    own = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
     found = {
         node.name: (ast.get_docstring(node) or "").partition("\n")[0]
-        for path in (sorted(folder.rglob("*.py")) or [own])
+        for path in (sorted(Path(NLCTL_FOLDER, group).rglob("*.py")) or [Path(face(group))])
         for node in ast.parse(path.read_bytes()).body
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and chosen(node)
     }
-    return {name: found[name] for name in _public(ast.parse(own.read_bytes())) if name in found}
+    return {name: found[name] for name in public_names(group) if name in found}
 
 
 def _is_record(node: ast.stmt) -> bool:
@@ -101,12 +100,3 @@ def _is_record(node: ast.stmt) -> bool:
 
 def _is_function(node: ast.stmt) -> bool:
     return isinstance(node, ast.FunctionDef)
-
-
-def _public(module: ast.Module) -> list[str]:
-    """Return ``__all__``."""
-    return next(
-        ast.literal_eval(node.value)
-        for node in module.body
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
-    )

@@ -97,7 +97,7 @@ GUIDES = (
         states=1,
         parameters=4,
         time=1.5,
-        code="nlctl.sliding_mode(law=nlctl.SuperTwistingLaw())",
+        code="nlctl.sliding_mode(law=nlctl.controllers.SuperTwistingLaw())",
     ),
     ControllerGuide(
         name="funnel",
@@ -108,7 +108,7 @@ GUIDES = (
         states=0,
         parameters=4,
         time=6.4,
-        code="nlctl.FunnelControl()",
+        code="nlctl.controllers.FunnelControl()",
     ),
     ControllerGuide(
         name="prescribed performance",
@@ -119,7 +119,7 @@ GUIDES = (
         states=0,
         parameters=4,
         time=2.0,
-        code="nlctl.PrescribedPerformance()",
+        code="nlctl.controllers.PrescribedPerformance()",
     ),
     ControllerGuide(
         name="adaptive neural",
@@ -143,7 +143,7 @@ GUIDES = (
         states=28,
         parameters=11,
         time=1.6,
-        code="nlctl.adaptive_neural(order=2, law=nlctl.KnownSignLaw())",
+        code="nlctl.adaptive_neural(order=2, law=nlctl.controllers.KnownSignLaw())",
     ),
     ControllerGuide(
         name="dynamic surface",
@@ -182,7 +182,7 @@ GUIDES = (
         states=5,
         parameters=6,
         time=1.4,
-        code="nlctl.mrac(law=nlctl.DirectLaw())",
+        code="nlctl.mrac(law=nlctl.controllers.DirectLaw())",
     ),
     ControllerGuide(
         name="model reference, constrained",
@@ -193,7 +193,10 @@ GUIDES = (
         states=8,
         parameters=8,
         time=1.3,
-        code="nlctl.mrac(error=nlctl.ConstrainedError(), law=nlctl.ConstrainedLaw())",
+        code=(
+            "nlctl.mrac(error=nlctl.controllers.ConstrainedError(), "
+            "law=nlctl.controllers.ConstrainedLaw())"
+        ),
     ),
     ControllerGuide(
         name="L1 adaptive",
@@ -215,7 +218,7 @@ GUIDES = (
         states=4,
         parameters=4,
         time=None,
-        code="nlctl.AdaptiveDeadZoneInverse()",
+        code="nlctl.controllers.AdaptiveDeadZoneInverse()",
     ),
     ControllerGuide(
         name="extremum seeking",
@@ -226,7 +229,7 @@ GUIDES = (
         states=3,
         parameters=5,
         time=None,
-        code="nlctl.ExtremumSeeking()",
+        code="nlctl.controllers.ExtremumSeeking()",
     ),
 )
 """Every controller, the simplest first."""

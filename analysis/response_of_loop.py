@@ -14,8 +14,8 @@ from nlctl.blocks import memory_states
 from nlctl.delays.transport import PAST
 from nlctl.diagrams import leaves, supplied_blocks
 from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
-from nlctl.errors import DiagramError, DivergedError
-from nlctl.response import EngineWarning, input_output_response
+from nlctl.errors import DiagramError, DivergedError, EngineWarning
+from nlctl.response import input_output_response
 from nlctl.sampling.system import clocks_of
 from nlctl.sliding.relay import SLIDING
 from nlctl.upstream.systems import System, SystemResponse

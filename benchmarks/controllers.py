@@ -19,13 +19,13 @@ TIMES = np.linspace(0, 20, 2001)
 ROUNDS = 40
 
 
-def compiled(code: str) -> nlctl.Compiled:
+def compiled(code: str) -> nlctl.native.Compiled:
     """Return Example 1 with a controller."""
     controller = eval(code, {"nlctl": nlctl})
     return nlctl.compile(nlctl.paper.example_1(controller=controller))
 
 
-def seconds(loop: nlctl.Compiled) -> float:
+def seconds(loop: nlctl.native.Compiled) -> float:
     """Return the time of one run."""
     began = time.perf_counter()
     nlctl.input_output_response(loop, TIMES)

@@ -59,9 +59,12 @@ def best(call: Callable[[], Any], repeats: int = REPEATS) -> tuple[float, Any]:
 
 def known_sign(order: int) -> Any:
     """Return an example of the paper with a law that knows the sign."""
-    robust = nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
     controller = nlctl.adaptive_neural(
-        order, law=nlctl.KnownSignLaw(), weights=nlctl.AdaptiveWeights(Gamma=10.0), robust=robust
+        order,
+        law=nlctl.controllers.KnownSignLaw(),
+        weights=nlctl.controllers.AdaptiveWeights(Gamma=10.0),
+        robust=robust,
     )
     example = nlctl.paper.example_1 if order == 2 else nlctl.paper.example_2
     return example(controller=controller)

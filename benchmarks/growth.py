@@ -62,7 +62,7 @@ def _members(size: int, threads: int) -> tuple[str, ...]:
     return f"{seconds:.2f}", f"{1e3 * seconds / size:.3g}", f"{peak_memory() / 2**20:.0f}"
 
 
-def _ensemble(compiled: nlctl.Compiled, size: int, threads: int) -> float:
+def _ensemble(compiled: nlctl.native.Compiled, size: int, threads: int) -> float:
     start = time.perf_counter()
     x1 = 0.5 + np.linspace(-0.1, 0.1, size)
     nlctl.ensemble_response(compiled, TIMES, initial_state={"plant.x1": x1}, threads=threads)
@@ -126,6 +126,6 @@ def _table(
     for size in sizes:
         try:
             table.add_row(f"{size}", *call(row, size, *arguments, limit=LIMIT))
-        except (nlctl.CompileError, TimeoutError) as error:
+        except (nlctl.errors.CompileError, TimeoutError) as error:
             table.caption = f"{size}: {str(error)[:300]}"
     return table

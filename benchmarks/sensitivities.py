@@ -47,7 +47,7 @@ def rows(name: str, diagram: object) -> list[tuple[str, ...]]:
     def run() -> object:
         return nlctl.input_output_response(compiled, TIMES, audit=False)
 
-    def derivatives(k: int) -> nlctl.SensitivityResponse:
+    def derivatives(k: int) -> nlctl.sensitivities.SensitivityResponse:
         return nlctl.sensitivity_response(
             compiled, TIMES, of=["y"], with_respect_to=GAINS[:k], audit=False
         )

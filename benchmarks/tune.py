@@ -69,14 +69,18 @@ PROBLEMS = (
 )  # fmt: skip
 
 
-def own_search(problem: Problem, compiled: object) -> tuple[np.ndarray, np.ndarray, nlctl.Tuned]:
+def own_search(
+    problem: Problem, compiled: object
+) -> tuple[np.ndarray, np.ndarray, nlctl.sensitivities.Tuned]:
     """Return runs so far and the best margin so far of `nlctl.tune`."""
     tuned = nlctl.tune(compiled, problem.space, problem.spec, 400, TIMES, starts=1)
     history = tuned.history[tuned.history["by"] == "search"]
     return history["runs"].to_numpy(), np.maximum.accumulate(history["margin"].to_numpy()), tuned
 
 
-def evolution(problem: Problem, compiled: object, tuned: nlctl.Tuned, seed: int) -> np.ndarray:
+def evolution(
+    problem: Problem, compiled: object, tuned: nlctl.sensitivities.Tuned, seed: int
+) -> np.ndarray:
     """Return the best margin so far after each run of CMA-ES, over logarithms of the gains."""
     names, (low, high) = tuned.names, np.log([tuned.low, tuned.high])
     strategy = cma.CMAEvolutionStrategy(
@@ -100,7 +104,7 @@ def evolution(problem: Problem, compiled: object, tuned: nlctl.Tuned, seed: int)
     return np.maximum.accumulate(best)
 
 
-def cost_of_derivatives(compiled: object, tuned: nlctl.Tuned) -> float:
+def cost_of_derivatives(compiled: object, tuned: nlctl.sensitivities.Tuned) -> float:
     """Return how many runs one with derivatives takes, at the gains that were found."""
     same = {"params": tuned.params, "audit": False, "rtol": 1e-6, "atol": 1e-8}
 

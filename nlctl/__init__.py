@@ -1,7 +1,8 @@
 """nlctl: adaptive neural control of pure-feedback nonlinear systems with python-control.
 
 The names below are loaded when first used, so that ``import nlctl`` and ``nlctl --help`` are
-instant.  ``__init__.pyi`` lists them for readers, editors and type checkers alike.
+instant.  ``__init__.pyi`` lists them for readers, editors and type checkers alike: what most
+scripts need, and the rooms with everything else.
 """
 
 import lazy_loader
@@ -11,4 +12,13 @@ from .host.checkout import find_analysis as _find_analysis
 
 _find_analysis()
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_listed, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """Return what is listed; of what has moved into a room, with a warning that names it."""
+    if name not in __all__:
+        from .host.rooms import found_in_room  # late: few ask
+
+        return found_in_room(name) or _listed(name)
+    return _listed(name)

@@ -76,7 +76,8 @@ class Spec(Protocol):
     derived : callable, optional
         ``derived(self) -> dict`` of numbers that follow from the parameters; `p` has them too.
     check : callable, optional
-        ``check(self)`` raises `nlctl.ParameterError` where several fields contradict each other.
+        ``check(self)`` raises `nlctl.errors.ParameterError` where several fields contradict each
+        other.
     plant_order : int, optional
         Of a controller: the order of the plants that it is made for.
     supplied : Supplied, optional

@@ -4,6 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from numpy import ndarray
+
+__all__ = [
+    "AlgebraicLoopError",
+    "AmbiguousNameError",
+    "AuditError",
+    "BlockError",
+    "CacheWarning",
+    "ChatteringError",
+    "CompileError",
+    "DiagramError",
+    "DivergedError",
+    "EngineWarning",
+    "InexactWarning",
+    "OperatingPointError",
+    "ParameterError",
+    "UnknownKeywordError",
+    "UnknownNameError",
+    "UsageError",
+    "ZenoError",
+]
 
 
 class UsageError(ValueError):
@@ -13,7 +37,7 @@ class UsageError(ValueError):
     --------
     >>> try:
     ...     nlctl.interconnect({"gain": nlctl.Gain(k="high")})
-    ... except nlctl.UsageError as error:
+    ... except nlctl.errors.UsageError as error:
     ...     print(error)
     Gain needs numbers for k, got 'high'
     """
@@ -43,7 +67,14 @@ class UnknownNameError(UsageError):
 
 
 class UnknownKeywordError(UnknownNameError, TypeError):
-    """A record has no parameter of that name; Python's own kind of error as well."""
+    """A record has no parameter of that name; Python's own kind of error as well.
+
+    Examples
+    --------
+    >>> nlctl.DeadZone(br=0.1)
+    Traceback (most recent call last):
+    nlctl.errors.UnknownKeywordError: unknown parameter 'br' of DeadZone; nearest: 'b_r'
+    """
 
 
 class AmbiguousNameError(UsageError):
@@ -97,7 +128,7 @@ class DivergedError(RuntimeError):
     >>> escapes = ct.nlsys(lambda t, x, u, params: x**2, inputs=0, states=1, name="escapes")
     >>> try:
     ...     nlctl.input_output_response(escapes, [0.0, 2.0], 0, [1.0])
-    ... except nlctl.DivergedError as error:
+    ... except nlctl.errors.DivergedError as error:
     ...     print(round(error.time, 6))
     1.0
     """
@@ -121,7 +152,7 @@ class ChatteringError(DivergedError):
     >>> holds = ct.nlsys(lambda t, x, u, params: -np.sign(x), inputs=0, states=1, name="holds")
     >>> try:
     ...     nlctl.input_output_response(holds, [0.0, 2.0], 0, [1.0])
-    ... except nlctl.ChatteringError as error:
+    ... except nlctl.errors.ChatteringError as error:
     ...     print(round(error.time, 3))
     1.0
     """
@@ -147,7 +178,7 @@ class ZenoError(DivergedError):
     >>> ball = nlctl.block(Ball(), "ball")
     >>> try:
     ...     nlctl.input_output_response(ball, [0.0, 4.0], engine="python-control")
-    ... except nlctl.ZenoError as error:
+    ... except nlctl.errors.ZenoError as error:
     ...     print(round(error.time, 4))
     3.0
     """
@@ -215,4 +246,105 @@ class CompileError(UsageError):
     >>> nlctl.compile(ct.nlsys(None, remembers, inputs=1, outputs=1, name="block"))
     Traceback (most recent call last):
     nlctl.errors.CompileError: block 'block' cannot be compiled: ...
+    """
+
+
+class AlgebraicLoopError(UsageError):
+    """Signals that depend on each other at the same instant; the message prints the loop.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> def half(t, x, u, params):
+    ...     return 1 + 0.5 * u
+    >>> half = ct.nlsys(None, half, inputs="v", outputs="w", name="half")
+    >>> same = ct.nlsys(None, lambda t, x, u, params: u, inputs="w", outputs="v", name="same")
+    >>> loop = ct.interconnect([half, same], outputs="w", name="loop")
+    >>> nlctl.compile(loop)
+    Traceback (most recent call last):
+    nlctl.errors.AlgebraicLoopError: ...
+    >>> print(nlctl.compile(loop, algebraic_loops="solve").output(0, []))  # w = 1 + w / 2
+    [2.]
+    """
+
+
+class AuditError(UsageError):
+    """Machine code and python-control differ; the message names the block and both numbers.
+
+    Examples
+    --------
+    A function that reads a clock is not one of its arguments; the audit sees it where reading its
+    code does not.  With ``engine="auto"`` python-control takes over, and an `EngineWarning` says
+    so:
+
+    >>> issubclass(nlctl.errors.AuditError, nlctl.errors.UsageError)
+    True
+    """
+
+
+class OperatingPointError(UsageError):
+    """No operating point was found: the message says how far the nearest place is from one.
+
+    Attributes
+    ----------
+    states, inputs : ndarray
+        Where the search has ended.
+    residual : float
+        Largest violation there.
+
+    Examples
+    --------
+    >>> import control as ct
+    >>> never = ct.nlsys(lambda t, x, u, params: x**2 + 1, inputs=0, states=1, name="never")
+    >>> try:
+    ...     nlctl.find_operating_point(never)
+    ... except nlctl.errors.OperatingPointError as error:
+    ...     print(error.residual)
+    1.0
+    """
+
+    def __init__(self, message: str, states: ndarray, inputs: ndarray, residual: float) -> None:
+        super().__init__(message)
+        self.states, self.inputs, self.residual = states, inputs, residual
+
+
+class EngineWarning(UserWarning):
+    """A diagram could not be compiled, and python-control runs it: the message says why.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import control as ct
+    >>> def remembers(t, x, u, params):
+    ...     seen.append(u[0])
+    ...     return u
+    >>> seen = []
+    >>> block = ct.nlsys(None, remembers, inputs=1, outputs=1, name="block")
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     response = nlctl.input_output_response(block, [0.0, 1.0], 2.0)
+    >>> print(told[0].category.__name__, response.outputs)
+    EngineWarning [2. 2.]
+    """
+
+
+class CacheWarning(UserWarning):
+    """Machine code is not kept: others may write to the folder, or it is another user's.
+
+    Examples
+    --------
+    A folder in which others may write keeps no machine code: it would be executed.
+
+    >>> import os, tempfile, warnings
+    >>> from unittest import mock
+    >>> with (
+    ...     tempfile.TemporaryDirectory() as folder,
+    ...     mock.patch.dict(os.environ, NLCTL_CACHE_DIR=folder),
+    ...     warnings.catch_warnings(record=True) as told,
+    ... ):
+    ...     warnings.simplefilter("always")
+    ...     os.chmod(folder, 0o777)
+    ...     outputs = nlctl.compile(nlctl.block(nlctl.Gain(), "gain")).output(0, [], [1.0])
+    >>> {warning.category.__name__ for warning in told}
+    {'CacheWarning'}
     """

@@ -181,7 +181,7 @@ class ForcedDuffing:
     --------
     At rest in the origin only the forcing q cos(w t) drives it, q = 5.1 at t = 0:
 
-    >>> plant = nlctl.block(nlctl.ForcedDuffing(), "plant")
+    >>> plant = nlctl.block(nlctl.plants.ForcedDuffing(), "plant")
     >>> print(plant.dynamics(0, [0.0, 0.0], [0.0]).round(9))
     [0.  5.1]
     """
@@ -248,7 +248,7 @@ class Genesio:
 
     Examples
     --------
-    >>> plant = nlctl.block(nlctl.Genesio(), "plant")
+    >>> plant = nlctl.block(nlctl.plants.Genesio(), "plant")
     >>> print(plant.dynamics(0, [1.0, 0.0, 0.0], [0.0]))  # -c x1 + x1^2
     [ 0.  0. -5.]
     """
@@ -320,7 +320,7 @@ class WingRock:
     --------
     The wing's bias alone, and with ailerons that half cancel it:
 
-    >>> wing = nlctl.block(nlctl.WingRock(), "wing")
+    >>> wing = nlctl.block(nlctl.plants.WingRock(), "wing")
     >>> [float(wing.dynamics(0, [0.0, 0.0], [v])[1].round(9)) for v in (0.0, -0.4 / 3)]
     [0.8, 0.4]
     """

@@ -231,7 +231,8 @@ class BandLimitedNoise:
     --------
     The same function of time in every run; nothing of it depends on a step size:
 
-    >>> sensor = nlctl.block(nlctl.BandLimitedNoise(inputs=("y",), outputs=("ym",)), "sensor")
+    >>> noise = nlctl.references.BandLimitedNoise(inputs=("y",), outputs=("ym",))
+    >>> sensor = nlctl.block(noise, "sensor")
     >>> once, again = sensor.output(0.3, [], [1.0]), sensor.output(0.3, [], [1.0])
     >>> print(bool(once == again), bool(0 < abs(once[0] - 1.0) < 0.1))
     True True

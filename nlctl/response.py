@@ -15,7 +15,7 @@ from .annotations import as_annotated
 from .arguments import ATOL, RTOL, number, one_of, tolerances
 from .blocks import sampling_of
 from .diagrams import leaves, supplied_blocks
-from .errors import ParameterError
+from .errors import AlgebraicLoopError, AuditError, CompileError, EngineWarning, ParameterError
 from .names import unknown
 from .params import checked_times
 from .reference.interpreted import SOLVE_IVP_METHODS, python_control_response
@@ -38,30 +38,10 @@ if TYPE_CHECKING:
     from .native import Compiled, Tableau
     from .reference.known import Known
 
-__all__ = ["EngineWarning", "input_output_response"]
+__all__ = ["input_output_response"]
 
 ENGINES = ("python-control", "native", "auto")
 NATIVE_ONLY = ("max_steps", "step")  # settings that python-control does not know
-
-
-class EngineWarning(UserWarning):
-    """A diagram could not be compiled, and python-control runs it: the message says why.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> import control as ct
-    >>> def remembers(t, x, u, params):
-    ...     seen.append(u[0])
-    ...     return u
-    >>> seen = []
-    >>> block = ct.nlsys(None, remembers, inputs=1, outputs=1, name="block")
-    >>> with warnings.catch_warnings(record=True) as told:
-    ...     warnings.simplefilter("always")
-    ...     response = nlctl.input_output_response(block, [0.0, 1.0], 2.0)
-    >>> print(told[0].category.__name__, response.outputs)
-    EngineWarning [2. 2.]
-    """
 
 
 @as_annotated
@@ -281,7 +261,7 @@ def _computed(run: RunArguments, engine: str) -> Response:
                     "engine='native' has it, max_step= bounds the steps of both engines"
                 )
         return python_control_response(run, _known)
-    from .native import AlgebraicLoopError, AuditError, Compiled, CompileError  # late: needs numba
+    from .native import Compiled  # late: needs numba
 
     if not interpretable and not isinstance(run.system, Compiled):
         raise ParameterError(

@@ -85,7 +85,7 @@ class Ramp:
 
     Examples
     --------
-    >>> ramp = nlctl.block(nlctl.Ramp(slope=2.0, t_start=1.0), "ramp")
+    >>> ramp = nlctl.block(nlctl.sources.Ramp(slope=2.0, t_start=1.0), "ramp")
     >>> print(ramp.output(0.5, [], []), ramp.output(4.0, [], []))
     [0.] [6.]
     """
@@ -162,7 +162,7 @@ class Square:
 
     Examples
     --------
-    >>> square = nlctl.block(nlctl.Square(period=2.0, duty=0.25), "square")
+    >>> square = nlctl.block(nlctl.sources.Square(period=2.0, duty=0.25), "square")
     >>> print([float(square.output(t, [], [])[0]) for t in (0.0, 0.4, 0.5, 1.9, 2.0)])
     [1.0, 1.0, -1.0, -1.0, 1.0]
     """
@@ -206,7 +206,7 @@ class Pulse:
 
     >>> import control as ct
     >>> integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
-    >>> pulse = nlctl.Pulse(height=5.0, t_start=60.0, width=1e-3)
+    >>> pulse = nlctl.sources.Pulse(height=5.0, t_start=60.0, width=1e-3)
     >>> loop = nlctl.interconnect({"pulse": pulse, "integrator": integrator}, outputs=["y"])
     >>> print(nlctl.input_output_response(loop, [0, 100]).outputs[0, -1].round(9))
     0.005
@@ -245,7 +245,7 @@ class PulseTrain:
 
     Examples
     --------
-    >>> train = nlctl.block(nlctl.PulseTrain(period=1.0, width=0.25), "train")
+    >>> train = nlctl.block(nlctl.sources.PulseTrain(period=1.0, width=0.25), "train")
     >>> print([float(train.output(t, [], [])[0]) for t in (-0.9, 0.1, 0.25, 3.2)])
     [0.0, 1.0, 0.0, 1.0]
     """
@@ -299,7 +299,7 @@ class Chirp:
     --------
     The mean frequency of a linear sweep is that in its middle, here 2 pi rad/s for 10 s:
 
-    >>> chirp = nlctl.Chirp(omega_0=0.0, omega_1=4 * np.pi, t_1=10.0, phase=np.pi / 2)
+    >>> chirp = nlctl.sources.Chirp(omega_0=0.0, omega_1=4 * np.pi, t_1=10.0, phase=np.pi / 2)
     >>> print(nlctl.block(chirp, "chirp").output(10.0, [], []).round(9))
     [1.]
     """
@@ -369,7 +369,7 @@ class TimeTable:
 
     Examples
     --------
-    >>> table = nlctl.TimeTable(times=(0.0, 1.0, 3.0), values=(0.0, 2.0, 0.0))
+    >>> table = nlctl.sources.TimeTable(times=(0.0, 1.0, 3.0), values=(0.0, 2.0, 0.0))
     >>> print(nlctl.block(table, "table").output(2.0, [], []))
     [1.]
     """

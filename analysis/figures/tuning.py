@@ -68,7 +68,7 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     Parameters
     ----------
     history : pandas.DataFrame
-        As that of `nlctl.Tuned`.
+        As that of `nlctl.sensitivities.Tuned`.
     cost : bool, optional
         Whether it is the cost that counts.
 
@@ -99,7 +99,7 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
     Parameters
     ----------
     gains : pandas.DataFrame
-        As `nlctl.Tuned.to_pandas` returns it.
+        As `nlctl.sensitivities.Tuned.to_pandas` returns it.
     before, after : float
         The least margin, or the cost, with all gains of the start and as found.
     what : str

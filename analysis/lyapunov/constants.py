@@ -187,7 +187,7 @@ def disturbance(plant: Any, box: Box, times: tuple[float, float], *, tol: float 
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, disturbance
     >>> box = Box(names=("x1", "x2", "x3"), low=(-1.0,) * 3, high=(1.0,) * 3)
-    >>> found = disturbance(nlctl.Genesio(), box, (0.0, np.inf))
+    >>> found = disturbance(nlctl.plants.Genesio(), box, (0.0, np.inf))
     >>> -1.0001 < found.low <= -1.0 and 1.0 <= found.high < 1.0001
     True
     """

@@ -98,11 +98,11 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
         options of a `Choice`:
 
         * "paper"; "no network", "no robust term", "neither", "fixed gain": see
-          `nlctl.ablations`, where the fixed gain is -N(zeta) that the paper's loop has reached
-          after 20 s;
+          `nlctl.controllers.ablations`, where the fixed gain is -N(zeta) that the paper's loop has
+          reached after 20 s;
         * "PID", "sliding mode": see `baselines`;
-        * "certified": `nlctl.KnownSignLaw` with gains that `nlctl.analysis.lyapunov.certify` proves
-          a bound for;
+        * "certified": `nlctl.controllers.KnownSignLaw` with gains that
+          `nlctl.analysis.lyapunov.certify` proves a bound for;
         * "dead zone in zeta'", "leakage", "monotone zeta": the paper's gains with another law for
           the Nussbaum argument.
 

@@ -138,7 +138,7 @@ def run_case(case: Case) -> CaseRun:
 
     Raises
     ------
-    nlctl.DivergedError
+    nlctl.errors.DivergedError
         If the loop diverges.
     """
     diagram = case.diagram

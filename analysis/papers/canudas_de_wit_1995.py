@@ -405,8 +405,8 @@ _PAPER = Paper(
         "the first fall of the force; these are not the same number.",
     ),
     methods=(
-        "Every run is one of the block nlctl.LuGre with the parameters of Table I, in machine "
-        "code; steps end where the velocity reverses.",
+        "Every run is one of the block nlctl.actuators.LuGre with the parameters of Table I, in "
+        "machine code; steps end where the velocity reverses.",
     ),
     limits=(
         "The model's behaviour is reproduced, not that of friction: nothing here was measured.",

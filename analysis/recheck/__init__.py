@@ -58,7 +58,7 @@ def recheck(content: Any) -> str:
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
     >>> from nlctl.analysis.recheck import recheck, seal_of
-    >>> controller = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0, phi=0.1))
+    >>> controller = nlctl.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=20.0, phi=0.1))
     >>> loop = nlctl.paper.example_1(controller=controller, actuator=nlctl.Gain())
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = certify(loop).save(Path(folder) / "certificate.json")

@@ -5,7 +5,7 @@ import warnings
 
 def warnings_are_errors(gallery_conf, script):
     """Set the filter anew before each script."""
-    from nlctl import EngineWarning
+    from nlctl.errors import EngineWarning
 
     warnings.simplefilter("error", EngineWarning)
 

@@ -90,7 +90,7 @@ assert abs(rate - 2) < 0.05
 # again; a ledger and a study have a record of the loop that they are of:
 try:
     loop_report(nlctl.paper.example_1(), title="Another loop", response=response)
-except nlctl.DiagramError as error:
+except nlctl.errors.DiagramError as error:
     print(error)
 
 # %%

@@ -10,7 +10,9 @@ import numpy as np
 import nlctl
 
 t = np.linspace(0, 20, 2001)
-series = nlctl.cascade({"limit": nlctl.Saturation(limit=15.0), "dead_zone": nlctl.DeadZone()})
+series = nlctl.actuators.cascade(
+    {"limit": nlctl.Saturation(limit=15.0), "dead_zone": nlctl.DeadZone()}
+)
 for actuator in (nlctl.Backlash(), series):
     loop = nlctl.paper.example_1(actuator=actuator)
     response = nlctl.input_output_response(loop, t)

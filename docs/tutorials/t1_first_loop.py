@@ -39,5 +39,5 @@ assert np.abs(y - yd)[t > 10].max() < 0.15
 # A wrong name or value is refused in one sentence:
 try:
     nlctl.input_output_response(loop, t, params={"actuator.b_right": 0.6})
-except nlctl.UnknownNameError as error:
+except nlctl.errors.UnknownNameError as error:
     print(error)

@@ -41,7 +41,7 @@ assert np.abs(v - (1 - np.exp(-t / 0.1))).max() < 1e-8
 # Bounds are held where a value is born, and where one arrives later.
 try:
     Lag(T=-1.0)
-except nlctl.ParameterError as error:
+except nlctl.errors.ParameterError as error:
     print(error)
 
 # %%

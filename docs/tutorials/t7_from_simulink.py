@@ -13,10 +13,10 @@ line, Goto and From             signals with the same name are connected
 Gain, Sum, Transfer Fcn         ``ct.ss``, ``ct.tf``, ``ct.summing_junction`` of python-control
 MATLAB Function                 a function of ``ct.nlsys``, or an equation of a record
 Saturation, Dead Zone, ...      ``nlctl.Saturation``, ``nlctl.DeadZone``, ``nlctl.Backlash``, ``nlctl.Relay``, ...
-Step, Pulse Generator, Chirp    ``nlctl.Step``, ``nlctl.PulseTrain``, ``nlctl.Square``, ``nlctl.Chirp``
-From Workspace                  ``nlctl.TimeTable``, or an input of the run
+Step, Pulse Generator, Chirp    ``nlctl.Step``, and ``PulseTrain``, ``Square``, ``Chirp`` of ``nlctl.sources``
+From Workspace                  ``nlctl.sources.TimeTable``, or an input of the run
 PID Controller (2DOF)           ``nlctl.PID2``, of ``("ref", "y")`` or of ``("e",)``
-Extended Kalman Filter          ``nlctl.ExtendedKalmanFilter``, next to ``nlctl.luenberger``
+Extended Kalman Filter          ``nlctl.observers.ExtendedKalmanFilter``, next to ``nlctl.observers.luenberger``
 initial condition               ``nlctl.initial_state(loop, {"plant.x1": 0.8})``
 zero-crossing detection         always, of all equations that can be read: ``print(nlctl.compile(model))``
 external reset, Hit Crossing    ``guard`` and ``reset`` of a block; ``events=`` of a run, ``response.events``

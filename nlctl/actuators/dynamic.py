@@ -160,7 +160,7 @@ class SecondOrderLag:
     A step overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), half a damped period after it:
 
     >>> import numpy as np
-    >>> lag = nlctl.block(nlctl.SecondOrderLag(omega=20.0, zeta=0.6), "actuator")
+    >>> lag = nlctl.block(nlctl.actuators.SecondOrderLag(omega=20.0, zeta=0.6), "actuator")
     >>> top = np.pi / (20.0 * np.sqrt(1 - 0.6**2))
     >>> response = nlctl.input_output_response(lag, np.array([0.0, top]), 1.0)
     >>> print(round(response.outputs[-1], 5), round(1 + np.exp(-np.pi * 0.6 / 0.8), 5))

@@ -47,7 +47,7 @@ class Coulomb:
 
     Examples
     --------
-    >>> friction = nlctl.block(nlctl.Coulomb(F_c=1.0, sigma_2=0.5), "friction")
+    >>> friction = nlctl.block(nlctl.actuators.Coulomb(F_c=1.0, sigma_2=0.5), "friction")
     >>> [float(friction.output(0, [], [velocity])[0]) for velocity in (-2.0, 0.0, 2.0)]
     [-2.0, 0.0, 2.0]
     """
@@ -89,7 +89,7 @@ class Stribeck:
     --------
     Just behind rest it is F_s, far from it F_c and the viscous part:
 
-    >>> friction = nlctl.block(nlctl.Stribeck(F_c=1.0, F_s=1.5, sigma_2=0.5), "friction")
+    >>> friction = nlctl.block(nlctl.actuators.Stribeck(F_c=1.0, F_s=1.5, sigma_2=0.5), "friction")
     >>> [round(float(friction.output(0, [], [velocity])[0]), 6) for velocity in (1e-9, 2.0)]
     [1.5, 2.0]
     """
@@ -158,7 +158,7 @@ class StickSlip:
     --------
     At rest it takes up what is applied, up to F_s:
 
-    >>> friction = nlctl.block(nlctl.StickSlip(F_c=1.0, F_s=1.5), "friction")
+    >>> friction = nlctl.block(nlctl.actuators.StickSlip(F_c=1.0, F_s=1.5), "friction")
     >>> [float(friction.output(0, [0.0], [0.0, applied])[0]) for applied in (0.7, -1.4, 1.6)]
     [0.7, -1.4, 1.0]
     """
@@ -235,7 +235,7 @@ class Dahl:
     Along a path in one direction the force tends to F_c as 1 - exp(-sigma_0 x / F_c):
 
     >>> import numpy as np
-    >>> friction = nlctl.block(nlctl.Dahl(sigma_0=2.0, F_c=1.0), "friction")
+    >>> friction = nlctl.block(nlctl.actuators.Dahl(sigma_0=2.0, F_c=1.0), "friction")
     >>> response = nlctl.input_output_response(friction, np.array([0.0, 1.0]), 1.0)
     >>> print(round(response.outputs[-1], 6), round(1 - np.exp(-2), 6))
     0.864665 0.864665
@@ -289,9 +289,9 @@ class LuGre:
     At a constant velocity the force tends to that of `Stribeck`:
 
     >>> import numpy as np
-    >>> friction = nlctl.block(nlctl.LuGre(), "friction")
+    >>> friction = nlctl.block(nlctl.actuators.LuGre(), "friction")
     >>> response = nlctl.input_output_response(friction, np.array([0.0, 0.1]), 0.01)
-    >>> steady = nlctl.block(nlctl.Stribeck(), "steady").output(0, [], [0.01])
+    >>> steady = nlctl.block(nlctl.actuators.Stribeck(), "steady").output(0, [], [0.01])
     >>> print(round(response.outputs[-1], 6), steady.round(6))
     1.004 [1.004]
     """
@@ -359,7 +359,7 @@ class BoucWen:
     Where gamma + delta > 0 the force tends to a bound:
 
     >>> import numpy as np
-    >>> record = nlctl.BoucWen(alpha=2.0, beta=1.0, gamma=0.5, delta=0.5)
+    >>> record = nlctl.actuators.BoucWen(alpha=2.0, beta=1.0, gamma=0.5, delta=0.5)
     >>> force = nlctl.block(record, "spring")
     >>> response = nlctl.input_output_response(force, np.array([0.0, 1.0]), 1.0)
     >>> print(record.z_max, round(response.outputs[-1], 6), round(2 * (1 - np.exp(-1)), 6))

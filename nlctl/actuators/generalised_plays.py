@@ -67,7 +67,7 @@ class GeneralisedPrandtlIshlinskii:
     --------
     One play of half gap 0.1 between two saturations that are 0.4 apart in u:
 
-    >>> record = nlctl.GeneralisedPrandtlIshlinskii(
+    >>> record = nlctl.actuators.GeneralisedPrandtlIshlinskii(
     ...     rising=(1.0, 1.0, -0.2, 0.0), falling=(1.0, 1.0, 0.2, 0.0), w=(1.0,), r=(0.1,)
     ... )
     >>> hysteresis = nlctl.block(record, "actuator")

@@ -42,7 +42,7 @@ class DeadZoneInverse:
 
     Examples
     --------
-    >>> inverse, zone = nlctl.DeadZoneInverse(), nlctl.DeadZone(ripple_r=0, ripple_l=0)
+    >>> inverse, zone = nlctl.actuators.DeadZoneInverse(), nlctl.DeadZone(ripple_r=0, ripple_l=0)
     >>> both = nlctl.actuators.cascade({"inverse": inverse, "zone": zone})
     >>> [round(float(both.output(0, [], [u])[0]), 6) for u in (-0.4, 0.0, 0.7)]
     [-0.4, 0.0, 0.7]
@@ -120,7 +120,8 @@ class BacklashInverse:
     --------
     It jumps across the gap where its input reverses:
 
-    >>> inverse = nlctl.block(nlctl.BacklashInverse(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.6), "inverse")
+    >>> record = nlctl.actuators.BacklashInverse(m_r=1.0, m_l=1.0, c_r=0.5, c_l=-0.6)
+    >>> inverse = nlctl.block(record, "inverse")
     >>> [float(inverse.output(0, [1.0], [2.0, rate])[0]) for rate in (1.0, -1.0)]
     [2.5, 1.4]
     """
@@ -203,7 +204,8 @@ class PrandtlIshlinskiiInverse:
 
     Examples
     --------
-    >>> operator, inverse = nlctl.PrandtlIshlinskii(), nlctl.PrandtlIshlinskiiInverse()
+    >>> operator = nlctl.actuators.PrandtlIshlinskii()
+    >>> inverse = nlctl.actuators.PrandtlIshlinskiiInverse()
     >>> both = nlctl.actuators.cascade({"inverse": inverse, "operator": operator})
     >>> [round(float(both.output(0, [0.0] * 8, [u])[0]), 6) for u in (-0.4, 0.1, 0.7)]
     [-0.4, 0.1, 0.7]

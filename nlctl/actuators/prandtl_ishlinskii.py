@@ -66,7 +66,7 @@ class Stop:
     --------
     The play that it completes stays behind u by r, so that the stop stays at r:
 
-    >>> stop = nlctl.block(nlctl.Stop(r=1.0), "stop")
+    >>> stop = nlctl.block(nlctl.actuators.Stop(r=1.0), "stop")
     >>> [float(stop.output(0, [0.0], [u])[0]) for u in (0.4, 3.0, -3.0)]
     [0.4, 1.0, -1.0]
     """
@@ -169,7 +169,7 @@ class PrandtlIshlinskii:
     --------
     One play of half gap 0.4 with weight 0.5, next to u itself:
 
-    >>> record = nlctl.PrandtlIshlinskii(w_0=1.0, w=(0.5,), r=(0.4,))
+    >>> record = nlctl.actuators.PrandtlIshlinskii(w_0=1.0, w=(0.5,), r=(0.4,))
     >>> hysteresis = nlctl.block(record, "actuator")
     >>> [round(float(hysteresis.output(0, [0.0], [u])[0]), 6) for u in (0.3, 1.0)]
     [0.3, 1.3]
@@ -260,7 +260,7 @@ class OneSidedDeadZones:
     --------
     Slopes 1 between the thresholds, 0.5 beyond 1 on the right, 2 beyond -1 on the left:
 
-    >>> record = nlctl.OneSidedDeadZones(w_0=1.0, w=(1.0, -0.5), r=(-1.0, 1.0))
+    >>> record = nlctl.actuators.OneSidedDeadZones(w_0=1.0, w=(1.0, -0.5), r=(-1.0, 1.0))
     >>> shape = nlctl.block(record, "actuator")
     >>> [float(shape.output(0, [], [u])[0]) for u in (-2.0, 0.5, 3.0)]
     [-3.0, 0.5, 2.0]

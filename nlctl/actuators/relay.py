@@ -158,7 +158,7 @@ def relay_grid(levels: Sequence[float]) -> tuple[tuple[float, ...], tuple[float,
 
     Examples
     --------
-    >>> nlctl.relay_grid([-1, 0, 1])
+    >>> nlctl.actuators.relay_grid([-1, 0, 1])
     ((0.0, 1.0, 1.0), (-1.0, -1.0, 0.0))
     """
     grid = vector("relay_grid", "levels", levels)
@@ -180,7 +180,7 @@ class Preisach:
                                    s_k(t-)    beta_k < u < alpha_k
 
     with weights w_k >= 0 (Mayergoyz, Mathematical Models of Hysteresis, 1991, section 1.1).
-    `nlctl.relay_grid` makes the thresholds of a grid in the half-plane alpha > beta.
+    `nlctl.actuators.relay_grid` makes the thresholds of a grid in the half-plane alpha > beta.
 
     It does not obey (2): |v| <= sum w_k for all u.  In plain `control.input_output_response` each
     memory relaxes as that of `nlctl.Relay`.
@@ -194,7 +194,7 @@ class Preisach:
     --------
     Two relays of half weight, which turn on at 0.5 and 1:
 
-    >>> record = nlctl.Preisach(alpha=(0.5, 1.0), beta=(-0.5, -1.0), w=(0.5, 0.5))
+    >>> record = nlctl.actuators.Preisach(alpha=(0.5, 1.0), beta=(-0.5, -1.0), w=(0.5, 0.5))
     >>> hysteresis = nlctl.block(record, "actuator")
     >>> response = nlctl.input_output_response(hysteresis, [0, 1, 2, 3], [0.0, 0.6, 1.1, 0.0])
     >>> print(response.outputs)

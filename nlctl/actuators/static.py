@@ -152,7 +152,8 @@ class AsymmetricSaturation:
 
     Examples
     --------
-    >>> limit = nlctl.block(nlctl.AsymmetricSaturation(slope_l=2.0, limit_l=-6.0), "actuator")
+    >>> record = nlctl.actuators.AsymmetricSaturation(slope_l=2.0, limit_l=-6.0)
+    >>> limit = nlctl.block(record, "actuator")
     >>> [float(limit.output(0, [], [u])[0]) for u in (-5.0, -1.0, 1.0, 50.0)]
     [-6.0, -2.0, 1.0, 10.0]
     """

@@ -27,7 +27,7 @@ class FixedGainLaw:
 
     Examples
     --------
-    >>> law = nlctl.block(nlctl.FixedGainLaw(beta=2.0, kappa=10.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.FixedGainLaw(beta=2.0, kappa=10.0), "law")
     >>> print(law.output(0, [], [0.5, 0.25, 0.0, 0.0]))  # -kappa (beta r + W_psi)
     [-12.5]
     """
@@ -71,7 +71,8 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     Examples
     --------
     >>> import nlctl
-    >>> fixed = replaced(nlctl.adaptive_neural(order=2), law=nlctl.FixedGainLaw(kappa=5.0))
+    >>> law = nlctl.controllers.FixedGainLaw(kappa=5.0)
+    >>> fixed = replaced(nlctl.adaptive_neural(order=2), law=law)
     >>> float(nlctl.parameters(fixed)["value"]["law.kappa"])
     5.0
     """

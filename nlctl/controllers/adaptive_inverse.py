@@ -49,7 +49,7 @@ class AdaptiveDeadZoneInverse:
     --------
     Its outputs are the input of the dead zone and both estimated break points:
 
-    >>> inverse = nlctl.block(nlctl.AdaptiveDeadZoneInverse(), "inverse")
+    >>> inverse = nlctl.block(nlctl.controllers.AdaptiveDeadZoneInverse(), "inverse")
     >>> print(inverse.output(0, [1.0, 0.5, 1.0, -0.25], [2.0, 0.0]))
     [ 2.5   0.5  -0.25]
     """

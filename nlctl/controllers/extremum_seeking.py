@@ -33,7 +33,8 @@ class ExtremumSeeking:
     --------
     At omega t = pi / 2, where y is 0.25 above its mean eta = 1:
 
-    >>> seeking = nlctl.block(nlctl.ExtremumSeeking(k=2.0, a=0.1, omega=10.0), "seeking")
+    >>> record = nlctl.controllers.ExtremumSeeking(k=2.0, a=0.1, omega=10.0)
+    >>> seeking = nlctl.block(record, "seeking")
     >>> t, x, y = np.pi / 20, [3.0, 0.5, 1.0], [1.25]
     >>> print(seeking.output(t, x, y), seeking.dynamics(t, x, y))  # theta_hat + a; k xi, ...
     [3.1] [ 1.    -0.475  0.25 ]

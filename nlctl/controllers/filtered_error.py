@@ -77,7 +77,7 @@ class FilteredError:
     --------
     For lambda_1 = 1.5, e_1 = 2 and e_2 = 1 the outputs are e, r = 1.5 e_1 + e_2 and Y_d:
 
-    >>> error = nlctl.block(nlctl.FilteredError(lambdas=(1.5,)), "error")
+    >>> error = nlctl.block(nlctl.controllers.FilteredError(lambdas=(1.5,)), "error")
     >>> print(error.output(0, [], [2.0, 1.0, 0.0, 0.0, 0.5]))
     [2. 4. 1.]
     """

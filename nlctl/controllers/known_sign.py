@@ -41,7 +41,7 @@ class KnownSignLaw:
     --------
     Without a network's output its bracket is beta r, as r s = 0:
 
-    >>> law = nlctl.block(nlctl.KnownSignLaw(beta=2.5, N_0=2.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.KnownSignLaw(beta=2.5, N_0=2.0), "law")
     >>> print(law.output(0, [], [0.2, 0.0, 0.0, 0.0]))
     [-1.]
     """

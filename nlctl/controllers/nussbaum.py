@@ -48,7 +48,7 @@ class NussbaumLaw:
     --------
     At zeta = 1 the paper's Nussbaum function is 0; zeta' = r eta is not:
 
-    >>> law = nlctl.block(nlctl.NussbaumLaw(beta=2.5), "law")
+    >>> law = nlctl.block(nlctl.controllers.NussbaumLaw(beta=2.5), "law")
     >>> u = [2.0, 0.0, 0.0, 1.0]  # r, W_psi, robust, Y_d
     >>> print(law.output(0, [1.0], u).round(12), law.dynamics(0, [1.0], u))
     [0. 1.] [12.]

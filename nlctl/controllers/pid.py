@@ -308,7 +308,7 @@ def standard_pid(
 
     Examples
     --------
-    >>> law = nlctl.standard_pid(K=2.0, T_i=4.0, T_d=1.0, b=0.5)
+    >>> law = nlctl.controllers.standard_pid(K=2.0, T_i=4.0, T_d=1.0, b=0.5)
     >>> print(law.k_p, law.k_i, law.k_d, law.T_f, law.T_t)
     2.0 0.5 2.0 0.1 2.0
     """

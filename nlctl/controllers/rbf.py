@@ -166,7 +166,8 @@ class GaussianBasis:
     Examples
     --------
     >>> import numpy as np
-    >>> basis = nlctl.block(nlctl.GaussianBasis(centres=((0.0,), (2.0,)), widths=(2.0,)), "basis")
+    >>> record = nlctl.controllers.GaussianBasis(centres=((0.0,), (2.0,)), widths=(2.0,))
+    >>> basis = nlctl.block(record, "basis")
     >>> print(basis.output(0, [], [0.0]).round(6), round(np.exp(-1), 6))
     [1.       0.367879] 0.367879
     """
@@ -262,7 +263,7 @@ class AdaptiveWeights(NetworkWeights):
     --------
     Two weights at 0 learn r psi, by Gamma = 0.5; the outputs are W_hat^T psi and |W_hat|:
 
-    >>> weights = nlctl.block(nlctl.AdaptiveWeights(nodes=2), "weights")
+    >>> weights = nlctl.block(nlctl.controllers.AdaptiveWeights(nodes=2), "weights")
     >>> print(weights.dynamics(0, [0.0, 0.0], [2.0, 1.0, 0.25]))
     [1.   0.25]
     >>> print(weights.output(0, [3.0, 4.0], [2.0, 1.0, 0.25]))

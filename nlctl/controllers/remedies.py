@@ -40,7 +40,7 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
     --------
     zeta stands still while |r| <= r_0:
 
-    >>> law = nlctl.block(nlctl.DeadZoneNussbaumLaw(beta=2.0, r_0=0.3), "law")
+    >>> law = nlctl.block(nlctl.controllers.DeadZoneNussbaumLaw(beta=2.0, r_0=0.3), "law")
     >>> [round(float(law.dynamics(0, [1.0], [r, 0.0, 0.0, 0.0])[0]), 6) for r in (0.3, 0.5)]
     [0.0, 0.2]
     """
@@ -74,7 +74,7 @@ class LeakyNussbaumLaw(NussbaumLaw):
     --------
     At r = 0 zeta goes back to 1 at the rate c:
 
-    >>> law = nlctl.block(nlctl.LeakyNussbaumLaw(c=0.5), "law")
+    >>> law = nlctl.block(nlctl.controllers.LeakyNussbaumLaw(c=0.5), "law")
     >>> print(law.dynamics(0, [3.0], [0.0, 0.0, 0.0, 0.0]))
     [-1.]
     """
@@ -104,8 +104,8 @@ class MonotoneNussbaumLaw(NussbaumLaw):
     --------
     With s = -3 the law of the paper lets zeta fall; here it cannot:
 
-    >>> falls = nlctl.block(nlctl.NussbaumLaw(beta=2.0), "law")
-    >>> never = nlctl.block(nlctl.MonotoneNussbaumLaw(beta=2.0), "law")
+    >>> falls = nlctl.block(nlctl.controllers.NussbaumLaw(beta=2.0), "law")
+    >>> never = nlctl.block(nlctl.controllers.MonotoneNussbaumLaw(beta=2.0), "law")
     >>> falls.dynamics(0, [1.0], [1, -3, 0, 0])[0] < 0 < never.dynamics(0, [1.0], [1, -3, 0, 0])[0]
     np.True_
     """

@@ -134,7 +134,7 @@ class LossOfEffectiveness(_Effect):
 
 @record
 class Noise(_Effect):
-    """Band-limited noise, a fixed function of time: see `nlctl.BandLimitedNoise`."""
+    """Band-limited noise, a fixed function of time: see `nlctl.references.BandLimitedNoise`."""
 
     value: float = param(0.0, unit="1", meaning="root mean square of the noise", at_least=0)
     low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
@@ -148,7 +148,7 @@ class Noise(_Effect):
             raise ParameterError(f"Noise needs low < high, got {self.low:g} and {self.high:g}")
 
     def derived(self) -> dict[str, Any]:
-        """Frequencies and phases, those of `nlctl.BandLimitedNoise` with one signal."""
+        """Frequencies and phases, those of `nlctl.references.BandLimitedNoise` with one signal."""
         omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
         return {"omega": omega, "phase": phase}
 

@@ -12,21 +12,16 @@ through time, each with its own steps.  `response` makes of one run what python-
 `ensemble` runs many.
 """
 
-from ..errors import CompileError
 from .ahead import compile_ahead
-from .audit import AuditError
 from .compiled import Compiled, compile  # noqa: A004 (what it does)
-from .diagram.schedule import AlgebraicLoopError
 from .ensemble import ensemble_response
 from .ensemble_result import Ensemble
 from .frequency import frequency_response
 from .integrate.methods.tableau import Tableau
 from .integrate.state import Status
 from .linearized import linearize
-from .machine.store import CacheWarning
 from .operating_points import (
     OperatingPoint,
-    OperatingPointError,
     find_operating_point,
     find_operating_points,
 )
@@ -37,15 +32,10 @@ from .stepping import Stepper, StepperState, stepper
 from .typesetting import BlockEquations, typeset
 
 __all__ = [
-    "AlgebraicLoopError",
-    "AuditError",
     "BlockEquations",
-    "CacheWarning",
-    "CompileError",
     "Compiled",
     "Ensemble",
     "OperatingPoint",
-    "OperatingPointError",
     "Response",
     "Settings",
     "Statistics",

@@ -20,7 +20,7 @@ from ..blocks import supplied_of
 from ..delays.transport import PAST
 from ..diagrams import Apart, apart, override, supplied_blocks
 from ..diagrams.points import SHAKEN, PointValues, agree, explained, values_now
-from ..errors import ParameterError, UsageError
+from ..errors import AuditError, ParameterError
 from ..sampling.system import Happening, happening
 from ..supplied import SuppliedOutput, supplying
 from ..upstream.control_internals import outputs_now, rates_now, set_parameters
@@ -46,20 +46,6 @@ _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in 
 
 Audit = bool | Literal["every run"]
 Evaluated = Callable[[float, np.ndarray, np.ndarray], PointValues]
-
-
-class AuditError(UsageError):
-    """Machine code and python-control differ; the message names the block and both numbers.
-
-    Examples
-    --------
-    A function that reads a clock is not one of its arguments; the audit sees it where reading its
-    code does not.  With ``engine="auto"`` python-control takes over, and an `EngineWarning` says
-    so:
-
-    >>> issubclass(nlctl.AuditError, nlctl.UsageError)
-    True
-    """
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,13 +9,12 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..errors import CompileError, UsageError
+from ..errors import AlgebraicLoopError, CompileError, UsageError
 from ..reference.known import Known
 from ..responses.watched import Watched
 from ..upstream.systems import System
 from . import compiled as engine
 from .compiled import Compiled, with_watched
-from .diagram.schedule import AlgebraicLoopError
 from .happened import row_labels
 from .machine.evaluations import prepared_parameters
 from .machine.routine import Routine

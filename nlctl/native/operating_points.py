@@ -13,7 +13,7 @@ from scipy.optimize import OptimizeResult, least_squares, root
 from ..annotations import as_annotated
 from ..arguments import number
 from ..diagrams import state_names
-from ..errors import ParameterError, UnknownKeywordError, UsageError
+from ..errors import OperatingPointError, ParameterError, UnknownKeywordError
 from ..names import find_name, unknown
 from ..params import as_numbers
 from ..responses.arguments import checked_params, state_array
@@ -23,7 +23,7 @@ from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram
 from .happened import row_labels
 
-__all__ = ["OperatingPoint", "OperatingPointError", "find_operating_point", "find_operating_points"]
+__all__ = ["OperatingPoint", "find_operating_point", "find_operating_points"]
 
 _WHO = "find_operating_point"
 _FOUND = 1e-8  # residual, relative to what it is made of
@@ -88,32 +88,6 @@ class OperatingPoint(ct.OperatingPoint):
         if self.kinks:
             lines.append(f"  at a kink of {', '.join(self.kinks)}")
         return "\n".join(lines)
-
-
-class OperatingPointError(UsageError):
-    """No operating point was found: the message says how far the nearest place is from one.
-
-    Attributes
-    ----------
-    states, inputs : ndarray
-        Where the search has ended.
-    residual : float
-        Largest violation there.
-
-    Examples
-    --------
-    >>> import control as ct
-    >>> never = ct.nlsys(lambda t, x, u, params: x**2 + 1, inputs=0, states=1, name="never")
-    >>> try:
-    ...     nlctl.find_operating_point(never)
-    ... except nlctl.OperatingPointError as error:
-    ...     print(error.residual)
-    1.0
-    """
-
-    def __init__(self, message: str, point: OperatingPoint) -> None:
-        super().__init__(message)
-        self.states, self.inputs, self.residual = point.states, point.inputs, point.residual
 
 
 class _Asked(NamedTuple):
@@ -227,7 +201,9 @@ def find_operating_point(
             f"no operating point of '{cut.compiled.system.name}' was found from "
             f"{np.round(asked.x, 6)}: the search ended at {np.round(point.states, 6)}, where what "
             f"was asked is missed by {point.residual:.3g}; begin elsewhere, or ask for less",
-            point,
+            point.states,
+            point.inputs,
+            point.residual,
         )
     return point
 

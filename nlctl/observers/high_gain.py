@@ -48,7 +48,8 @@ class HighGainObserver:
 
     Examples
     --------
-    >>> observer = nlctl.block(nlctl.HighGainObserver(alpha=(2.0, 1.0), epsilon=0.1), "observer")
+    >>> record = nlctl.observers.HighGainObserver(alpha=(2.0, 1.0), epsilon=0.1)
+    >>> observer = nlctl.block(record, "observer")
     >>> print(observer.dynamics(0, [0.0, 0.0], [1.0]).round(9))
     [ 20. 100.]
     """

@@ -66,7 +66,7 @@ class ExtendedKalmanFilter:
     >>> @nlctl.equation
     ... def pendulum(x, u):
     ...     return x[1], -np.sin(x[0]) + u[0]
-    >>> record = nlctl.ExtendedKalmanFilter(f=pendulum, Q=0.1 * np.eye(2), R=((0.5,),))
+    >>> record = nlctl.observers.ExtendedKalmanFilter(f=pendulum, Q=0.1 * np.eye(2), R=((0.5,),))
     >>> block = nlctl.block(record, "filter")
     >>> print(block.state_labels)
     ['x1_hat', 'x2_hat', 'P11', 'P12', 'P22']

@@ -38,7 +38,7 @@ class LuenbergerObserver:
     --------
     A double integrator, with both poles of the error at -1:
 
-    >>> observer = nlctl.block(nlctl.LuenbergerObserver(L=((2.0,), (1.0,))), "observer")
+    >>> observer = nlctl.block(nlctl.observers.LuenbergerObserver(L=((2.0,), (1.0,))), "observer")
     >>> print(observer.dynamics(0, [0.0, 0.0], [0.0, 1.0]))  # x_hat = 0 while y = 1
     [2. 1.]
     """
@@ -132,7 +132,7 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     --------
     >>> import control as ct
     >>> plant = ct.ss([[0, 1], [-1, 0]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y")
-    >>> observer = nlctl.luenberger(plant, poles=[-2, -3])
+    >>> observer = nlctl.observers.luenberger(plant, poles=[-2, -3])
     >>> print(observer.inputs, np.round(observer.L, 9).ravel())
     ('v', 'y') [5. 5.]
     """

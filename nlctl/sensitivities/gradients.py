@@ -37,7 +37,7 @@ class MetricGradient:
     Examples
     --------
     >>> import numpy as np
-    >>> made = nlctl.MetricGradient(
+    >>> made = nlctl.sensitivities.MetricGradient(
     ...     key="size", value=1.0, with_respect_to=("p",), scale=np.ones(1), above=np.ones(1),
     ...     below=-np.ones(1),
     ... )

@@ -34,7 +34,7 @@ class NoDerivative:
 
     Examples
     --------
-    >>> lack = nlctl.NoDerivative(
+    >>> lack = nlctl.sensitivities.NoDerivative(
     ...     time=0.5, where="guard of 'a'", why="grazing", with_respect_to=("p",)
     ... )
     >>> print(lack)

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CompileError, DivergedError, ParameterError
+from ..errors import AlgebraicLoopError, CompileError, DivergedError, ParameterError
 from ..native import Compiled, ensemble_response
-from ..native.diagram.wiring import AlgebraicLoopError
 from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
 from .response import sensitivity_response

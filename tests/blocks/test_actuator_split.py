@@ -80,7 +80,7 @@ def test_the_others_say_why_they_have_none(names, why):
 @settings(max_examples=10)
 def test_the_sum_of_plays_attains_its_bounds(w, w_0):
     """eps_u = -+ sum w_i r_i after a long way up or down, k the sum of the weights."""
-    spec = nlctl.PrandtlIshlinskii(w=w, w_0=w_0)
+    spec = nlctl.actuators.PrandtlIshlinskii(w=w, w_0=w_0)
     split, most = decompose(spec), float(np.dot(w, spec.r))
     assert split.provenance == "proved"
     assert (split.k_1, split.k_2) == pytest.approx((w_0 + sum(w),) * 2)
@@ -139,9 +139,9 @@ def test_other_records_are_refused_too(spec, told):
 @pytest.mark.ci
 def test_the_proof_is_examined_with_several_memories_or_refused():
     """The ledger's runs with four plays; with relays one sentence, before anything runs."""
-    found = examine(nlctl.paper.example_1(actuator=nlctl.PrandtlIshlinskii()), 1.0)
+    found = examine(nlctl.paper.example_1(actuator=nlctl.actuators.PrandtlIshlinskii()), 1.0)
     run = found.runs.first
     eps = found.runs.split.eps_u(run.signals["u"], run.signals["v"])
     assert np.abs(eps).max() <= found.runs.split.eps_star + 1e-12
     with pytest.raises(DecompositionError, match="Preisach is not of the form"):
-        examine(nlctl.paper.example_1(actuator=nlctl.Preisach()), 1.0)
+        examine(nlctl.paper.example_1(actuator=nlctl.actuators.Preisach()), 1.0)

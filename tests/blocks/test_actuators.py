@@ -71,7 +71,7 @@ class TestDeadZone:
     def test_a_slope_that_could_vanish_is_refused(self, side):
         """Assumption 1 wants k(u, t) > 0."""
         told = rf"needs \|ripple_{side}\| < slope_{side}.* got -2 and 1"
-        with pytest.raises(nlctl.ParameterError, match=told):
+        with pytest.raises(nlctl.errors.ParameterError, match=told):
             nlctl.DeadZone(**{f"slope_{side}": 1.0, f"ripple_{side}": -2.0})
 
 
@@ -156,9 +156,9 @@ class TestPlay:
 
     def test_the_gap_has_two_ends(self):
         """c_l < c_r, and the slopes are positive."""
-        with pytest.raises(nlctl.ParameterError, match=r"needs c_l < c_r, got 1 and 0\.5"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"needs c_l < c_r, got 1 and 0\.5"):
             nlctl.Backlash(c_l=1.0)
-        with pytest.raises(nlctl.ParameterError, match="Backlash needs m_l > 0, got 0"):
+        with pytest.raises(nlctl.errors.ParameterError, match="Backlash needs m_l > 0, got 0"):
             nlctl.Backlash(m_l=0)
 
 
@@ -269,7 +269,7 @@ class TestBacklashInPythonControl:
         block, t = nlctl.block(nlctl.Backlash(), "actuator"), np.linspace(0, 0.1, 3)
         made = nlctl.input_output_response(nlctl.block(nlctl.Backlash(v0=0.4), "actuator"), t)
         np.testing.assert_allclose(made.outputs, 0.4, atol=1e-9)
-        with pytest.raises(nlctl.UnknownNameError, match="unknown parameter 'v0'"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="unknown parameter 'v0'"):
             nlctl.input_output_response(block, t, params={"actuator.v0": 0.4})
         run = nlctl.input_output_response(block, t, 0, {"actuator.memory": 0.4})
         np.testing.assert_allclose(run.outputs, made.outputs, atol=1e-9)

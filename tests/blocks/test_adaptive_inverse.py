@@ -21,18 +21,20 @@ def at(spec, x, u):
 def test_with_the_true_values_the_dead_zone_disappears(wanted, m_r, m_l, b_r, b_l):
     """Estimates that are right make actuator and inverse the identity, as `DeadZoneInverse`."""
     x = (m_r, m_r * b_r, m_l, -m_l * b_l)
-    u, right, left = at(nlctl.AdaptiveDeadZoneInverse(), x, (wanted, 0.3))
+    u, right, left = at(nlctl.controllers.AdaptiveDeadZoneInverse(), x, (wanted, 0.3))
     values = {"slope_r": m_r, "slope_l": m_l, "b_r": b_r, "b_l": -b_l}
     zone = nlctl.DeadZone(**values, ripple_r=0.0, ripple_l=0.0)
     assert at(zone, (), (u,))[0] == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    assert u == pytest.approx(at(nlctl.DeadZoneInverse(**values), (), (wanted,))[0], abs=1e-9)
+    assert u == pytest.approx(
+        at(nlctl.actuators.DeadZoneInverse(**values), (), (wanted,))[0], abs=1e-9
+    )
     assert (right, left) == (pytest.approx(b_r), pytest.approx(-b_l))
 
 
 @given(numbers, numbers, slopes, slopes, widths, widths, st.floats(0.1, 10))
 def test_projection_only_takes_away_what_leaves_the_bounds(wanted, r, m_r, m_l, b_r, b_l, gamma):
     """At a bound the rates point inwards; elsewhere they are the gradient's."""
-    spec = nlctl.AdaptiveDeadZoneInverse(gamma=gamma)
+    spec = nlctl.controllers.AdaptiveDeadZoneInverse(gamma=gamma)
     p = equation_arguments(spec)
     at_bounds = (spec.m_min, 0.0, spec.m_min, 0.0)
     m_r1, mb_r1, m_l1, mb_l1 = spec.update(0.0, at_bounds, (wanted, r), p)
@@ -76,7 +78,7 @@ def regulated(inverse, zone):
 def test_its_lyapunov_function_falls_by_beta_r_squared():
     """From estimates that are too wide: V(T) - V(0) is minus the integral of beta r^2."""
     zone = nlctl.DeadZone(b_r=0.5, b_l=-0.4, ripple_r=0.0, ripple_l=0.0, slope_r=1.2, slope_l=0.9)
-    inverse = nlctl.AdaptiveDeadZoneInverse(gamma=0.5, b_0=1.5)
+    inverse = nlctl.controllers.AdaptiveDeadZoneInverse(gamma=0.5, b_0=1.5)
     times = np.linspace(0, 10, 20_001)
     loop = regulated(inverse, zone)
     response = nlctl.input_output_response(loop, times, rtol=1e-10, atol=1e-12)
@@ -97,9 +99,12 @@ def test_it_beats_the_actuator_without_it():
     """Break points that are unknown at first: a fifth of the error that the dead zone makes."""
     zone = nlctl.DeadZone(b_r=0.5, b_l=-0.4, ripple_r=0.0, ripple_l=0.0, slope_r=1.2, slope_l=0.9)
     times = np.linspace(0, 60, 6001)
-    still = nlctl.AdaptiveDeadZoneInverse(gamma=1e-9)
+    still = nlctl.controllers.AdaptiveDeadZoneInverse(gamma=1e-9)
     late = {}
-    for label, inverse in (("still", still), ("adaptive", nlctl.AdaptiveDeadZoneInverse())):
+    for label, inverse in (
+        ("still", still),
+        ("adaptive", nlctl.controllers.AdaptiveDeadZoneInverse()),
+    ):
         r = nlctl.input_output_response(regulated(inverse, zone), times).outputs[0]
         late[label] = np.abs(r[times > 50]).max()
     assert late["adaptive"] < 0.2 * late["still"]

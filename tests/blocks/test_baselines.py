@@ -96,7 +96,7 @@ class TestSlidingMode:
     @given(numbers, st.floats(0.1, 20), st.floats(1e-3, 5))
     def test_it_is_the_saturated_proportional_law(self, r, K, phi):
         """-K r / phi inside of the layer, -K sign r outside."""
-        (u,) = at(nlctl.SlidingModeLaw(K=K, phi=phi), (), (r,))
+        (u,) = at(nlctl.controllers.SlidingModeLaw(K=K, phi=phi), (), (r,))
         assert u == pytest.approx(-K * (r / phi if abs(r) < phi else np.sign(r)), rel=1e-12)
 
     def test_it_reaches_the_layer_in_the_time_of_the_book(self):
@@ -111,7 +111,7 @@ class TestSlidingMode:
             return 2.0 * np.sin(5 * t)
 
         plant = nlctl.PureFeedback(order=2, f=f, d=d, initial={"x1": 1.0})
-        controller = nlctl.sliding_mode(law=nlctl.SlidingModeLaw(K=8.0, phi=0.05))
+        controller = nlctl.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=8.0, phi=0.05))
         still = nlctl.SumOfSines(order=2, amplitudes=0.0, frequencies=1.0, phases=0.0)
         blocks = {"r": still, "plant": plant, "controller": controller, "actuator": nlctl.Gain()}
         loop = nlctl.interconnect(blocks, outputs=["e", "r", "u"])
@@ -137,7 +137,7 @@ class TestActuators:
         """In the order of the stages, each parameter under its stage's name."""
         one, two = nlctl.Saturation(limit=3.0), nlctl.DeadZone()
         for stages in ({"a": one, "b": two}, {"b": two, "a": one}):
-            made, v = nlctl.cascade(stages), u
+            made, v = nlctl.actuators.cascade(stages), u
             for stage in stages.values():
                 (v,) = at(stage, (), (v,))
             assert made.output(0.0, [], [u])[0] == pytest.approx(v, rel=1e-14, abs=1e-14)
@@ -146,16 +146,16 @@ class TestActuators:
     def test_memory_survives_in_a_cascade(self):
         """A wide saturation in front of the backlash changes nothing over 20 s."""
         stages = {"saturation": nlctl.Saturation(limit=1e3), "body": nlctl.Backlash()}
-        inside = run(nlctl.paper.example_2(actuator=nlctl.cascade(stages)), T)
+        inside = run(nlctl.paper.example_2(actuator=nlctl.actuators.cascade(stages)), T)
         alone = run(nlctl.paper.example_2(), T)
         np.testing.assert_allclose(inside.outputs, alone.outputs, atol=1e-5)
 
     def test_stages_with_other_signals_are_refused(self):
         """By the stage's name."""
-        with pytest.raises(nlctl.DiagramError, match=r"'plant' goes from \['v'\]"):
-            nlctl.cascade({"plant": nlctl.Genesio()})
-        with pytest.raises(nlctl.DiagramError, match="at least one stage"):
-            nlctl.cascade({})
+        with pytest.raises(nlctl.errors.DiagramError, match=r"'plant' goes from \['v'\]"):
+            nlctl.actuators.cascade({"plant": nlctl.plants.Genesio()})
+        with pytest.raises(nlctl.errors.DiagramError, match="at least one stage"):
+            nlctl.actuators.cascade({})
 
 
 class TestAblations:
@@ -163,7 +163,7 @@ class TestAblations:
         """Parameters of the pieces that stay are those of the controller."""
         (controller,) = (s for s in nlctl.paper.example_2().syslist if s.name == "controller")
         own = nlctl.parameters(controller)["value"]
-        made = nlctl.ablations(controller, kappa=7.0)
+        made = nlctl.controllers.ablations(controller, kappa=7.0)
         for label, without in (
             ("no network", ["weights."]),
             ("no robust term", ["robust."]),
@@ -179,7 +179,7 @@ class TestAblations:
     def test_nothing_replaced_is_the_same_controller(self):
         """Bit for bit, and the original is not changed."""
         (controller,) = (s for s in nlctl.paper.example_1().syslist if s.name == "controller")
-        twin = nlctl.replaced(controller)
+        twin = nlctl.controllers.replaced(controller)
         x, u = np.linspace(-1, 1, twin.nstates), np.linspace(-0.5, 0.8, twin.ninputs)
         np.testing.assert_array_equal(twin.output(0, x, u), controller.output(0, x, u))
         np.testing.assert_array_equal(twin.dynamics(0, x, u), controller.dynamics(0, x, u))
@@ -188,8 +188,10 @@ class TestAblations:
     def test_the_fixed_gain_is_the_nussbaum_law_with_its_argument_held(self, u, zeta):
         """kappa = -N(zeta)."""
         kappa = -float(nlctl.functions.nussbaum(zeta))
-        (held,) = at(nlctl.FixedGainLaw(kappa=kappa), (), u)
-        assert held == pytest.approx(at(nlctl.NussbaumLaw(), (zeta,), u)[0], rel=1e-12, abs=1e-12)
+        (held,) = at(nlctl.controllers.FixedGainLaw(kappa=kappa), (), u)
+        assert held == pytest.approx(
+            at(nlctl.controllers.NussbaumLaw(), (zeta,), u)[0], rel=1e-12, abs=1e-12
+        )
 
 
 class TestComparedControllers:
@@ -205,9 +207,9 @@ class TestComparedControllers:
 
     def test_an_unknown_one_is_named_with_the_nearest(self):
         """Example or controller."""
-        with pytest.raises(nlctl.UnknownNameError, match="example_2"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="example_2"):
             baselines("example_3")
-        with pytest.raises(nlctl.UnknownNameError, match="sliding mode"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="sliding mode"):
             loops.example_1(controller="slidingmode")
 
     def test_the_fixed_gain_is_what_the_paper_s_loop_has_reached(self):

@@ -21,20 +21,20 @@ def wing_rock(weights, *, command=0.0, **pieces):
     """Return wing rock under MRAC with the gains of Chowdhary and Johnson."""
     still = nlctl.SumOfSines(order=0, amplitudes=command, frequencies=0.0, phases=np.pi / 2)
     controller = {
-        "model": nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0),
-        "error": nlctl.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
-        "basis": nlctl.WingRockRegressor(),
+        "model": nlctl.controllers.ReferenceModel(a=(4.0, 2.0), b=4.0),
+        "error": nlctl.controllers.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
+        "basis": nlctl.controllers.WingRockRegressor(),
         "weights": weights,
-        "law": nlctl.ModelReferenceLaw(gain=L),
+        "law": nlctl.controllers.ModelReferenceLaw(gain=L),
     }
-    plant = {"command": still, "plant": nlctl.WingRock(), "actuator": nlctl.Gain()}
+    plant = {"command": still, "plant": nlctl.plants.WingRock(), "actuator": nlctl.Gain()}
     sums = [f"Omega[{i},{j}]" for i in range(6) for j in range(6)] if pieces else []
     return nlctl.interconnect({**plant, **controller, **pieces}, outputs=["e", "u", *sums])
 
 
 def with_history(*, command=0.0, **changes):
-    stack = nlctl.sampled(nlctl.HistoryStack(gain=L, **changes), 0.05)
-    return wing_rock(nlctl.ConcurrentWeights(Gamma=5.0), command=command, stack=stack)
+    stack = nlctl.sampled(nlctl.controllers.HistoryStack(gain=L, **changes), 0.05)
+    return wing_rock(nlctl.controllers.ConcurrentWeights(Gamma=5.0), command=command, stack=stack)
 
 
 def states_of(loop, response):
@@ -49,7 +49,7 @@ def weights_of(loop, response):
 @given(samples, st.floats(0.0, 1.0), st.integers(1, 6))
 def test_the_stack_holds_the_sums_over_the_points_that_it_took(taken, novelty, points):
     """Step by step against a list of points that is summed by NumPy."""
-    spec = nlctl.HistoryStack(nodes=3, gain=2.0, points=points, novelty=novelty)
+    spec = nlctl.controllers.HistoryStack(nodes=3, gain=2.0, points=points, novelty=novelty)
     p, x, kept = equation_arguments(spec), np.zeros(len(spec.states)), []
     for psi, derivative, u in taken:
         last = kept[-1][0] if kept else np.zeros(3)
@@ -69,7 +69,7 @@ def test_the_law_is_the_sum_over_recorded_errors(taken, W_hat, r, psi):
     points = [(psi_j, Delta) for psi_j, Delta, _ in taken]
     z = sum((psi_j * Delta for psi_j, Delta in points), np.zeros(3))
     Omega = sum((np.outer(psi_j, psi_j) for psi_j, _ in points), np.zeros((3, 3)))
-    spec = nlctl.ConcurrentWeights(nodes=3, Gamma=2.0)
+    spec = nlctl.controllers.ConcurrentWeights(nodes=3, Gamma=2.0)
     u = np.array([r, *psi, *z, *Omega.ravel()])
     by_hand = r * psi + sum(psi_j * (Delta - W_hat @ psi_j) for psi_j, Delta in points)
     found = spec.update(0.0, W_hat, u, equation_arguments(spec))
@@ -81,7 +81,9 @@ def test_the_law_is_the_sum_over_recorded_errors(taken, W_hat, r, psi):
 def test_weights_converge_with_recorded_points_and_do_not_without(command):
     """A constant command excites nothing at last: MRAC tracks with other weights than W."""
     times = np.linspace(0, 60, 601)
-    plain = wing_rock(nlctl.AdaptiveWeights(nodes=6, Gamma=5.0, sigma_1=0.0), command=command)
+    plain = wing_rock(
+        nlctl.controllers.AdaptiveWeights(nodes=6, Gamma=5.0, sigma_1=0.0), command=command
+    )
     run = nlctl.input_output_response(plain, times)
     assert np.abs(run.outputs[0][-100:]).max() < 1e-6
     assert np.abs(weights_of(plain, run)[:, -1] - W).max() > 0.5
@@ -99,7 +101,7 @@ def test_the_lyapunov_function_decays_by_the_recorded_points_too():
     E = np.array([states[f"plant.x{i}"] - states[f"model.xm{i}"] for i in (1, 2)])
     off = weights_of(loop, response) - W[:, None]
     Omega = response.outputs[2:].reshape(6, 6, -1)
-    P = nlctl.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)).lyapunov_matrix
+    P = nlctl.controllers.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)).lyapunov_matrix
     V = np.einsum("it,ij,jt->t", E, P, E) + np.sum(off**2, axis=0) / 5.0
     learning = np.einsum("it,ijt,jt->t", off, Omega, off)
     assert np.all(np.diff(V) <= 1e-9)
@@ -111,7 +113,7 @@ def test_the_lyapunov_function_decays_by_the_recorded_points_too():
 
 def test_wing_rock_without_its_nonlinear_terms_is_linear():
     """w_3 = w_4 = w_5 = 0: the matrix exponential, with the constant w_0 as a third state."""
-    plant = nlctl.block(nlctl.WingRock(w=(*W[:3], 0.0, 0.0, 0.0)), "plant")
+    plant = nlctl.block(nlctl.plants.WingRock(w=(*W[:3], 0.0, 0.0, 0.0)), "plant")
     times = np.linspace(0, 2, 21)
     response = nlctl.input_output_response(plant, times, 0.3, rtol=1e-10, atol=1e-12)
     A = np.array([[0, 1, 0], [W[1], W[2], W[0] + L * 0.3], [0, 0, 0]])
@@ -123,5 +125,5 @@ def test_wing_rock_without_its_nonlinear_terms_is_linear():
 
 def test_six_weights():
     """The form of the regressor is fixed."""
-    with pytest.raises(nlctl.ParameterError, match="WingRock needs 6 weights w, got 2"):
-        nlctl.WingRock(w=(1.0, 2.0))
+    with pytest.raises(nlctl.errors.ParameterError, match="WingRock needs 6 weights w, got 2"):
+        nlctl.plants.WingRock(w=(1.0, 2.0))

@@ -25,10 +25,10 @@ def unstable(x, v):
 def loop_of(error):
     """x' = x + u, |u| <= 10, after xm' = -xm + 5 sin(0.5 t), from x = -9.99: hardly to be held."""
     controller = nlctl.mrac(
-        nlctl.ReferenceModel(a=(1.0,), b=1.0),
+        nlctl.controllers.ReferenceModel(a=(1.0,), b=1.0),
         error=error,
-        weights=nlctl.AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
-        law=nlctl.ConstrainedLaw(u_max=10.0),
+        weights=nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
+        law=nlctl.controllers.ConstrainedLaw(u_max=10.0),
     )
     command = nlctl.SumOfSines(order=0, amplitudes=5.0, frequencies=0.5, phases=0.0)
     plant = nlctl.PureFeedback(order=1, f=unstable, initial={"x1": -9.99})
@@ -43,7 +43,9 @@ def run_of(error):
     return response, dict(zip(nlctl.state_names(loop), response.states, strict=True))
 
 
-CONSTRAINED = nlctl.ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0)  # P = 1, as theirs
+CONSTRAINED = nlctl.controllers.ConstrainedError(
+    K=(1.0,), Q=(2.0,), gamma_d=1.0
+)  # P = 1, as theirs
 
 
 @pytest.mark.slow
@@ -89,7 +91,7 @@ def test_the_lyapunov_function_falls_although_the_input_saturates():
 def test_without_the_correction_the_estimates_wind_up():
     """The same law learning from e: its gains leave for ten times their true values."""
     constrained, _ = run_of(CONSTRAINED)
-    plain, _ = run_of(nlctl.ModelError(K=(1.0,), Q=(2.0,)))
+    plain, _ = run_of(nlctl.controllers.ModelError(K=(1.0,), Q=(2.0,)))
     assert constrained.outputs[4].max() < 3.0
     assert plain.outputs[4].max() > 30.0
 
@@ -97,7 +99,7 @@ def test_without_the_correction_the_estimates_wind_up():
 @given(st.floats(-1e6, 1e6), st.floats(0.1, 100))
 def test_the_law_never_leaves_its_limits(wanted, u_max):
     """|u| <= u_max, and u - du is what the law wanted."""
-    law = nlctl.ConstrainedLaw(u_max=u_max)
+    law = nlctl.controllers.ConstrainedLaw(u_max=u_max)
     u, du = law.output(0.0, (), (-wanted,), equation_arguments(law))
     assert abs(u) <= u_max
     assert u - du == pytest.approx(wanted, rel=1e-12, abs=1e-9)
@@ -107,7 +109,7 @@ def test_the_law_never_leaves_its_limits(wanted, u_max):
 @given(st.lists(st.floats(-3, 3), min_size=4, max_size=4))
 def test_without_a_deficit_it_is_the_model_error(u):
     """du = 0 from E_d = 0: nothing moves, and a law sees what it sees of `ModelError`."""
-    spec, plain = nlctl.ConstrainedError(), nlctl.ModelError()
+    spec, plain = nlctl.controllers.ConstrainedError(), nlctl.controllers.ModelError()
     x, p = np.array([0.0, 0.0, 0.7]), equation_arguments(spec)
     np.testing.assert_array_equal(spec.update(0.0, x, np.array([*u, 0.0]), p), 0.0)
     seen = plain.output(0.0, np.empty(0), np.array(u), equation_arguments(plain))
@@ -116,5 +118,5 @@ def test_without_a_deficit_it_is_the_model_error(u):
 
 def test_gains_and_weights_of_equal_length():
     """As of `ModelError`."""
-    with pytest.raises(nlctl.ParameterError, match="ConstrainedError needs as many Q as K"):
-        nlctl.ConstrainedError(K=(1.0,))
+    with pytest.raises(nlctl.errors.ParameterError, match="ConstrainedError needs as many Q as K"):
+        nlctl.controllers.ConstrainedError(K=(1.0,))

@@ -31,7 +31,7 @@ class TestFilteredError:
     @given(st.data(), orders)
     def test_equations_14_and_18_written_out(self, data, n):
         """r = lambda_{n-1} e_1 + ... + lambda_1 e_{n-1} + e_n, and Y_d one derivative later."""
-        spec = nlctl.FilteredError(lambdas=stable_lambdas(data.draw, n))
+        spec = nlctl.controllers.FilteredError(lambdas=stable_lambdas(data.draw, n))
         x, yd = data.draw(vectors(n)), data.draw(vectors(n + 1))
         e = x - yd[:n]
         r, Y_d = e[n - 1], -yd[n]
@@ -46,7 +46,7 @@ class TestFilteredError:
     @given(st.data(), orders, st.floats(-1, 1))
     def test_the_derivative_of_r_is_xn_dot_plus_Yd(self, data, n, t):  # noqa: N802
         """(15)-(18): along any motion x_i' = x_{i+1}, by complex step through the equation."""
-        spec = nlctl.FilteredError(lambdas=stable_lambdas(data.draw, n))
+        spec = nlctl.controllers.FilteredError(lambdas=stable_lambdas(data.draw, n))
         y, yd = (Polynomial(data.draw(vectors(n + 3))) for _ in range(2))
 
         def signals(t):
@@ -70,10 +70,12 @@ class TestFilteredError:
         roots += [data.draw(parts)] if degree % 2 else []
         lambdas = np.poly(roots).real[1:]
         if max(np.real(roots)) < 0:
-            assert nlctl.FilteredError(lambdas=lambdas).lambdas == tuple(lambdas)
+            assert nlctl.controllers.FilteredError(lambdas=lambdas).lambdas == tuple(lambdas)
         else:
-            with pytest.raises(nlctl.ParameterError, match=r"^FilteredError needs a Hurwitz"):
-                nlctl.FilteredError(lambdas=lambdas)
+            with pytest.raises(
+                nlctl.errors.ParameterError, match=r"^FilteredError needs a Hurwitz"
+            ):
+                nlctl.controllers.FilteredError(lambdas=lambdas)
 
     @given(st.tuples(*[st.integers(-2, 6)] * 3))
     @settings(max_examples=300)
@@ -81,30 +83,30 @@ class TestFilteredError:
         """s^3 + a s^2 + b s + c with whole a, b, c: a > 0, c > 0, a b > c, in exact arithmetic."""
         a, b, c = lambdas
         if a > 0 and c > 0 and a * b > c:
-            nlctl.FilteredError(lambdas=lambdas)
+            nlctl.controllers.FilteredError(lambdas=lambdas)
         else:
-            with pytest.raises(nlctl.ParameterError, match="Hurwitz"):
-                nlctl.FilteredError(lambdas=lambdas)
+            with pytest.raises(nlctl.errors.ParameterError, match="Hurwitz"):
+                nlctl.controllers.FilteredError(lambdas=lambdas)
 
     @each_row("lambdas", [(0,), (0, 4), (2, 0), (1, 1, 1), (1, 2, 2), (2, 2, 2, 1)])
     def test_the_boundary_is_refused(self, lambdas):
         """Roots on the imaginary axis: e does not follow r to zero."""
-        with pytest.raises(nlctl.ParameterError, match="Hurwitz"):
-            nlctl.FilteredError(lambdas=lambdas)
+        with pytest.raises(nlctl.errors.ParameterError, match="Hurwitz"):
+            nlctl.controllers.FilteredError(lambdas=lambdas)
 
     @pytest.mark.parametrize("n", range(2, 8))
     def test_binomial_lambdas(self, n):
         """(s + 1)^(n-1) has Pascal's coefficients, and is accepted."""
         lambdas = binomial_lambdas(n)
         assert lambdas == pytest.approx([math.comb(n - 1, k) for k in range(1, n)])
-        assert nlctl.FilteredError(lambdas=lambdas).order == n
+        assert nlctl.controllers.FilteredError(lambdas=lambdas).order == n
 
 
 class TestPieces:
     @given(st.data(), st.integers(1, 6), numbers, st.floats(0.1, 9), st.floats(0, 2))
     def test_weights_25(self, data, l, r, Gamma, sigma):  # noqa: E741
         """W_hat' = Gamma (r psi - sigma_1 W_hat), W_hat^T psi, |W_hat|."""
-        spec = nlctl.AdaptiveWeights(nodes=l, Gamma=Gamma, sigma_1=sigma)
+        spec = nlctl.controllers.AdaptiveWeights(nodes=l, Gamma=Gamma, sigma_1=sigma)
         psi, W = data.draw(vectors(l)), data.draw(vectors(l))
         p, u = equation_arguments(spec), np.concatenate([[r], psi])
         law = [Gamma * (r * psi[i] - sigma * W[i]) for i in range(l)]
@@ -115,7 +117,7 @@ class TestPieces:
     @given(r=numbers, delta=numbers, gamma=st.floats(0.1, 9), tau=st.floats(0.05, 2))
     def test_robust_term_25(self, r, delta, gamma, tau):
         """delta_hat' = gamma (r tanh(r/tau) - sigma_2 delta_hat), delta_hat tanh(r/tau)."""
-        spec = nlctl.RobustTerm(gamma=gamma, tau=tau, sigma_2=0.3)
+        spec = nlctl.controllers.RobustTerm(gamma=gamma, tau=tau, sigma_2=0.3)
         p = equation_arguments(spec)
         sign = (math.exp(r / tau) - math.exp(-r / tau)) / (math.exp(r / tau) + math.exp(-r / tau))
         law = gamma * (r * sign - 0.3 * delta)
@@ -126,7 +128,7 @@ class TestPieces:
     @given(u=vectors(4), zeta=numbers, beta=st.floats(0.1, 9))
     def test_nussbaum_law_23_and_24(self, u, zeta, beta):
         """u = N(zeta) eta and zeta' = r eta, so that u r = N(zeta) zeta' identically."""
-        spec = nlctl.NussbaumLaw(beta=beta)
+        spec = nlctl.controllers.NussbaumLaw(beta=beta)
         p, eta = equation_arguments(spec), beta * u[0] + u[1] + u[2] + u[3]
         N = math.exp(zeta**2) * math.cos(math.pi * zeta / 2)
         control, state = spec.output(0.0, (zeta,), tuple(u), p)
@@ -139,21 +141,21 @@ class TestPieces:
     @given(zeta=numbers)
     def test_another_nussbaum_function(self, zeta):
         """Any function of zeta may be put in, also a plain one."""
-        spec = nlctl.NussbaumLaw(N=lambda z: z**2 * np.cos(z), beta=2.0)
+        spec = nlctl.controllers.NussbaumLaw(N=lambda z: z**2 * np.cos(z), beta=2.0)
         got = spec.output(0.0, (zeta,), (1.0, 0.5, 0.0, 0.0), equation_arguments(spec))[0]
         assert got == pytest.approx(zeta**2 * math.cos(zeta) * 2.5)
 
     def test_centres(self):
         """Diagonals, grids and Latin hypercubes lie where their names say."""
-        diagonal = np.array(nlctl.diagonal_centres(5, 3, -2, 2))
+        diagonal = np.array(nlctl.controllers.diagonal_centres(5, 3, -2, 2))
         np.testing.assert_array_equal(diagonal, np.outer([-2, -1, 0, 1, 2], np.ones(3)))
-        grid = nlctl.grid_centres([2, 3], 0, 2)
+        grid = nlctl.controllers.grid_centres([2, 3], 0, 2)
         assert grid == ((0, 0), (0, 1), (0, 2), (2, 0), (2, 1), (2, 2))
-        cube = np.array(nlctl.latin_hypercube_centres(8, 2, -4, 4, seed=3))
+        cube = np.array(nlctl.controllers.latin_hypercube_centres(8, 2, -4, 4, seed=3))
         for column in cube.T:  # one centre in each of the eight slices of every axis
             assert sorted(np.floor(column + 4)) == list(range(8))
-        assert (cube == nlctl.latin_hypercube_centres(8, 2, -4, 4, seed=3)).all()
-        assert (cube != nlctl.latin_hypercube_centres(8, 2, -4, 4, seed=4)).any()
+        assert (cube == nlctl.controllers.latin_hypercube_centres(8, 2, -4, 4, seed=3)).all()
+        assert (cube != nlctl.controllers.latin_hypercube_centres(8, 2, -4, 4, seed=4)).any()
 
 
 @st.composite
@@ -163,11 +165,11 @@ def loops(draw):
     count = draw(st.integers(1, 4))
     centres = [draw(vectors(draw(st.integers(n, n)))) for _ in range(count)]
     records = {
-        "filtered_error": nlctl.FilteredError(lambdas=stable_lambdas(draw, n)),
-        "basis": nlctl.GaussianBasis(centres=centres, widths=draw(st.floats(0.5, 3))),
-        "weights": nlctl.AdaptiveWeights(nodes=count, Gamma=draw(st.floats(0.1, 3))),
-        "robust": nlctl.RobustTerm(tau=draw(st.floats(0.1, 1))),
-        "law": nlctl.NussbaumLaw(beta=draw(st.floats(0.1, 5))),
+        "filtered_error": nlctl.controllers.FilteredError(lambdas=stable_lambdas(draw, n)),
+        "basis": nlctl.controllers.GaussianBasis(centres=centres, widths=draw(st.floats(0.5, 3))),
+        "weights": nlctl.controllers.AdaptiveWeights(nodes=count, Gamma=draw(st.floats(0.1, 3))),
+        "robust": nlctl.controllers.RobustTerm(tau=draw(st.floats(0.1, 1))),
+        "law": nlctl.controllers.NussbaumLaw(beta=draw(st.floats(0.1, 5))),
     }
     state = [*draw(vectors(count)), draw(numbers), draw(st.floats(-2, 2))]
     return n, records, np.array(state), draw(vectors(2 * n + 1))
@@ -213,8 +215,8 @@ class TestJoined:
     def test_pieces_left_out(self, inputs, zeta, delta):
         """Zero in the place of network, robust term or both: the terms of (23) disappear."""
         assume(abs(math.cos(math.pi / 2 * zeta)) > 1e-3)
-        no_network = {"weights": nlctl.Zero(outputs=("W_psi", "W_norm"))}
-        no_robust = {"robust": nlctl.Zero(outputs=("robust", "delta_hat"))}
+        no_network = {"weights": nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))}
+        no_robust = {"robust": nlctl.controllers.Zero(outputs=("robust", "delta_hat"))}
         e = inputs[:2] - inputs[2:4]
         r = 1.5 * e[0] + e[1]
         base = 2.5 * r + 1.5 * e[1] - inputs[4]
@@ -233,22 +235,32 @@ class TestJoined:
         [
             (0, {}, "order >= 1, got 0"),
             (2.0, {}, "order >= 1, got 2.0"),
-            (3, {"filtered_error": nlctl.FilteredError()}, r"order 3 needs 2 lambdas, got 1 \("),
-            (2, {"basis": nlctl.GaussianBasis(centres=np.eye(3))}, "at most 2 coordinates, got 3"),
+            (
+                3,
+                {"filtered_error": nlctl.controllers.FilteredError()},
+                r"order 3 needs 2 lambdas, got 1 \(",
+            ),
+            (
+                2,
+                {"basis": nlctl.controllers.GaussianBasis(centres=np.eye(3))},
+                "at most 2 coordinates, got 3",
+            ),
         ],
     )
     def test_orders_and_dimensions_must_fit(self, order, pieces, told):
         """The message says what is needed and what was given."""
-        with pytest.raises(nlctl.ParameterError, match=rf"adaptive_neural .*{told}"):
+        with pytest.raises(nlctl.errors.ParameterError, match=rf"adaptive_neural .*{told}"):
             nlctl.adaptive_neural(order, **pieces)
 
     def test_the_number_of_nodes_must_fit(self):
         """Weights for other nodes than the basis has: the missing signal is named."""
-        weights = nlctl.AdaptiveWeights(nodes=28)
-        with pytest.raises(nlctl.ParameterError, match="nodes=28 for 27 centres"):
+        weights = nlctl.controllers.AdaptiveWeights(nodes=28)
+        with pytest.raises(nlctl.errors.ParameterError, match="nodes=28 for 27 centres"):
             nlctl.adaptive_neural(2, weights=weights)
-        basis = nlctl.block(nlctl.GaussianBasis(), "basis")  # a system's centres are not looked at
-        with pytest.raises(nlctl.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
+        basis = nlctl.block(
+            nlctl.controllers.GaussianBasis(), "basis"
+        )  # a system's centres are not looked at
+        with pytest.raises(nlctl.errors.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
             nlctl.adaptive_neural(2, basis=basis, weights=nlctl.block(weights, "weights"))
-        with pytest.raises(nlctl.ParameterError, match="nodes=26 for 27 centres"):
-            nlctl.adaptive_neural(2, weights=nlctl.AdaptiveWeights(nodes=26))
+        with pytest.raises(nlctl.errors.ParameterError, match="nodes=26 for 27 centres"):
+            nlctl.adaptive_neural(2, weights=nlctl.controllers.AdaptiveWeights(nodes=26))

@@ -116,27 +116,27 @@ class TestDescribingFunctions:
         found, by_fft = first_harmonic(nlctl.Backlash, A, **gap)
         assert found == pytest.approx(of_play(h), abs=1e-8)
         assert by_fft == pytest.approx(of_play(h), abs=1e-6)
-        found, _ = first_harmonic(nlctl.Stop, A, r=h * A)
+        found, _ = first_harmonic(nlctl.actuators.Stop, A, r=h * A)
         assert found == pytest.approx(1 - of_play(h), abs=1e-8)
 
     @given(A=amplitudes)
     @settings(max_examples=4)
     def test_of_the_sum_of_plays(self, A):
         """It is linear in the operator."""
-        spec = nlctl.PrandtlIshlinskii()
+        spec = nlctl.actuators.PrandtlIshlinskii()
         plays = [w * of_play(r / A) for w, r in zip(spec.w, spec.r, strict=True)]
-        found, _ = first_harmonic(nlctl.PrandtlIshlinskii, A)
+        found, _ = first_harmonic(nlctl.actuators.PrandtlIshlinskii, A)
         assert found == pytest.approx(spec.w_0 + sum(plays), abs=1e-8)
 
     @given(A=amplitudes)
     @settings(max_examples=4)
     def test_of_the_inverse_of_a_sum_of_plays(self, A):
         """A sum of plays with the inverse loading curve."""
-        spec = nlctl.PrandtlIshlinskiiInverse()
+        spec = nlctl.actuators.PrandtlIshlinskiiInverse()
         r, slopes = np.array(spec.r), spec.w_0 + np.cumsum([0.0, *spec.w])
         thresholds = spec.w_0 * r + np.maximum(r[:, None] - r, 0) @ np.array(spec.w)
         plays = [of_play(each / A) for each in thresholds]
-        found, by_fft = first_harmonic(nlctl.PrandtlIshlinskiiInverse, A)
+        found, by_fft = first_harmonic(nlctl.actuators.PrandtlIshlinskiiInverse, A)
         wanted = 1 / spec.w_0 + np.diff(1 / slopes) @ plays
         assert found == pytest.approx(wanted, abs=1e-8)
         assert by_fft == pytest.approx(wanted, abs=1e-6)
@@ -145,12 +145,12 @@ class TestDescribingFunctions:
     @settings(max_examples=6)
     def test_of_a_preisach_operator(self, A):
         """The sum of its relays, whose thresholds are not symmetric."""
-        spec = nlctl.Preisach()
+        spec = nlctl.actuators.Preisach()
         relays = [
             w * of_relay_pair(on / A, off / A) / A
             for on, off, w in zip(spec.alpha, spec.beta, spec.w, strict=True)
         ]
-        found, by_fft = first_harmonic(nlctl.Preisach, A)
+        found, by_fft = first_harmonic(nlctl.actuators.Preisach, A)
         assert found == pytest.approx(sum(relays), abs=1e-6)
         assert by_fft == pytest.approx(sum(relays), abs=1e-2)
 
@@ -203,7 +203,7 @@ def test_a_relay_around_a_second_order_lag_has_the_period_of_tsypkin(omega, zeta
 def oscillator(omega, zeta, width):
     """Return the relay in feedback with the lag."""
     minus = ct.nlsys(None, lambda t, x, u, p: [-u[0]], inputs=["y"], outputs=["e"], name="minus")
-    plant = nlctl.block(nlctl.SecondOrderLag(omega=omega, zeta=zeta), "plant")
+    plant = nlctl.block(nlctl.actuators.SecondOrderLag(omega=omega, zeta=zeta), "plant")
     relay = nlctl.block(nlctl.Relay(on=width, off=-width), "relay")
     return ct.interconnect(
         [plant, relay, minus],
@@ -242,7 +242,7 @@ class TestPythonControls:
         lag = nlctl.block(nlctl.Lag(T=0.5), "lag")
         found = nlctl.describing_function(lag, A, omega)
         assert found == pytest.approx(1 / (1 + 0.5j * omega), abs=1e-6)
-        with pytest.raises(nlctl.UsageError, match="depends on the frequency"):
+        with pytest.raises(nlctl.errors.UsageError, match="depends on the frequency"):
             ct.describing_function(lag, A)
 
     @given(A=amplitudes, h=shares, omega=st.floats(0.1, 10))
@@ -290,11 +290,11 @@ class TestPythonControls:
         """Amplitudes that are not positive, and blocks with more signals."""
         limit = nlctl.block(nlctl.Saturation(), "limit")
         for wrong in (0.0, -1.0, np.nan, "2", [1.0, 0.0]):
-            with pytest.raises(nlctl.ParameterError, match="amplitudes > 0"):
+            with pytest.raises(nlctl.errors.ParameterError, match="amplitudes > 0"):
                 nlctl.describing_function(limit, wrong)
-        with pytest.raises(nlctl.ParameterError, match="one input and one output"):
+        with pytest.raises(nlctl.errors.ParameterError, match="one input and one output"):
             nlctl.describing_function(nlctl.block(nlctl.PID(), "law"), 1.0)
-        with pytest.raises(nlctl.ParameterError, match="two amplitudes > 0 or more"):
+        with pytest.raises(nlctl.errors.ParameterError, match="two amplitudes > 0 or more"):
             nlctl.limit_cycles(ct.tf([1], [1, 1]), limit, [1.0])
 
 

@@ -67,8 +67,8 @@ class TestLags:
     @settings(max_examples=10)
     def test_a_second_order_lag_is_its_transfer_function(self, k, omega, zeta):
         """k omega^2 / (s^2 + 2 zeta omega s + omega^2)."""
-        spec = nlctl.SecondOrderLag(k=k, omega=omega, zeta=zeta)
-        made = compiled(nlctl.SecondOrderLag).linearize(0, 0, params=values(spec))
+        spec = nlctl.actuators.SecondOrderLag(k=k, omega=omega, zeta=zeta)
+        made = compiled(nlctl.actuators.SecondOrderLag).linearize(0, 0, params=values(spec))
         wanted = ct.tf([k * omega**2], [1, 2 * zeta * omega, omega**2])
         s = 1j * omega * np.array([0.1, 1.0, 10.0])
         np.testing.assert_allclose(made(s), wanted(s), rtol=1e-11)
@@ -78,7 +78,7 @@ class TestLags:
     def test_a_step_overshoots_as_the_damping_ratio_says(self, zeta):
         """By exp(-pi zeta / sqrt(1 - zeta^2)) at half a period of the damped oscillation."""
         damped = np.sqrt(1 - zeta**2)
-        spec = nlctl.SecondOrderLag(omega=1.0, zeta=zeta, v0=0.0)
+        spec = nlctl.actuators.SecondOrderLag(omega=1.0, zeta=zeta, v0=0.0)
         run = drive(spec, [0, np.pi / damped], [1.0, 1.0], rtol=1e-10, atol=1e-12)
         assert run.outputs[0, -1] == pytest.approx(1 + np.exp(-np.pi * zeta / damped), abs=1e-8)
 
@@ -127,15 +127,19 @@ class TestAsymmetricSaturation:
     @given(u=st.floats(-30, 30), m_r=positive, m_l=positive, high=positive, low=positive)
     def test_the_characteristic(self, u, m_r, m_l, high, low):
         """A slope up to a limit on either side; with equal ones it is `Saturation`."""
-        spec = nlctl.AsymmetricSaturation(slope_r=m_r, slope_l=m_l, limit_r=high, limit_l=-low)
+        spec = nlctl.actuators.AsymmetricSaturation(
+            slope_r=m_r, slope_l=m_l, limit_r=high, limit_l=-low
+        )
         v = along(spec, [u, u])[0]
         assert v == (min(m_r * u, high) if u >= 0 else max(m_l * u, -low))
-        same = nlctl.AsymmetricSaturation(slope_r=1, slope_l=1, limit_r=high, limit_l=-high)
+        same = nlctl.actuators.AsymmetricSaturation(
+            slope_r=1, slope_l=1, limit_r=high, limit_l=-high
+        )
         assert along(same, [u, u])[0] == along(nlctl.Saturation(limit=high), [u, u])[0]
 
     def test_its_break_points_are_corners(self):
         """Where the slope changes, and at either limit."""
-        spec = nlctl.AsymmetricSaturation()
+        spec = nlctl.actuators.AsymmetricSaturation()
         p = equation_arguments(spec)
         for k, point in enumerate((0.0, p.limit_l / p.slope_l, p.limit_r / p.slope_r)):
             assert spec.switching(0, (), (point,), p)[k] == 0.0
@@ -147,13 +151,16 @@ class TestAsymmetricSaturation:
         (lambda: nlctl.RateLimiter(fall=0.5), "RateLimiter needs fall < 0, got 0.5"),
         (lambda: nlctl.RateLimiter(v0="x"), "RateLimiter needs a number for v0, got 'x'"),
         (lambda: nlctl.Lag(T=0.0), "Lag needs T > 0, got 0"),
-        (lambda: nlctl.SecondOrderLag(zeta=-0.1), "SecondOrderLag needs zeta >= 0, got -0.1"),
+        (
+            lambda: nlctl.actuators.SecondOrderLag(zeta=-0.1),
+            "SecondOrderLag needs zeta >= 0, got -0.1",
+        ),
         (lambda: nlctl.Quantiser(q=0.0), "Quantiser needs q > 0, got 0"),
         (lambda: nlctl.Quantiser(riser=1.0), "Quantiser needs riser to be True or False"),
-        (lambda: nlctl.AsymmetricSaturation(limit_l=1.0), "needs limit_l < 0, got 1"),
+        (lambda: nlctl.actuators.AsymmetricSaturation(limit_l=1.0), "needs limit_l < 0, got 1"),
     ],
 )
 def test_what_is_out_of_bounds_is_refused(make, told):
     """With record, rule and value."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()

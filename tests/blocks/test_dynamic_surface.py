@@ -10,7 +10,7 @@ import nlctl
 from nlctl.params import equation_arguments
 
 numbers, positive = st.floats(-5, 5), st.floats(0.1, 10)
-NO_NETWORK = {"weights": nlctl.Zero(outputs=("W_psi", "W_norm"))}
+NO_NETWORK = {"weights": nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))}
 
 
 @nlctl.equation
@@ -41,7 +41,7 @@ def loop_of(controller, f, **initial):
 def test_three_surfaces_by_hand(values, c, tau):
     """s_1, alpha_1, a_2', s_2, alpha_2, a_3', s_3, one after the other."""
     x1, x2, x3, a2, a3, yd, yd1 = values
-    spec = nlctl.DynamicSurface(c=tuple(c), tau=tuple(tau))
+    spec = nlctl.controllers.DynamicSurface(c=tuple(c), tau=tuple(tau))
     x, u, p = np.array([a2, a3]), np.array([x1, x2, x3, yd, yd1]), equation_arguments(spec)
     alpha_1 = -c[0] * (x1 - yd) + yd1
     rate_2 = (alpha_1 - a2) / tau[0]
@@ -56,7 +56,7 @@ def test_three_surfaces_by_hand(values, c, tau):
 @each_row("tau", [0.1, 0.02])
 def test_the_price_of_the_filter_is_its_time_constant(tau):
     """tau e'' + e' + c_1 e = -tau yd'': of a sine, a tau w^2 / |c_1 - tau w^2 + j w| at last."""
-    surface = nlctl.DynamicSurface(c=(2.0, 4.0), tau=(tau,))
+    surface = nlctl.controllers.DynamicSurface(c=(2.0, 4.0), tau=(tau,))
     controller = nlctl.dynamic_surface_control(surface, **NO_NETWORK)
     times = np.linspace(0, 30, 6001)
     response = nlctl.input_output_response(
@@ -70,9 +70,9 @@ def test_the_lyapunov_function_of_the_network_falls_by_the_last_surface():
     """V = s_n^2 + |W_hat - W|^2 / Gamma has V' = -2 c_n s_n^2, whatever the filters do."""
     Gamma, W = 4.0, np.array([0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214])
     controller = nlctl.dynamic_surface_control(
-        basis=nlctl.WingRockRegressor(),
-        weights=nlctl.AdaptiveWeights(nodes=6, Gamma=Gamma, sigma_1=0.0),
-        law=nlctl.ModelReferenceLaw(gain=3.0),
+        basis=nlctl.controllers.WingRockRegressor(),
+        weights=nlctl.controllers.AdaptiveWeights(nodes=6, Gamma=Gamma, sigma_1=0.0),
+        law=nlctl.controllers.ModelReferenceLaw(gain=3.0),
     )
     loop, times = loop_of(controller, wing, x1=1.2, x2=1.0), np.linspace(0, 20, 20_001)
     response = nlctl.input_output_response(loop, times, rtol=1e-10, atol=1e-12)
@@ -87,10 +87,12 @@ def test_the_lyapunov_function_of_the_network_falls_by_the_last_surface():
 def test_the_network_pays_behind_the_dead_zone_of_example_1():
     """The paper's plant and actuator, unknown to both: half the error, or less."""
     times, late = np.linspace(0, 30, 3001), {}
-    grid = nlctl.GaussianBasis(centres=nlctl.grid_centres([7, 7], -3, 3), widths=(1.0,))
-    learning = nlctl.AdaptiveWeights(nodes=49, Gamma=20.0, sigma_1=0.01)
+    grid = nlctl.controllers.GaussianBasis(
+        centres=nlctl.controllers.grid_centres([7, 7], -3, 3), widths=(1.0,)
+    )
+    learning = nlctl.controllers.AdaptiveWeights(nodes=49, Gamma=20.0, sigma_1=0.01)
     for label, weights in (("with", learning), ("without", NO_NETWORK["weights"])):
-        surface = nlctl.DynamicSurface(c=(2.0, 4.0), tau=(0.02,))
+        surface = nlctl.controllers.DynamicSurface(c=(2.0, 4.0), tau=(0.02,))
         controller = nlctl.dynamic_surface_control(surface, basis=grid, weights=weights)
         loop = nlctl.paper.example_1(controller=controller)
         response = nlctl.input_output_response(loop, times)
@@ -100,7 +102,7 @@ def test_the_network_pays_behind_the_dead_zone_of_example_1():
 
 def test_a_filter_that_starts_from_0_costs_a_large_input_at_first():
     """Example 1 at t = 0: u is alpha_1 / tau, or c_2 alpha_1 from a_2 = alpha_1."""
-    surface = nlctl.DynamicSurface(c=(5.0, 10.0), tau=(0.02,))
+    surface = nlctl.controllers.DynamicSurface(c=(5.0, 10.0), tau=(0.02,))
     alpha_1 = -5.0 * 0.5 + 0.75
     spec, u = equation_arguments(surface), np.array([0.5, 0.0, 0.0, 0.75])
     wanted = [sum(surface.output(0.0, np.array([a]), u, spec)[2:]) for a in (0.0, alpha_1)]
@@ -110,15 +112,20 @@ def test_a_filter_that_starts_from_0_costs_a_large_input_at_first():
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.DynamicSurface(tau=(0.1, 0.1)), "one tau less than c.* got 2 of tau and 2"),
-        (lambda: nlctl.DynamicSurface(c=(1.0,)), "got 1 of tau and 1 of c"),
         (
-            lambda: nlctl.dynamic_surface_control(weights=nlctl.AdaptiveWeights(nodes=4)),
+            lambda: nlctl.controllers.DynamicSurface(tau=(0.1, 0.1)),
+            "one tau less than c.* got 2 of tau and 2",
+        ),
+        (lambda: nlctl.controllers.DynamicSurface(c=(1.0,)), "got 1 of tau and 1 of c"),
+        (
+            lambda: nlctl.dynamic_surface_control(
+                weights=nlctl.controllers.AdaptiveWeights(nodes=4)
+            ),
             "got nodes=4 for 27",
         ),
     ],
 )
 def test_pieces_of_dynamic_surface_control_that_do_not_fit_are_refused(make, told):
     """The culprit, the rule and the values."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()

@@ -13,7 +13,7 @@ def seeking_of(performance, **fields):
     block = ct.nlsys(
         None, lambda t, x, u, params: performance(u[0]), inputs=["theta"], outputs=["y"], name="map"
     )
-    parts = {"map": block, "seeking": nlctl.ExtremumSeeking(**fields)}
+    parts = {"map": block, "seeking": nlctl.controllers.ExtremumSeeking(**fields)}
     return nlctl.interconnect(parts, outputs=["theta", "y"])
 
 

@@ -66,7 +66,7 @@ class TestDahl:
     @settings(max_examples=20)
     def test_along_a_path_the_force_is_made_of_exponentials(self, moves, sigma_0, F_c):
         """F -> +-F_c with the length F_c / sigma_0."""
-        spec = nlctl.Dahl(sigma_0=sigma_0, F_c=F_c)
+        spec = nlctl.actuators.Dahl(sigma_0=sigma_0, F_c=F_c)
         found = travel(spec, moves)[1:]
         np.testing.assert_allclose(found, list(dahl_along(spec, 0.0, moves)), atol=1e-8)
         assert np.all(np.abs(found) <= F_c * (1 + 1e-9))
@@ -75,13 +75,13 @@ class TestDahl:
     @settings(max_examples=10)
     def test_it_is_rate_independent(self, moves, data):
         """The same moves at other speeds."""
-        spec = nlctl.Dahl(sigma_0=2.0)
+        spec = nlctl.actuators.Dahl(sigma_0=2.0)
         times = data.draw(st.lists(st.floats(0.1, 10), min_size=len(moves), max_size=len(moves)))
         np.testing.assert_allclose(travel(spec, moves, times), travel(spec, moves), atol=1e-8)
 
     def test_stiffness_before_sliding(self):
         """d force / d position = sigma_0 at force 0."""
-        spec = nlctl.Dahl()
+        spec = nlctl.actuators.Dahl()
         forces = travel(spec, [1e-9, -2e-9])
         np.testing.assert_allclose(np.diff(forces) / [1e-9, -2e-9], spec.sigma_0, rtol=3e-4)
 
@@ -94,7 +94,7 @@ class TestBoucWen:
     def test_along_a_path_it_is_made_of_exponentials(self, moves, gamma, delta, beta, alpha):
         """nu = 1: on either side of z = 0 one exponential of the position."""
         delta = round(delta * gamma, 6)
-        spec = nlctl.BoucWen(alpha=alpha, beta=beta, gamma=gamma, delta=delta)
+        spec = nlctl.actuators.BoucWen(alpha=alpha, beta=beta, gamma=gamma, delta=delta)
         found = travel(spec, moves)[1:]
         exact = list(bouc_wen_along(spec, 0.0, moves))
         np.testing.assert_allclose(found, exact, atol=1e-7 * (1 + max(map(abs, exact))))
@@ -104,7 +104,7 @@ class TestBoucWen:
     @settings(max_examples=20)
     def test_z_stays_below_its_bound(self, moves, gamma, share, nu):
         """From within it, for every exponent, and it is attained by a long move."""
-        spec = nlctl.BoucWen(alpha=2, beta=1, gamma=gamma, delta=share * gamma, nu=nu)
+        spec = nlctl.actuators.BoucWen(alpha=2, beta=1, gamma=gamma, delta=share * gamma, nu=nu)
         start = [0.999 * spec.z_max]
         assert np.all(np.abs(travel(spec, moves, start=start)) <= spec.z_max * (1 + 1e-7))
         slope = 2 * nu / spec.z_max  # at which z tends to its bound, per position
@@ -112,7 +112,7 @@ class TestBoucWen:
 
     def test_the_values_of_the_benchmark_have_no_bound(self):
         """gamma + delta < 0: dz/dy = alpha + 300 z, an exponential that grows."""
-        spec = nlctl.BoucWen()
+        spec = nlctl.actuators.BoucWen()
         assert spec.z_max == np.inf
         y = 0.01
         exact = spec.alpha / 300 * np.expm1(300 * y)
@@ -120,8 +120,8 @@ class TestBoucWen:
 
 
 OF_THE_PATH = {
-    "Dahl": nlctl.Dahl(sigma_0=2.0),
-    "Bouc-Wen": nlctl.BoucWen(alpha=2.0, beta=1.0, gamma=0.8, delta=0.3, nu=1.7),
+    "Dahl": nlctl.actuators.Dahl(sigma_0=2.0),
+    "Bouc-Wen": nlctl.actuators.BoucWen(alpha=2.0, beta=1.0, gamma=0.8, delta=0.3, nu=1.7),
 }
 
 
@@ -181,7 +181,7 @@ def pushed(spring):
         outputs=["position", "velocity"], name="mass", params={"k": spring},
     )  # fmt: skip
     loop = nlctl.interconnect(
-        [mass, nlctl.block(nlctl.LuGre(), "friction")],
+        [mass, nlctl.block(nlctl.actuators.LuGre(), "friction")],
         inputs=["pull"], outputs=["position", "velocity", "force"], name="mass_on_friction",
     )  # fmt: skip
     return nlctl.compile(loop)
@@ -212,18 +212,22 @@ class TestLuGre:
     @settings(max_examples=10)
     def test_at_a_constant_velocity_it_becomes_stribecks_curve(self, v, sign):
         """Section III: F = g(v) sign(v) + sigma_2 v, with the transient in closed form."""
-        spec, v = nlctl.LuGre(), sign * v
+        spec, v = nlctl.actuators.LuGre(), sign * v
         g = 1.0 + 0.5 * np.exp(-((v / 1e-3) ** 2))
         time = 40 * g / (1e5 * abs(v))
         run = drive(spec, [0, time / 40, time], [v, v, v], rtol=1e-10, atol=1e-14)
-        steady = nlctl.Stribeck().output(0, (), (v,), equation_arguments(nlctl.Stribeck()))[0]
+        steady = nlctl.actuators.Stribeck().output(
+            0, (), (v,), equation_arguments(nlctl.actuators.Stribeck())
+        )[0]
         assert steady == pytest.approx(g * np.sign(v) + 0.4 * v, rel=1e-13)
         assert run.outputs[0, -1] == pytest.approx(steady, rel=1e-7)
         assert run.states[0, 1] == pytest.approx(sign * g / 1e5 * (1 - np.exp(-1)), rel=1e-7)
 
     def test_before_sliding_it_is_a_spring_with_a_damper(self):
         """Linearised at rest: d force / dz = sigma_0, d force / d velocity = sigma_1 + sigma_2."""
-        at_rest = compiled(nlctl.LuGre).linearize(0, 0, params=values(nlctl.LuGre()))
+        at_rest = compiled(nlctl.actuators.LuGre).linearize(
+            0, 0, params=values(nlctl.actuators.LuGre())
+        )
         np.testing.assert_allclose(at_rest.A, 0, atol=0)
         np.testing.assert_allclose(at_rest.B, 1)
         np.testing.assert_allclose(at_rest.C, 1e5)
@@ -264,7 +268,7 @@ class TestLuGre:
         for omega in (1.0, 10.0, 25.0):
             times = np.linspace(0, 6 * np.pi / omega, 1201)
             v = 1.1e-3 * (1 - np.cos(omega * times)) + 1e-4
-            force = drive(nlctl.LuGre(), times, v, rtol=1e-9, atol=1e-14).outputs[0]
+            force = drive(nlctl.actuators.LuGre(), times, v, rtol=1e-9, atol=1e-14).outputs[0]
             rising = np.interp(1e-3, v[800:1001], force[800:1001])
             falling = np.interp(1e-3, v[1000:][::-1], force[1000:][::-1])
             widths.append(rising - falling)
@@ -292,7 +296,7 @@ class TestLuGre:
         """The work of the force is at least what the bristles store, sigma_0 z^2 / 2."""
         times = np.linspace(0, 4, 4001)
         v = 2e-3 * np.sin(7 * times) + 1e-3 * np.sin(31 * times)
-        run = drive(nlctl.LuGre(), times, v, rtol=1e-9, atol=1e-14)
+        run = drive(nlctl.actuators.LuGre(), times, v, rtol=1e-9, atol=1e-14)
         power = run.outputs[0] * v
         work = np.append(0, np.cumsum((power[1:] + power[:-1]) / 2) * times[1])
         assert np.all(work - 1e5 * run.states[0] ** 2 / 2 > -1e-9)
@@ -309,7 +313,7 @@ def on_a_belt():
         None, lambda t, x, u, p: [2.0 * (u[0] - u[1])], inputs=["pull", "position"],
         outputs=["applied"], name="spring",
     )  # fmt: skip
-    blocks = [mass, spring, nlctl.block(nlctl.StickSlip(sigma_2=0.0), "friction")]
+    blocks = [mass, spring, nlctl.block(nlctl.actuators.StickSlip(sigma_2=0.0), "friction")]
     outputs = ["position", "velocity", "applied", "force"]
     return nlctl.compile(nlctl.interconnect(blocks, inputs=["pull"], outputs=outputs, name="belt"))
 
@@ -389,7 +393,10 @@ class TestStickSlip:
     )
     def test_machine_code_equals_python_control(self, v, push, mode):
         """At rest, at the limit of static friction, and between the modes."""
-        block, made = nlctl.block(nlctl.StickSlip(), "b"), compiled(nlctl.StickSlip)
+        block, made = (
+            nlctl.block(nlctl.actuators.StickSlip(), "b"),
+            compiled(nlctl.actuators.StickSlip),
+        )
         for name in ("dynamics", "output"):
             expected = getattr(block, name)(0.0, [mode], [v, push])
             np.testing.assert_array_equal(getattr(made, name)(0.0, [mode], [v, push]), expected)
@@ -402,7 +409,7 @@ def free_mass():
         lambda t, x, u, p: [x[1], u[0] - u[1]], lambda t, x, u, p: x, states=2,
         inputs=["applied", "force"], outputs=["position", "velocity"], name="mass",
     )  # fmt: skip
-    blocks = [mass, nlctl.block(nlctl.StickSlip(sigma_2=0.0), "friction")]
+    blocks = [mass, nlctl.block(nlctl.actuators.StickSlip(sigma_2=0.0), "friction")]
     outputs = ["position", "velocity", "force"]
     return nlctl.compile(
         nlctl.interconnect(blocks, inputs=["applied"], outputs=outputs, name="pushed")
@@ -413,8 +420,8 @@ def free_mass():
 def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
     """With F_s = F_c; both are odd, and oppose the motion."""
     coulomb, stribeck = (
-        nlctl.Coulomb(F_c=F_c, sigma_2=sigma_2),
-        nlctl.Stribeck(F_c=F_c, F_s=F_c, sigma_2=sigma_2),
+        nlctl.actuators.Coulomb(F_c=F_c, sigma_2=sigma_2),
+        nlctl.actuators.Stribeck(F_c=F_c, F_s=F_c, sigma_2=sigma_2),
     )
     one, other = (s.output(0, (), (v,), equation_arguments(s))[0] for s in (coulomb, stribeck))
     assert one == pytest.approx(other, rel=1e-14)
@@ -423,7 +430,14 @@ def test_stribecks_curve_between_its_levels_is_coulombs(v, F_c, sigma_2):
 
 
 @pytest.mark.parametrize(
-    "kind", [nlctl.Coulomb, nlctl.Stribeck, nlctl.Dahl, nlctl.LuGre, nlctl.BoucWen]
+    "kind",
+    [
+        nlctl.actuators.Coulomb,
+        nlctl.actuators.Stribeck,
+        nlctl.actuators.Dahl,
+        nlctl.actuators.LuGre,
+        nlctl.actuators.BoucWen,
+    ],
 )
 @given(v=st.floats(-2, 2), x=st.floats(-1, 1))
 @settings(max_examples=20)
@@ -442,15 +456,15 @@ def test_machine_code_equals_python_control(kind, v, x):
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.LuGre(F_s=0.5), "LuGre needs F_c <= F_s, got 1 and 0.5"),
-        (lambda: nlctl.Stribeck(F_c=2.0), "Stribeck needs F_c <= F_s, got 2 and 1.5"),
-        (lambda: nlctl.StickSlip(F_s=0.5), "StickSlip needs F_c <= F_s, got 1 and 0.5"),
-        (lambda: nlctl.StickSlip(v0=0.5), "StickSlip needs v0 to be 0, 1 or -1, got 0.5"),
-        (lambda: nlctl.Dahl(F_c=0.0), "Dahl needs F_c > 0, got 0"),
-        (lambda: nlctl.BoucWen(nu=0.5), "BoucWen needs nu >= 1, got 0.5"),
+        (lambda: nlctl.actuators.LuGre(F_s=0.5), "LuGre needs F_c <= F_s, got 1 and 0.5"),
+        (lambda: nlctl.actuators.Stribeck(F_c=2.0), "Stribeck needs F_c <= F_s, got 2 and 1.5"),
+        (lambda: nlctl.actuators.StickSlip(F_s=0.5), "StickSlip needs F_c <= F_s, got 1 and 0.5"),
+        (lambda: nlctl.actuators.StickSlip(v0=0.5), "StickSlip needs v0 to be 0, 1 or -1, got 0.5"),
+        (lambda: nlctl.actuators.Dahl(F_c=0.0), "Dahl needs F_c > 0, got 0"),
+        (lambda: nlctl.actuators.BoucWen(nu=0.5), "BoucWen needs nu >= 1, got 0.5"),
     ],
 )
 def test_what_is_no_friction_is_refused(make, told):
     """With record, rule and value."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()

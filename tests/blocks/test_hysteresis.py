@@ -30,7 +30,7 @@ def backlashes(draw):
 
 @st.composite
 def stops(draw):
-    return nlctl.Stop(r=draw(positive), v0=draw(inputs))
+    return nlctl.actuators.Stop(r=draw(positive), v0=draw(inputs))
 
 
 @st.composite
@@ -38,14 +38,16 @@ def sums_of_plays(draw):
     r = np.cumsum(draw(st.lists(positive, min_size=4, max_size=4)))
     w = draw(st.lists(positive, min_size=4, max_size=4))
     v0 = draw(st.lists(inputs, min_size=4, max_size=4))
-    return nlctl.PrandtlIshlinskii(w_0=draw(positive), w=w, r=r, v0=tuple(v0))
+    return nlctl.actuators.PrandtlIshlinskii(w_0=draw(positive), w=w, r=r, v0=tuple(v0))
 
 
 @st.composite
 def inverses(draw):
     r = np.cumsum(draw(st.lists(positive, min_size=4, max_size=4)))
     w = draw(st.lists(positive, min_size=4, max_size=4))
-    return nlctl.PrandtlIshlinskiiInverse(w_0=1 + draw(positive), w=w, r=r, v0=draw(inputs))
+    return nlctl.actuators.PrandtlIshlinskiiInverse(
+        w_0=1 + draw(positive), w=w, r=r, v0=draw(inputs)
+    )
 
 
 @st.composite
@@ -55,7 +57,7 @@ def generalised_sums(draw):
     r = np.cumsum([draw(st.sampled_from((0.0, 0.3))), *draw(st.tuples(*[positive] * 3))])
     w = draw(st.lists(positive, min_size=4, max_size=4))
     v0 = draw(st.lists(inputs, min_size=4, max_size=4))
-    return nlctl.GeneralisedPrandtlIshlinskii(
+    return nlctl.actuators.GeneralisedPrandtlIshlinskii(
         rising=draw(envelope), falling=draw(envelope), w=w, r=r, v0=tuple(v0)
     )
 
@@ -70,7 +72,7 @@ def relays(draw):
 def relay_sums(draw):
     w = draw(st.lists(positive, min_size=10, max_size=10))
     sides = draw(st.lists(signs, min_size=10, max_size=10))
-    return nlctl.Preisach(w=w, v0=tuple(sides))
+    return nlctl.actuators.Preisach(w=w, v0=tuple(sides))
 
 
 EVERY = {
@@ -114,17 +116,17 @@ def operator(spec, path):
         if isinstance(spec, nlctl.Backlash):
             memory = spec.m_r * by_clipping(u, memory / spec.m_r, spec.c_l, spec.c_r)
             out.append(memory[0])
-        elif isinstance(spec, nlctl.Stop):
+        elif isinstance(spec, nlctl.actuators.Stop):
             memory = by_clipping(u, memory, -spec.r, spec.r)
             out.append(u - memory[0])
-        elif isinstance(spec, nlctl.PrandtlIshlinskii):
+        elif isinstance(spec, nlctl.actuators.PrandtlIshlinskii):
             memory = by_clipping(u, memory, -np.array(spec.r), np.array(spec.r))
             out.append(spec.w_0 * u + np.dot(spec.w, memory))
-        elif isinstance(spec, nlctl.PrandtlIshlinskiiInverse):
+        elif isinstance(spec, nlctl.actuators.PrandtlIshlinskiiInverse):
             first, w, r = of_the_inverse(spec)
             memory = by_clipping(u, memory, -r, r)
             out.append(first * u + np.dot(w, memory))
-        elif isinstance(spec, nlctl.GeneralisedPrandtlIshlinskii):
+        elif isinstance(spec, nlctl.actuators.GeneralisedPrandtlIshlinskii):
             memory = by_envelopes(u, memory, spec)
             out.append(np.dot(spec.w, memory))
         elif isinstance(spec, nlctl.Relay):
@@ -317,7 +319,10 @@ grid_paths = st.lists(on_the_grid, min_size=2, max_size=8)
 def test_loop_areas_of_play_and_stop(A, r):
     """A cycle of amplitude A encloses 4 r (A - r), and nothing where A <= r."""
     cycle = every_quarter([-A, A, -A])
-    for spec, sense in ((nlctl.Backlash(m_r=1, m_l=1, c_r=r, c_l=-r), -1), (nlctl.Stop(r=r), 1)):
+    for spec, sense in (
+        (nlctl.Backlash(m_r=1, m_l=1, c_r=r, c_l=-r), -1),
+        (nlctl.actuators.Stop(r=r), 1),
+    ):
         v = along(spec, [A, *cycle])[1:]
         assert integral(v, cycle) == pytest.approx(sense * 4 * r * max(A - r, 0.0), abs=1e-12)
 
@@ -325,7 +330,10 @@ def test_loop_areas_of_play_and_stop(A, r):
 @given(A=quarters, w=st.lists(positive, min_size=4, max_size=4))
 def test_the_loop_area_of_a_sum_of_plays_is_the_sum_of_theirs(A, w):
     """Of each 4 r (A - r), by its weight."""
-    spec, r = nlctl.PrandtlIshlinskii(w=w, r=(0.25, 0.5, 1.0, 1.5)), np.array((0.25, 0.5, 1.0, 1.5))
+    spec, r = (
+        nlctl.actuators.PrandtlIshlinskii(w=w, r=(0.25, 0.5, 1.0, 1.5)),
+        np.array((0.25, 0.5, 1.0, 1.5)),
+    )
     cycle = every_quarter([-A, A, -A])
     v = along(spec, [A, *cycle])[1:]
     wanted = -4 * np.dot(w, r * np.maximum(A - r, 0))
@@ -335,7 +343,7 @@ def test_the_loop_area_of_a_sum_of_plays_is_the_sum_of_theirs(A, w):
 @given(A=st.floats(0.1, 3), w=st.lists(positive, min_size=10, max_size=10))
 def test_the_loop_area_of_a_preisach_operator_is_that_of_the_relays_it_switches(A, w):
     """Of each relay that both ends pass 2 w (alpha - beta): exactly, between its thresholds."""
-    spec = nlctl.Preisach(w=w)
+    spec = nlctl.actuators.Preisach(w=w)
     alpha, beta = np.array(spec.alpha), np.array(spec.beta)
     near = np.add.outer([-1e-9, 0.0, 1e-9], [*alpha, *beta]).ravel()
     up = np.unique([-A, *near[np.abs(near) < A], A])
@@ -362,7 +370,7 @@ def test_loop_area_of_a_relay(A, height):
 @given(path=grid_paths, r=quarters)
 def test_the_stop_stores_v_squared_over_two_and_burns_the_rest(path, r):
     """Its work, the integral of v du, is the change of v^2 / 2 and r times the play's way."""
-    spec, u = nlctl.Stop(r=r), every_quarter(path)
+    spec, u = nlctl.actuators.Stop(r=r), every_quarter(path)
     v = along(spec, u)
     way = np.abs(np.diff(u - v)).sum()
     assert integral(v, u) == pytest.approx((v[-1] ** 2 - v[0] ** 2) / 2 + r * way, abs=1e-12)
@@ -371,7 +379,7 @@ def test_the_stop_stores_v_squared_over_two_and_burns_the_rest(path, r):
 @given(path=grid_paths)
 def test_plays_burn_their_thresholds_times_their_ways(path):
     """The integral of u dv is the change of what is stored, and sum w_i r_i |dH_i| >= 0."""
-    spec = nlctl.PrandtlIshlinskii(r=(0.25, 0.5, 1.0, 1.5))
+    spec = nlctl.actuators.PrandtlIshlinskii(r=(0.25, 0.5, 1.0, 1.5))
     u = every_quarter(path)
     run = drive(spec, np.arange(float(u.size)), u)
     H, v, w, r = run.states, run.outputs[0], np.array(spec.w), np.array(spec.r)
@@ -383,11 +391,11 @@ def test_plays_burn_their_thresholds_times_their_ways(path):
 def test_a_preisach_operator_of_one_level_pair_is_a_relay():
     """With one relay, and as the sum of its relays with several."""
     path = np.random.default_rng(4).normal(size=60)
-    one = nlctl.Preisach(alpha=(0.5,), beta=(-0.25,), w=(2.0,))
+    one = nlctl.actuators.Preisach(alpha=(0.5,), beta=(-0.25,), w=(2.0,))
     np.testing.assert_array_equal(
         operator(one, path), operator(nlctl.Relay(on=0.5, off=-0.25, height=2.0), path)
     )
-    many = nlctl.Preisach(w=np.arange(1.0, 11.0))
+    many = nlctl.actuators.Preisach(w=np.arange(1.0, 11.0))
     parts = [
         along(nlctl.Relay(on=on, off=off, height=w), path)
         for on, off, w in zip(many.alpha, many.beta, many.w, strict=True)
@@ -398,18 +406,18 @@ def test_a_preisach_operator_of_one_level_pair_is_a_relay():
 def test_a_sum_of_plays_is_the_sum_of_plays():
     """With as many backlashes; one play and one stop add up to the input."""
     path = np.random.default_rng(5).normal(size=60)
-    spec = nlctl.PrandtlIshlinskii()
+    spec = nlctl.actuators.PrandtlIshlinskii()
     plays = [nlctl.Backlash(m_r=1, m_l=1, c_r=r, c_l=-r) for r in spec.r]
     parts = [w * along(play, path) for w, play in zip(spec.w, plays, strict=True)]
     np.testing.assert_allclose(along(spec, path), spec.w_0 * path + sum(parts), atol=1e-13)
-    stop = along(nlctl.Stop(r=spec.r[0]), path)
+    stop = along(nlctl.actuators.Stop(r=spec.r[0]), path)
     np.testing.assert_allclose(stop + along(plays[0], path), path, atol=1e-13)
 
 
 def three_plays(path):
     """Return the outputs of three plays and the input itself, at turning points."""
-    spec = nlctl.PrandtlIshlinskii(w_0=0.5, w=(0.2, 0.2, 0.1), r=(0.2, 0.4, 0.6))
-    made = compiled(nlctl.PrandtlIshlinskii, (("w", spec.w), ("r", spec.r)))
+    spec = nlctl.actuators.PrandtlIshlinskii(w_0=0.5, w=(0.2, 0.2, 0.1), r=(0.2, 0.4, 0.6))
+    made = compiled(nlctl.actuators.PrandtlIshlinskii, (("w", spec.w), ("r", spec.r)))
     path = np.asarray(path, dtype=float)
     times = np.arange(float(path.size))
     return nlctl.input_output_response(made, times, path, params=values(spec)).outputs
@@ -423,7 +431,7 @@ class TestGeneralisedPlays:
     def test_with_equal_envelopes_it_is_a_sum_of_plays_behind_a_characteristic(self, path):
         """A play of half gap 0 is that characteristic itself."""
         envelope = (2.0, 0.5, 0.3, -0.1)
-        made = nlctl.GeneralisedPrandtlIshlinskii(rising=envelope, falling=envelope)
+        made = nlctl.actuators.GeneralisedPrandtlIshlinskii(rising=envelope, falling=envelope)
         gamma = 2.0 * np.tanh(0.5 * np.array(path) + 0.3) - 0.1
         np.testing.assert_allclose(along(made, path), three_plays(gamma), atol=1e-13)
 
@@ -433,7 +441,7 @@ class TestGeneralisedPlays:
         wanted, apart = three_plays(path), []
         for s in (0.04, 0.02, 0.01):
             straight = (1 / s, s, 0.0, 0.0)
-            made = nlctl.GeneralisedPrandtlIshlinskii(rising=straight, falling=straight)
+            made = nlctl.actuators.GeneralisedPrandtlIshlinskii(rising=straight, falling=straight)
             apart.append(np.abs(along(made, path) - wanted).max())
         np.testing.assert_allclose(np.log2(apart[:-1]) - np.log2(apart[1:]), 2.0, atol=0.05)
 
@@ -441,7 +449,7 @@ class TestGeneralisedPlays:
     @settings(max_examples=20)
     def test_the_area_between_saturations_that_are_apart_by_2_c(self, c, height):
         """The integral of h (tanh(u + c) - tanh(u - c)) over all u is 4 c h."""
-        one = compiled(nlctl.GeneralisedPrandtlIshlinskii, (("w", (1.0,)), ("r", (0.0,))))
+        one = compiled(nlctl.actuators.GeneralisedPrandtlIshlinskii, (("w", (1.0,)), ("r", (0.0,))))
         ends = {"rising": (height, 1.0, -c, 0.0), "falling": (height, 1.0, c, 0.0)}
         params = {f"actuator.{name}": envelope for name, envelope in ends.items()}
         u = dense([20.0, -20.0, 20.0], 4000)
@@ -455,12 +463,12 @@ def test_in_python_control_the_memories_are_committed(kind):
     """By the reference engine: the operator itself, with corners of u between samples."""
     spec = {
         "play": nlctl.Backlash(),
-        "stop": nlctl.Stop(),
-        "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii(),
-        "its inverse": nlctl.PrandtlIshlinskiiInverse(),
-        "generalised": nlctl.GeneralisedPrandtlIshlinskii(),
+        "stop": nlctl.actuators.Stop(),
+        "Prandtl-Ishlinskii": nlctl.actuators.PrandtlIshlinskii(),
+        "its inverse": nlctl.actuators.PrandtlIshlinskiiInverse(),
+        "generalised": nlctl.actuators.GeneralisedPrandtlIshlinskii(),
         "relay": nlctl.Relay(),
-        "Preisach": nlctl.Preisach(),
+        "Preisach": nlctl.actuators.Preisach(),
     }[kind]
     times = np.linspace(0, 7, 36)  # u(6.4) is 1e-2 beside the threshold -0.5 of a relay
     u = np.interp(times, [0, 2, 3, 5, 7], [-1.3, 1.2, 0.37, 1.6, -1.4 - 1e-2 / 0.7])
@@ -472,32 +480,50 @@ def test_in_python_control_the_memories_are_committed(kind):
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.Stop(r=0.0), "Stop needs r > 0, got 0"),
-        (lambda: nlctl.Stop(v0=np.nan), "Stop needs a finite v0, got nan"),
-        (lambda: nlctl.PrandtlIshlinskii(r=(0.2, 0.1, 0.3, 0.4)), "increasing thresholds r"),
-        (lambda: nlctl.PrandtlIshlinskii(r=(0.2, 0.3)), "got 4 weights w and 2 thresholds r"),
-        (lambda: nlctl.PrandtlIshlinskii(w=(-0.3, -0.4, 0, 0)), r"w_0 \+ w\[0\] .* > 0"),
-        (lambda: nlctl.PrandtlIshlinskii(v0=(0.0, 1.0)), "needs v0 to be one number or 4, got 2"),
+        (lambda: nlctl.actuators.Stop(r=0.0), "Stop needs r > 0, got 0"),
+        (lambda: nlctl.actuators.Stop(v0=np.nan), "Stop needs a finite v0, got nan"),
         (
-            lambda: nlctl.GeneralisedPrandtlIshlinskii(rising=(1.0, -1.0, 0.0, 0.0)),
+            lambda: nlctl.actuators.PrandtlIshlinskii(r=(0.2, 0.1, 0.3, 0.4)),
+            "increasing thresholds r",
+        ),
+        (
+            lambda: nlctl.actuators.PrandtlIshlinskii(r=(0.2, 0.3)),
+            "got 4 weights w and 2 thresholds r",
+        ),
+        (lambda: nlctl.actuators.PrandtlIshlinskii(w=(-0.3, -0.4, 0, 0)), r"w_0 \+ w\[0\] .* > 0"),
+        (
+            lambda: nlctl.actuators.PrandtlIshlinskii(v0=(0.0, 1.0)),
+            "needs v0 to be one number or 4, got 2",
+        ),
+        (
+            lambda: nlctl.actuators.GeneralisedPrandtlIshlinskii(rising=(1.0, -1.0, 0.0, 0.0)),
             "needs rising = .* a_1 > 0, so that the envelope increases, got",
         ),
         (
-            lambda: nlctl.GeneralisedPrandtlIshlinskii(falling=(1.0, 1.0, 0.0)),
+            lambda: nlctl.actuators.GeneralisedPrandtlIshlinskii(falling=(1.0, 1.0, 0.0)),
             r"needs falling = \(a_0, a_1, a_2, a_3\)",
         ),
-        (lambda: nlctl.GeneralisedPrandtlIshlinskii(r=(0.0,)), "got 4 weights w and 1 threshold r"),
+        (
+            lambda: nlctl.actuators.GeneralisedPrandtlIshlinskii(r=(0.0,)),
+            "got 4 weights w and 1 threshold r",
+        ),
         (lambda: nlctl.Relay(on=-1.0), "Relay needs off < on, got -1 and -1"),
         (lambda: nlctl.Relay(v0=0.0), "Relay needs v0 of 1 and -1 only, got 0"),
         (lambda: nlctl.Relay(v0=(1.0, 1.0)), "Relay needs a number for v0"),
-        (lambda: nlctl.Preisach(w=(1.0,)), "as many alpha as beta and weights w, got 10, 10 and 1"),
-        (lambda: nlctl.Preisach(alpha=(1.0,), beta=(1.0,), w=(1.0,)), r"beta\[0\] < alpha\[0\]"),
-        (lambda: nlctl.relay_grid((0.0, 0.0)), "two or more increasing levels"),
+        (
+            lambda: nlctl.actuators.Preisach(w=(1.0,)),
+            "as many alpha as beta and weights w, got 10, 10 and 1",
+        ),
+        (
+            lambda: nlctl.actuators.Preisach(alpha=(1.0,), beta=(1.0,), w=(1.0,)),
+            r"beta\[0\] < alpha\[0\]",
+        ),
+        (lambda: nlctl.actuators.relay_grid((0.0, 0.0)), "two or more increasing levels"),
     ],
 )
 def test_what_makes_no_operator_is_refused(make, told):
     """With the record, the rule and the value."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()
 
 
@@ -522,7 +548,10 @@ def test_in_contact_the_switching_function_is_exactly_zero(kind, data):
 def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
     """Several memories that reverse and touch together: the paper's Example 1 with one and four."""
     steps = []
-    for actuator in (nlctl.Backlash(m_r=1, m_l=1, c_r=0.5, c_l=-0.5), nlctl.PrandtlIshlinskii()):
+    for actuator in (
+        nlctl.Backlash(m_r=1, m_l=1, c_r=0.5, c_l=-0.5),
+        nlctl.actuators.PrandtlIshlinskii(),
+    ):
         loop = nlctl.compile(nlctl.paper.example_1(actuator=actuator))
         run = nlctl.input_output_response(loop, np.linspace(0, 20, 201), rtol=rtol)
         steps.append(run.statistics.accepted + run.statistics.rejected)
@@ -533,10 +562,11 @@ def test_a_sum_of_plays_in_a_closed_loop_takes_no_more_steps_than_a_play(rtol):
 def test_members_of_an_ensemble_are_single_runs(kind):
     """Memories that start elsewhere, side by side in lanes; sums add up in another order."""
     record = {
-        "play": nlctl.Backlash, "stop": nlctl.Stop, "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii,
-        "its inverse": nlctl.PrandtlIshlinskiiInverse,
-        "generalised": nlctl.GeneralisedPrandtlIshlinskii, "relay": nlctl.Relay,
-        "Preisach": nlctl.Preisach,
+        "play": nlctl.Backlash, "stop": nlctl.actuators.Stop,
+        "Prandtl-Ishlinskii": nlctl.actuators.PrandtlIshlinskii,
+        "its inverse": nlctl.actuators.PrandtlIshlinskiiInverse,
+        "generalised": nlctl.actuators.GeneralisedPrandtlIshlinskii, "relay": nlctl.Relay,
+        "Preisach": nlctl.actuators.Preisach,
     }[kind]  # fmt: skip
     rng = np.random.default_rng(8)
     path, memories = rng.normal(size=20), np.sign(rng.normal(size=(11, len(record().states))))

@@ -23,7 +23,9 @@ paths = st.lists(inputs, min_size=2, max_size=8)
 def compiled(*kinds):
     """Return the machine code of actuators in series."""
     names = [f"stage{i}" for i in range(len(kinds))]
-    return nlctl.compile(nlctl.cascade({n: kind() for n, kind in zip(names, kinds, strict=True)}))
+    return nlctl.compile(
+        nlctl.actuators.cascade({n: kind() for n, kind in zip(names, kinds, strict=True)})
+    )
 
 
 def in_series(first, second, path):
@@ -43,7 +45,7 @@ def test_a_dead_zone_behind_its_inverse_is_the_identity(path, m_r, m_l, b_r, b_l
     own = {"slope_r": m_r, "slope_l": m_l, "b_r": b_r, "b_l": -b_l}
     zone = nlctl.DeadZone(**own, ripple_r=0.0, ripple_l=0.0)
     path = [*path, 0.0, -path[0]]
-    found = in_series(nlctl.DeadZoneInverse(**own), zone, path)
+    found = in_series(nlctl.actuators.DeadZoneInverse(**own), zone, path)
     np.testing.assert_allclose(found, path, atol=1e-13)
     assert found[-2] == 0.0
 
@@ -56,11 +58,11 @@ def operators(draw):
     gaps = np.diff(np.append(0, r))
     shares = draw(st.lists(st.floats(-1, 1), min_size=4, max_size=4))
     v0 = draw(inputs) + np.cumsum(gaps * shares)
-    return nlctl.PrandtlIshlinskii(w_0=m[0], w=np.diff(m), r=r, v0=tuple(v0))
+    return nlctl.actuators.PrandtlIshlinskii(w_0=m[0], w=np.diff(m), r=r, v0=tuple(v0))
 
 
 def inverse_of(spec):
-    return nlctl.PrandtlIshlinskiiInverse(w_0=spec.w_0, w=spec.w, r=spec.r, v0=spec.v0)
+    return nlctl.actuators.PrandtlIshlinskiiInverse(w_0=spec.w_0, w=spec.w, r=spec.r, v0=spec.v0)
 
 
 class TestPrandtlIshlinskii:
@@ -88,7 +90,9 @@ class TestPrandtlIshlinskii:
         one = inverse_of(spec)
         made = one.derived()
         memories = tuple(one.initial.values())
-        two = nlctl.PrandtlIshlinskiiInverse(w_0=made["W_0"], w=made["W"], r=made["R"], v0=memories)
+        two = nlctl.actuators.PrandtlIshlinskiiInverse(
+            w_0=made["W_0"], w=made["W"], r=made["R"], v0=memories
+        )
         again = two.derived()
         np.testing.assert_allclose(again["W_0"], spec.w_0, rtol=1e-12)
         np.testing.assert_allclose(again["W"], spec.w, atol=1e-11)
@@ -120,7 +124,7 @@ def backlash_behind_its_inverse():
         None, wave, inputs=0, outputs=["u", "u1"], params={"a": 1.0, "b": 0.0, "w": 3.0},
         name="source",
     )  # fmt: skip
-    inverse, gap = nlctl.BacklashInverse(), as_system(nlctl.Backlash(), "gap")
+    inverse, gap = nlctl.actuators.BacklashInverse(), as_system(nlctl.Backlash(), "gap")
     gap.update_names(inputs=["v"], outputs=["y"])
     blocks = [source, nlctl.block(inverse, "inverse"), gap]
     return nlctl.compile(nlctl.interconnect(blocks, outputs=["u", "v", "y"], name="compensated"))
@@ -150,7 +154,7 @@ class TestBacklash:
 
     def test_at_rest_it_keeps_its_side(self):
         """u' = 0: as it was before."""
-        block = nlctl.block(nlctl.BacklashInverse(), "b")
+        block = nlctl.block(nlctl.actuators.BacklashInverse(), "b")
         for side, end in ((1.0, 0.5), (-1.0, -0.6)):
             assert block.output(0.0, [side], [1.2, 0.0])[0] == pytest.approx(1 + end)
 
@@ -158,20 +162,29 @@ class TestBacklash:
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.BacklashInverse(c_l=0.5), "BacklashInverse needs c_l < c_r, got 0.5"),
-        (lambda: nlctl.BacklashInverse(v0=0.0), "BacklashInverse needs v0 of 1 and -1 only"),
-        (lambda: nlctl.DeadZoneInverse(b_l=0.3), "DeadZoneInverse needs b_l < 0, got 0.3"),
         (
-            lambda: nlctl.PrandtlIshlinskiiInverse(w=(-0.7, 0, 0, 0)),
+            lambda: nlctl.actuators.BacklashInverse(c_l=0.5),
+            "BacklashInverse needs c_l < c_r, got 0.5",
+        ),
+        (
+            lambda: nlctl.actuators.BacklashInverse(v0=0.0),
+            "BacklashInverse needs v0 of 1 and -1 only",
+        ),
+        (
+            lambda: nlctl.actuators.DeadZoneInverse(b_l=0.3),
+            "DeadZoneInverse needs b_l < 0, got 0.3",
+        ),
+        (
+            lambda: nlctl.actuators.PrandtlIshlinskiiInverse(w=(-0.7, 0, 0, 0)),
             r"needs w_0 \+ w\[0\] \+ ... \+ w\[0\] > 0, so that the operator has an inverse",
         ),
         (
-            lambda: nlctl.PrandtlIshlinskiiInverse(r=(0.2, 0.2, 0.3, 0.4)),
+            lambda: nlctl.actuators.PrandtlIshlinskiiInverse(r=(0.2, 0.2, 0.3, 0.4)),
             "PrandtlIshlinskiiInverse needs increasing thresholds",
         ),
     ],
 )
 def test_what_has_no_inverse_is_refused(make, told):
     """With record, rule and value."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()

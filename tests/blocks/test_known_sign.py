@@ -23,7 +23,7 @@ class TestTheLaw:
     @given(numbers, numbers, numbers, numbers, st.floats(0.1, 9), widths)
     def test_r_times_eta_covers_r_times_the_base(self, r, W_psi, robust, Y_d, beta, b):
         """(29) with s in the place of the smooth sign's argument, and r u is never positive."""
-        law = nlctl.KnownSignLaw(beta=beta, b=b)
+        law = nlctl.controllers.KnownSignLaw(beta=beta, b=b)
         eta = damped_base((r, W_psi, robust, Y_d), equation_arguments(law))
         base = beta * r + W_psi + robust + Y_d
         scale = 1 + abs(r) * (abs(base) + abs(beta * r))
@@ -34,7 +34,7 @@ class TestTheLaw:
     @given(numbers, st.floats(1.0, 20), st.sampled_from([-1, 1]), st.sampled_from([-1, 1]))
     def test_a_narrow_width_is_the_discontinuous_law(self, Y_d, r, sign, side):
         """b -> 0: u = -N_0 (beta r + |s| sign r)."""
-        law, s = nlctl.KnownSignLaw(b=1e-9), Y_d + sign
+        law, s = nlctl.controllers.KnownSignLaw(b=1e-9), Y_d + sign
         if abs(s) < 1e-3:
             return
         expected = -law.N_0 * (law.beta * side * r + abs(s) * side)
@@ -42,15 +42,15 @@ class TestTheLaw:
 
     def test_a_wide_width_leaves_proportional_feedback(self):
         """b -> infinity: u = -N_0 beta r."""
-        law = nlctl.KnownSignLaw(b=1e12)
+        law = nlctl.controllers.KnownSignLaw(b=1e12)
         assert at(law, 0.7, 1.0, 2.0, 3.0) == pytest.approx(-law.N_0 * law.beta * 0.7, rel=1e-9)
 
 
 def known_sign_loop(order=2, **kwargs):
-    robust = nlctl.RobustTerm(gamma=1e4, sigma_2=1e-3)
-    weights = nlctl.AdaptiveWeights(Gamma=10.0)
+    robust = nlctl.controllers.RobustTerm(gamma=1e4, sigma_2=1e-3)
+    weights = nlctl.controllers.AdaptiveWeights(Gamma=10.0)
     return nlctl.adaptive_neural(
-        order, weights=weights, robust=robust, law=nlctl.KnownSignLaw(), **kwargs
+        order, weights=weights, robust=robust, law=nlctl.controllers.KnownSignLaw(), **kwargs
     )
 
 
@@ -97,5 +97,5 @@ class TestItsPlace:
     def test_only_a_positive_gain_is_taken(self):
         """N_0 = 0 would be no law, and a negative one the wrong sign."""
         for bad in ({"N_0": 0.0}, {"N_0": -1.0}, {"b": 0.0}):
-            with pytest.raises(nlctl.ParameterError, match="KnownSignLaw needs"):
-                dataclasses.replace(nlctl.KnownSignLaw(), **bad)
+            with pytest.raises(nlctl.errors.ParameterError, match="KnownSignLaw needs"):
+                dataclasses.replace(nlctl.controllers.KnownSignLaw(), **bad)

@@ -20,9 +20,9 @@ def uncertain(x, v):
 
 def loop_of(Gamma=1000.0, omega=8.0):
     controller = nlctl.l1_adaptive(
-        nlctl.StatePredictor(a=(4.0, 2.0), gain=2.0),
-        weights=nlctl.ProjectedWeights(nodes=3, Gamma=Gamma, W_max=5.0),
-        law=nlctl.FilteredLaw(omega=omega, b=4.0, gain=2.0),
+        nlctl.controllers.StatePredictor(a=(4.0, 2.0), gain=2.0),
+        weights=nlctl.controllers.ProjectedWeights(nodes=3, Gamma=Gamma, W_max=5.0),
+        law=nlctl.controllers.FilteredLaw(omega=omega, b=4.0, gain=2.0),
     )
     plant = nlctl.PureFeedback(order=2, f=uncertain)
     blocks = {"command": SINE, "plant": plant, "controller": controller, "a": nlctl.Gain()}
@@ -44,7 +44,7 @@ def reference_response(times, omega=8.0):
 def test_the_predictor_keeps_its_bound_for_every_gain_of_adaptation():
     """|x - xm|^2 <= |W|^2 / (Gamma lambda_min(P)) from equal states and W_hat(0) = 0."""
     Gammas = np.array([1.0, 10.0, 100.0, 1000.0, 10_000.0])
-    P = nlctl.ModelError(K=(4.0, 2.0), Q=(1.0, 1.0)).lyapunov_matrix
+    P = nlctl.controllers.ModelError(K=(4.0, 2.0), Q=(1.0, 1.0)).lyapunov_matrix
     many = nlctl.ensemble_response(
         loop_of(), np.linspace(0, 10, 2001), params={"weights.Gamma": Gammas},
         keep=["x1", "x2", "xm1", "xm2"], rtol=1e-8, atol=1e-10,
@@ -78,8 +78,11 @@ def rohrs(controller):
 
 
 def rohrs_mrac(weights):
-    model, error = nlctl.ReferenceModel(a=(3.0,), b=3.0), nlctl.ModelError(K=(3.0,), Q=(6.0,))
-    loop = rohrs(nlctl.mrac(model, error=error, weights=weights, law=nlctl.DirectLaw()))
+    model, error = (
+        nlctl.controllers.ReferenceModel(a=(3.0,), b=3.0),
+        nlctl.controllers.ModelError(K=(3.0,), Q=(6.0,)),
+    )
+    loop = rohrs(nlctl.mrac(model, error=error, weights=weights, law=nlctl.controllers.DirectLaw()))
     start = {"controller.weights.W_hat[0]": 0.65, "controller.weights.W_hat[1]": -1.14}
     return loop, nlctl.initial_state(loop, start)
 
@@ -88,11 +91,11 @@ def rohrs_mrac(weights):
 @each_row(
     ("weights", "holds"),
     [
-        (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.0), False),
-        (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.03), False),
-        (nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.1), False),
-        (nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=15.0), True),
-        (nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=20.0), False),
+        (nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.0), False),
+        (nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.03), False),
+        (nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.1), False),
+        (nlctl.controllers.ProjectedWeights(nodes=2, Gamma=1.0, W_max=15.0), True),
+        (nlctl.controllers.ProjectedWeights(nodes=2, Gamma=1.0, W_max=20.0), False),
     ],
 )
 def test_rohrs_plant_under_mrac_is_lost_unless_a_ball_keeps_the_gain_below_17(weights, holds):
@@ -105,7 +108,7 @@ def test_rohrs_plant_under_mrac_is_lost_unless_a_ball_keeps_the_gain_below_17(we
         return
     try:
         response = nlctl.input_output_response(loop, times, 0, start)
-    except nlctl.DivergedError:
+    except nlctl.errors.DivergedError:
         return
     assert np.abs(response.outputs[0]).max() > 1e6  # a linear loop grows and stays finite for long
 
@@ -113,9 +116,9 @@ def test_rohrs_plant_under_mrac_is_lost_unless_a_ball_keeps_the_gain_below_17(we
 def test_rohrs_plant_under_l1_adaptive_control_stays():
     """The filter passes 0.30 of 16.1 rad/s; the estimates stay in their ball."""
     controller = nlctl.l1_adaptive(
-        nlctl.StatePredictor(a=(3.0,), gain=3.0),
-        weights=nlctl.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0),
-        law=nlctl.FilteredLaw(omega=5.0, b=3.0, gain=3.0),
+        nlctl.controllers.StatePredictor(a=(3.0,), gain=3.0),
+        weights=nlctl.controllers.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0),
+        law=nlctl.controllers.FilteredLaw(omega=5.0, b=3.0, gain=3.0),
     )
     response = nlctl.input_output_response(rohrs(controller), np.linspace(0, 60, 3001))
     assert np.abs(response.outputs[0]).max() < 0.6
@@ -125,14 +128,23 @@ def test_rohrs_plant_under_l1_adaptive_control_stays():
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.StatePredictor(a=(-1.0, 2.0)), "StatePredictor needs a Hurwitz"),
-        (lambda: nlctl.StatePredictor(gain=0.0), "StatePredictor needs a gain other than 0"),
-        (lambda: nlctl.FilteredLaw(gain=0.0), "FilteredLaw needs a gain other than 0"),
-        (lambda: nlctl.l1_adaptive(law=nlctl.FilteredLaw(gain=2.0)), "one gain .*, got 1 and 2"),
-        (lambda: nlctl.l1_adaptive(weights=nlctl.ProjectedWeights(nodes=9)), "nodes=9 for 3"),
+        (lambda: nlctl.controllers.StatePredictor(a=(-1.0, 2.0)), "StatePredictor needs a Hurwitz"),
+        (
+            lambda: nlctl.controllers.StatePredictor(gain=0.0),
+            "StatePredictor needs a gain other than 0",
+        ),
+        (lambda: nlctl.controllers.FilteredLaw(gain=0.0), "FilteredLaw needs a gain other than 0"),
+        (
+            lambda: nlctl.l1_adaptive(law=nlctl.controllers.FilteredLaw(gain=2.0)),
+            "one gain .*, got 1 and 2",
+        ),
+        (
+            lambda: nlctl.l1_adaptive(weights=nlctl.controllers.ProjectedWeights(nodes=9)),
+            "nodes=9 for 3",
+        ),
     ],
 )
 def test_pieces_of_l1_adaptive_control_that_do_not_fit_are_refused(make, told):
     """The culprit, the rule and the values."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()

@@ -15,10 +15,10 @@ positive = st.floats(0.1, 5)
 TRUE = np.array([1.5, -0.8, 0.6])
 GAMMA, SIGMA, GAIN = 2.0, 0.1, 3.0
 WEIGHTS = {
-    "gradient": nlctl.AdaptiveWeights(nodes=3, Gamma=GAMMA, sigma_1=0.0),
-    "sigma": nlctl.AdaptiveWeights(nodes=3, Gamma=GAMMA, sigma_1=SIGMA),
-    "e": nlctl.EModifiedWeights(nodes=3, Gamma=GAMMA, sigma=SIGMA),
-    "projection": nlctl.ProjectedWeights(nodes=3, Gamma=GAMMA, W_max=2.0, width=0.1),
+    "gradient": nlctl.controllers.AdaptiveWeights(nodes=3, Gamma=GAMMA, sigma_1=0.0),
+    "sigma": nlctl.controllers.AdaptiveWeights(nodes=3, Gamma=GAMMA, sigma_1=SIGMA),
+    "e": nlctl.controllers.EModifiedWeights(nodes=3, Gamma=GAMMA, sigma=SIGMA),
+    "projection": nlctl.controllers.ProjectedWeights(nodes=3, Gamma=GAMMA, W_max=2.0, width=0.1),
 }
 COMMAND = nlctl.SumOfSines(order=0, amplitudes=1.0, frequencies=0.7, phases=0.0)
 
@@ -39,9 +39,9 @@ def loop_of(weights, *, d=None, K=(4.0, 2.0)):
     extra = {} if d is None else {"d": d}
     plant = nlctl.PureFeedback(order=2, f=linear_uncertainty, initial={"x1": 0.6}, **extra)
     controller = nlctl.mrac(
-        error=nlctl.ModelError(K=K, Q=(1.0, 2.0)),
+        error=nlctl.controllers.ModelError(K=K, Q=(1.0, 2.0)),
         weights=weights,
-        law=nlctl.ModelReferenceLaw(gain=GAIN),
+        law=nlctl.controllers.ModelReferenceLaw(gain=GAIN),
     )
     blocks = {"command": COMMAND, "plant": plant, "controller": controller, "a": nlctl.Gain()}
     return nlctl.interconnect(blocks, outputs=["e", "r", "u", "W_norm"])
@@ -67,7 +67,7 @@ def what_modification_adds(label, W_hat, off, r):
 @given(vectors, positive, positive, positive, positive)
 def test_the_error_is_weighted_by_the_solution_of_the_lyapunov_equation(E, k, c, q_1, q_2):
     """Order 2 by hand: P_12 = Q_1 / (2 K_1), P_22 = (Q_2 + 2 P_12) / (2 K_2), r = b^T P E."""
-    spec = nlctl.ModelError(K=(k, c), Q=(q_1, q_2))
+    spec = nlctl.controllers.ModelError(K=(k, c), Q=(q_1, q_2))
     P_12 = q_1 / (2 * k)
     P_22 = (q_2 + 2 * P_12) / (2 * c)
     u = np.array([E[0] + 0.5, E[1] - 0.2, 0.5, -0.2])
@@ -84,7 +84,10 @@ def test_the_lyapunov_function_changes_as_the_proof_says(label, K):
     """V = E^T P E + |W_hat - W|^2 / Gamma: V(T) - V(0) is the integral of V' by hand."""
     times = np.linspace(0, 10, 20_001)
     E, W_hat, r = run_of(loop_of(WEIGHTS[label], K=K), times)
-    P, true = nlctl.ModelError(K=K, Q=(1.0, 2.0)).lyapunov_matrix, np.array([[1.5], [-0.8], [0.0]])
+    P, true = (
+        nlctl.controllers.ModelError(K=K, Q=(1.0, 2.0)).lyapunov_matrix,
+        np.array([[1.5], [-0.8], [0.0]]),
+    )
     off = W_hat - true
     V = np.einsum("it,ij,jt->t", E, P, E) + np.sum(off**2, axis=0) / GAMMA
     derivative = -(E[0] ** 2) - 2 * E[1] ** 2 + what_modification_adds(label, W_hat, off, r)
@@ -151,17 +154,26 @@ def test_the_ball_is_invariant_for_every_member_of_an_ensemble():
 @each_row(
     ("make", "told"),
     [
-        (lambda: nlctl.ReferenceModel(a=(-1.0, 2.0)), "ReferenceModel needs a Hurwitz .*-1"),
-        (lambda: nlctl.ModelError(K=(1.0, -2.0)), "ModelError needs a Hurwitz .*-2"),
-        (lambda: nlctl.ModelError(K=(1.0,)), "as many Q as K, got 2 of Q and 1 of K"),
-        (lambda: nlctl.ModelReferenceLaw(gain=0.0), "needs a gain other than 0"),
-        (lambda: nlctl.mrac(error=nlctl.ModelError(K=(1.0,), Q=(1.0,))), "got 1 of K and 2 of a"),
-        (lambda: nlctl.mrac(weights=nlctl.AdaptiveWeights(nodes=4)), "got nodes=4 for 3"),
+        (
+            lambda: nlctl.controllers.ReferenceModel(a=(-1.0, 2.0)),
+            "ReferenceModel needs a Hurwitz .*-1",
+        ),
+        (lambda: nlctl.controllers.ModelError(K=(1.0, -2.0)), "ModelError needs a Hurwitz .*-2"),
+        (lambda: nlctl.controllers.ModelError(K=(1.0,)), "as many Q as K, got 2 of Q and 1 of K"),
+        (lambda: nlctl.controllers.ModelReferenceLaw(gain=0.0), "needs a gain other than 0"),
+        (
+            lambda: nlctl.mrac(error=nlctl.controllers.ModelError(K=(1.0,), Q=(1.0,))),
+            "got 1 of K and 2 of a",
+        ),
+        (
+            lambda: nlctl.mrac(weights=nlctl.controllers.AdaptiveWeights(nodes=4)),
+            "got nodes=4 for 3",
+        ),
     ],
 )
 def test_pieces_that_do_not_fit_are_refused(make, told):
     """The culprit, the rule and the values."""
-    with pytest.raises(nlctl.ParameterError, match=told):
+    with pytest.raises(nlctl.errors.ParameterError, match=told):
         make()
 
 
@@ -173,9 +185,9 @@ def test_direct_mrac_finds_gains_for_an_unknown_input_gain():
         return 2.0 * x[0] + 0.5 * v
 
     controller = nlctl.mrac(
-        nlctl.ReferenceModel(a=(3.0,), b=3.0),
-        weights=nlctl.AdaptiveWeights(nodes=2, Gamma=20.0, sigma_1=0.0),
-        law=nlctl.DirectLaw(),
+        nlctl.controllers.ReferenceModel(a=(3.0,), b=3.0),
+        weights=nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=20.0, sigma_1=0.0),
+        law=nlctl.controllers.DirectLaw(),
     )
     command = nlctl.SumOfSines(
         order=0, amplitudes=(1.0, 1.0), frequencies=(1.0, 3.0), phases=(0.0, 1.0)

@@ -40,7 +40,7 @@ class TestLuenberger:
     def test_the_error_is_that_of_its_poles(self, poles, engine):
         """exp((A - L C) t) (x(0) - x_hat(0)), whatever u is; its eigenvalues are the poles."""
         plant, x0 = linear_plant(), np.array([1.0, -0.5, 0.3])
-        observer = nlctl.luenberger(plant, poles=poles)
+        observer = nlctl.observers.luenberger(plant, poles=poles)
         t = np.linspace(0, 3, 31)
         error, _, _ = with_observer(observer, plant, x0, t, engine, u=np.sin(5 * t))
         closed = A - np.array(observer.L) @ C
@@ -55,7 +55,7 @@ class TestLuenberger:
         rng = np.random.default_rng(seed)
         plant = ct.ss(*(rng.normal(size=s) for s in ((4, 4), (4, 1), (2, 4), (2, 1))))
         poles = np.array([-1.0, -2.0, -3.0, -4.0])
-        observer = nlctl.luenberger(plant, poles=poles)
+        observer = nlctl.observers.luenberger(plant, poles=poles)
         closed = np.array(observer.A) - np.array(observer.L) @ np.array(observer.C)
         np.testing.assert_allclose(np.sort(np.linalg.eigvals(closed).real), poles[::-1], rtol=1e-5)
         x, u = rng.normal(size=4), rng.normal(size=1)
@@ -69,7 +69,7 @@ class TestLuenberger:
         K = ct.place(A, B, [-1.0, -1.5, -2.0])
         names = [f"x{i}_hat" for i in (1, 2, 3)]
         law = ct.ss([], [], [], np.append(-K, [[1.0]], 1), inputs=[*names, "d"], outputs="u")
-        observer = nlctl.luenberger(plant, poles=[-5.0, -6.0, -7.0])
+        observer = nlctl.observers.luenberger(plant, poles=[-5.0, -6.0, -7.0])
         parts = {"plant": plant, "observer": observer, "law": law}
         loop = nlctl.compile(nlctl.interconnect(parts, inputs=["d"], outputs=["y"]))
         poles = np.linalg.eigvals(loop.linearize(np.zeros(6)).A)
@@ -84,20 +84,20 @@ class TestLuenberger:
         ],
     )
     def test_what_is_refused_of_poles(self, values, told):
-        with pytest.raises(nlctl.ParameterError, match=rf"^luenberger needs {told}"):
-            nlctl.luenberger(linear_plant(), **values)
+        with pytest.raises(nlctl.errors.ParameterError, match=rf"^luenberger needs {told}"):
+            nlctl.observers.luenberger(linear_plant(), **values)
 
     def test_what_cannot_be_observed_is_refused(self):
         """By name; and what is no plant in continuous time with an input."""
         blind = ct.ss(np.diag([1.0, 2.0]), [[1], [1]], [[1, 0]], 0, name="blind")
-        with pytest.raises(nlctl.ParameterError, match="'blind'"):
-            nlctl.luenberger(blind, poles=[-1.0, -2.0])
-        with pytest.raises(nlctl.ParameterError, match=r"continuous time .* dt = 0\.1"):
-            nlctl.luenberger(ct.ss(0.5, 1, 1, 0, 0.1), poles=[-1.0])
-        with pytest.raises(nlctl.ParameterError, match=r"L of shape 2 x 1 .* got 1 x 2"):
-            nlctl.LuenbergerObserver(L=((1.0, 2.0),))
-        with pytest.raises(nlctl.ParameterError, match=r"needs 1 in measured, got 2"):
-            nlctl.LuenbergerObserver(measured=("a", "b"))
+        with pytest.raises(nlctl.errors.ParameterError, match="'blind'"):
+            nlctl.observers.luenberger(blind, poles=[-1.0, -2.0])
+        with pytest.raises(nlctl.errors.ParameterError, match=r"continuous time .* dt = 0\.1"):
+            nlctl.observers.luenberger(ct.ss(0.5, 1, 1, 0, 0.1), poles=[-1.0])
+        with pytest.raises(nlctl.errors.ParameterError, match=r"L of shape 2 x 1 .* got 1 x 2"):
+            nlctl.observers.LuenbergerObserver(L=((1.0, 2.0),))
+        with pytest.raises(nlctl.errors.ParameterError, match=r"needs 1 in measured, got 2"):
+            nlctl.observers.LuenbergerObserver(measured=("a", "b"))
 
 
 class TestHighGain:
@@ -112,7 +112,7 @@ class TestHighGain:
     def test_the_peak_of_the_second_estimate(self, epsilon, engine):
         """alpha = (2, 1), x_2 = 0, error 1 in x_1: x_hat_2 = t / epsilon^2 exp(-t / epsilon)."""
         t = np.linspace(0, 12 * epsilon, 121)
-        spec = nlctl.HighGainObserver(alpha=(2.0, 1.0), epsilon=epsilon)
+        spec = nlctl.observers.HighGainObserver(alpha=(2.0, 1.0), epsilon=epsilon)
         observer = type(spec)(known="u", model=known_input, epsilon=epsilon)
         error, estimates, _ = with_observer(observer, self.chain(), [1.0, 0.0], t, engine)
         exact = t / epsilon**2 * np.exp(-t / epsilon)
@@ -123,7 +123,7 @@ class TestHighGain:
     @each_row("epsilon", [0.2, 0.05, 0.0125])
     def test_an_unknown_input_leaves_an_error_of_the_order_of_epsilon(self, epsilon):
         """x_1'' = 1, which phi_0 = 0 does not know: errors epsilon^2, and 2 epsilon in x_2."""
-        spec = nlctl.HighGainObserver(alpha=(2.0, 1.0), epsilon=epsilon)
+        spec = nlctl.observers.HighGainObserver(alpha=(2.0, 1.0), epsilon=epsilon)
         t = np.linspace(0, 40 * epsilon, 3)
         step = ct.ss([], [], [], 1, inputs="w", outputs="u", name="gain")
         parts = {"plant": self.chain(), "observer": spec, "gain": step}
@@ -134,7 +134,7 @@ class TestHighGain:
         assert x2 - x2_hat == pytest.approx(2 * epsilon, rel=1e-5)
 
     def test_its_poles_are_those_of_alpha_divided_by_epsilon(self):
-        spec = nlctl.HighGainObserver(alpha=(6.0, 11.0, 6.0), epsilon=0.1)
+        spec = nlctl.observers.HighGainObserver(alpha=(6.0, 11.0, 6.0), epsilon=0.1)
         linear = nlctl.compile(nlctl.block(spec, "o")).linearize(np.zeros(3), [0.0])
         poles = np.sort(np.linalg.eigvals(linear.A).real)
         np.testing.assert_allclose(poles, [-30.0, -20.0, -10.0], rtol=1e-9)
@@ -150,8 +150,8 @@ class TestHighGain:
         ],
     )
     def test_what_is_refused(self, values, told):
-        with pytest.raises(nlctl.ParameterError, match=rf"^HighGainObserver needs .*{told}"):
-            nlctl.HighGainObserver(**values)
+        with pytest.raises(nlctl.errors.ParameterError, match=rf"^HighGainObserver needs .*{told}"):
+            nlctl.observers.HighGainObserver(**values)
 
 
 @nlctl.equation
@@ -178,7 +178,7 @@ class TestExtendedKalmanFilter:
     Q, R = np.diag([0.1, 0.2, 0.3]), np.array([[0.05]])
 
     def filter(self, **others):
-        return nlctl.ExtendedKalmanFilter(f=linear_rates, Q=self.Q, R=self.R, **others)
+        return nlctl.observers.ExtendedKalmanFilter(f=linear_rates, Q=self.Q, R=self.R, **others)
 
     @every_engine
     def test_of_a_linear_plant_it_is_the_kalman_filter(self, engine):
@@ -198,13 +198,15 @@ class TestExtendedKalmanFilter:
         P = (P + P.T) / 2
         x0, u = [1.0, -0.5, 0.3], np.sin(t)
         _, own, _ = with_observer(self.filter(P0=P), plant, x0, t, u=u)
-        _, other, _ = with_observer(nlctl.luenberger(plant, L=L), plant, x0, t, u=u)
+        _, other, _ = with_observer(nlctl.observers.luenberger(plant, L=L), plant, x0, t, u=u)
         np.testing.assert_allclose(own, other, atol=1e-7)
 
     def test_riccati_of_a_scalar_in_closed_form(self):
         """x' = w, y = x + v: P' = q - P^2 / r, P = sqrt(q r) tanh(t sqrt(q / r)) from 0."""
         q, r, t = 0.4, 0.1, np.linspace(0, 2, 21)
-        spec = nlctl.ExtendedKalmanFilter(f=still, Q=((q,),), R=((r,),), P0=((0.0,),), known=())
+        spec = nlctl.observers.ExtendedKalmanFilter(
+            f=still, Q=((q,),), R=((r,),), P0=((0.0,),), known=()
+        )
         run = nlctl.input_output_response(nlctl.block(spec, "f"), t, 0.0, **TIGHT)
         exact = np.sqrt(q * r) * np.tanh(t * np.sqrt(q / r))
         np.testing.assert_allclose(np.array(run.states)[1], exact, atol=1e-8)
@@ -229,7 +231,7 @@ class TestExtendedKalmanFilter:
             lambda t, x, u, params: [x[0]],
             inputs="u", outputs="y", states=["x1", "x2"], name="plant",
         )  # fmt: skip
-        spec = nlctl.ExtendedKalmanFilter(f=pendulum, Q=0.1 * np.eye(2), R=((0.01,),))
+        spec = nlctl.observers.ExtendedKalmanFilter(f=pendulum, Q=0.1 * np.eye(2), R=((0.01,),))
         t = np.linspace(0, 20, 5)
         error, _, run = with_observer(spec, plant, [1.0, 1.0], t, engine, u=0.3 * np.sin(t))
         assert np.abs(error[:, 0]).max() == 1.0
@@ -240,7 +242,9 @@ class TestExtendedKalmanFilter:
     def test_sampled_it_tends_to_the_continuous_one(self):
         """By Euler's steps: the error of P is of the order of dt, half of it at half of dt."""
         at_last = []
-        spec = nlctl.ExtendedKalmanFilter(f=still, Q=((0.4,),), R=((0.1,),), P0=((0.0,),), known=())
+        spec = nlctl.observers.ExtendedKalmanFilter(
+            f=still, Q=((0.4,),), R=((0.1,),), P0=((0.0,),), known=()
+        )
         for dt in (0.02, 0.01):
             made = nlctl.discretise(nlctl.block(spec, "f"), dt)
             t = np.arange(0, 0.201, dt)
@@ -267,8 +271,10 @@ class TestExtendedKalmanFilter:
         ],
     )
     def test_what_is_refused(self, values, told):
-        with pytest.raises(nlctl.ParameterError, match=rf"^ExtendedKalmanFilter needs .*{told}"):
-            nlctl.ExtendedKalmanFilter(**values)
+        with pytest.raises(
+            nlctl.errors.ParameterError, match=rf"^ExtendedKalmanFilter needs .*{told}"
+        ):
+            nlctl.observers.ExtendedKalmanFilter(**values)
 
     def test_more_numbers_than_are_written_out_are_refused(self):
         with pytest.raises(Untraceable, match="more than 8 numbers"):

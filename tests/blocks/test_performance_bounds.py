@@ -16,12 +16,15 @@ gains = st.floats(0.1, 20.0)
 T = np.linspace(0, 20, 2001)
 CONTROLLERS = {
     "prescribed performance": (
-        nlctl.PrescribedPerformance(),
-        nlctl.PrescribedPerformance(
+        nlctl.controllers.PrescribedPerformance(),
+        nlctl.controllers.PrescribedPerformance(
             k=(0.5, 2.0, 3.0), rho_0=(3.0, 3.0, 6.0), rho_inf=(0.15, 0.7, 2.0), decay=3 * (0.5,)
         ),
     ),
-    "funnel": (nlctl.FunnelControl(k=5.0), nlctl.FunnelControl(order=3, k=5.0, decay=1.0)),
+    "funnel": (
+        nlctl.controllers.FunnelControl(k=5.0),
+        nlctl.controllers.FunnelControl(order=3, k=5.0, decay=1.0),
+    ),
 }
 
 
@@ -32,7 +35,9 @@ def at(spec, t, u):
 
 def single(k, rho):
     """Return prescribed performance control of one state with a constant bound."""
-    return nlctl.PrescribedPerformance(k=(k,), rho_0=(rho,), rho_inf=(rho,), decay=(0.0,))
+    return nlctl.controllers.PrescribedPerformance(
+        k=(k,), rho_0=(rho,), rho_inf=(rho,), decay=(0.0,)
+    )
 
 
 def integrator_loop(controller, x1):
@@ -51,7 +56,7 @@ def integrator_loop(controller, x1):
 @given(fractions, fractions, gains, gains, st.floats(0, 10))
 def test_prescribed_performance_is_the_inverse_of_tanh(xi_1, xi_2, k_1, k_2, t):
     """ln((1 + xi) / (1 - xi)) = 2 artanh xi: chosen xi_1, xi_2 give u = -2 k_2 artanh xi_2."""
-    spec = nlctl.PrescribedPerformance(
+    spec = nlctl.controllers.PrescribedPerformance(
         k=(k_1, k_2), rho_0=(3.0, 7.0), rho_inf=(0.5, 2.0), decay=(1.0, 0.2)
     )
     rho_1, rho_2 = 2.5 * np.exp(-t) + 0.5, 5 * np.exp(-0.2 * t) + 2
@@ -66,7 +71,7 @@ def test_prescribed_performance_is_the_inverse_of_tanh(xi_1, xi_2, k_1, k_2, t):
 @given(fractions, fractions, gains, st.floats(0, 10))
 def test_funnel_control_in_its_own_coordinates(w_1, w_2, k, t):
     """From w_1, w_2 back to e, e': the law is -k w_2 / (1 - w_2^2)."""
-    spec = nlctl.FunnelControl(k=k, rho_0=4.0, rho_inf=0.2, decay=1.5)
+    spec = nlctl.controllers.FunnelControl(k=k, rho_0=4.0, rho_inf=0.2, decay=1.5)
     width = 3.8 * np.exp(-1.5 * t) + 0.2
     slope = width * (w_2 - w_1 / (1 - w_1**2))
     e, u, rho = at(spec, t, [0.7 + width * w_1, -0.4 + slope, 0.7, -0.4])
@@ -79,8 +84,8 @@ def test_funnel_control_in_its_own_coordinates(w_1, w_2, k, t):
 def test_at_the_bound_and_beyond_it_there_is_no_law(factor, x2):
     """|e| >= rho_1: u is NaN, whatever the other states; the error and the bound are told."""
     for spec, signals in (
-        (nlctl.PrescribedPerformance(), [3.0 * factor, x2, 0.0]),
-        (nlctl.FunnelControl(rho_0=3.0), [3.0 * factor, x2, 0.0, 0.0]),
+        (nlctl.controllers.PrescribedPerformance(), [3.0 * factor, x2, 0.0]),
+        (nlctl.controllers.FunnelControl(rho_0=3.0), [3.0 * factor, x2, 0.0, 0.0]),
     ):
         e, u, rho = at(spec, 0.0, signals)
         assert (e, rho) == (3.0 * factor, 3.0)
@@ -104,7 +109,7 @@ def test_prescribed_performance_of_an_integrator_takes_the_time_of_its_quadratur
 
 def test_funnel_control_of_an_integrator_is_known_in_closed_form():
     """x' = -k w / (1 - w^2), w = x / rho: ln w - w^2 / 2 falls with the slope k / rho."""
-    spec = nlctl.FunnelControl(order=1, k=2.0, rho_0=1.5, rho_inf=1.5, decay=0.0)
+    spec = nlctl.controllers.FunnelControl(order=1, k=2.0, rho_0=1.5, rho_inf=1.5, decay=0.0)
     response = nlctl.input_output_response(
         integrator_loop(spec, 1.5 * 0.95), np.linspace(0, 2, 21), 0, rtol=1e-11, atol=1e-13
     )
@@ -139,17 +144,17 @@ def test_the_bound_holds_for_every_member_of_an_ensemble(label, number):
 def test_no_run_is_calm_where_the_promise_has_no_ground(label):
     """Outside of the bound at t = 0, or with the other sign of the input gain: refused."""
     spec = CONTROLLERS[label][0]
-    far = nlctl.paper.example_1(controller=spec, plant=nlctl.ForcedDuffing())
-    with pytest.raises(nlctl.DivergedError, match="after t = 0 s"):
+    far = nlctl.paper.example_1(controller=spec, plant=nlctl.plants.ForcedDuffing())
+    with pytest.raises(nlctl.errors.DivergedError, match="after t = 0 s"):
         nlctl.input_output_response(far, T, 0, nlctl.initial_state(far, {"plant.x1": 6.0}))
     reversed_gain = nlctl.paper.example_1(controller=spec, actuator=nlctl.Gain(k=-1.0))
-    with pytest.raises(nlctl.DivergedError):
+    with pytest.raises(nlctl.errors.DivergedError):
         nlctl.input_output_response(reversed_gain, T)
 
 
 def test_bounds_and_gains_of_equal_length():
     """One value for each state of the plant."""
-    with pytest.raises(nlctl.ParameterError, match=r"one value .*got 2 of k, 3 of rho_0"):
-        nlctl.PrescribedPerformance(rho_0=(1.0, 2.0, 3.0))
-    with pytest.raises(nlctl.ParameterError, match=r"FunnelControl needs an order .*0"):
-        nlctl.FunnelControl(order=0)
+    with pytest.raises(nlctl.errors.ParameterError, match=r"one value .*got 2 of k, 3 of rho_0"):
+        nlctl.controllers.PrescribedPerformance(rho_0=(1.0, 2.0, 3.0))
+    with pytest.raises(nlctl.errors.ParameterError, match=r"FunnelControl needs an order .*0"):
+        nlctl.controllers.FunnelControl(order=0)

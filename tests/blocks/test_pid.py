@@ -83,13 +83,13 @@ class TestUnsaturated:
 
     def test_the_standard_form(self):
         """K (1 + 1 / (T_i s) + T_d s / (1 + s T_d / N))."""
-        spec = nlctl.standard_pid(3.0, 2.0, 0.5, 8.0, signals="e", **FREE)
+        spec = nlctl.controllers.standard_pid(3.0, 2.0, 0.5, 8.0, signals="e", **FREE)
         linear = nlctl.compile(nlctl.block(spec, "law")).linearize([0.0, 0.0], [0.0])
         for s in (0.3j, 2j, 40j):
             exact = 3 * (1 + 1 / (2 * s) + 0.5 * s / (1 + s * 0.5 / 8))
             assert linear(s) == pytest.approx(exact, rel=1e-9)
-        assert nlctl.standard_pid(1.0, 4.0, 1.0).T_t == 2.0
-        assert nlctl.standard_pid(1.0, 4.0).T_t == 4.0
+        assert nlctl.controllers.standard_pid(1.0, 4.0, 1.0).T_t == 2.0
+        assert nlctl.controllers.standard_pid(1.0, 4.0).T_t == 4.0
 
     def test_sampled_it_is_the_recursion(self):
         """I[k+1] = I[k] + dt k_i e, z[k+1] = z[k] + dt D, at dt = 0.02 s, on a sampled ramp."""
@@ -97,7 +97,7 @@ class TestUnsaturated:
         spec = nlctl.PID2(**GAINS, b=0.4, c=0.5)
         law = nlctl.sampled(nlctl.discretise(nlctl.block(spec, "law"), dt))
         t = np.arange(count) * dt
-        ramp = nlctl.Ramp(slope=0.7, outputs="ref")
+        ramp = nlctl.sources.Ramp(slope=0.7, outputs="ref")
         wave = nlctl.Sine(omega=3.0, outputs="y")
         loop = nlctl.interconnect({"r": ramp, "y": wave, "law": law}, outputs=["u"])
         u = nlctl.input_output_response(loop, t).outputs.ravel()
@@ -159,7 +159,7 @@ class TestAntiWindup:
         Wound up, I = 7.5 and falls by 0.75 /s, for 8 s.  With either anti-windup it is 0.5 + 0.3,
         w = I - 0.5 is within the limits at once.
         """
-        source = nlctl.Square(amplitude=0.25, period=40.0, duty=0.25, outputs="e")
+        source = nlctl.sources.Square(amplitude=0.25, period=40.0, duty=0.25, outputs="e")
         t = np.linspace(0, 20, 401)
         left = {}
         for kind in ("back-calculation", "clamping", "none"):
@@ -234,7 +234,7 @@ class TestBumpless:
 )
 def test_what_is_refused(values, told):
     """By record, rule and value."""
-    with pytest.raises(nlctl.ParameterError, match=rf"^PID2 needs .*{told}"):
+    with pytest.raises(nlctl.errors.ParameterError, match=rf"^PID2 needs .*{told}"):
         nlctl.PID2(**values)
 
 
@@ -243,7 +243,7 @@ def test_what_is_refused(values, told):
     [({"T_i": 0.0}, "T_i > 0, got 0"), ({"T_d": -1.0}, "T_d >= 0, got -1"), ({"N": 0}, "N > 0")],
 )
 def test_what_the_standard_form_refuses(values, told):
-    with pytest.raises(nlctl.ParameterError, match=rf"^standard_pid needs .*{told}"):
-        nlctl.standard_pid(**{"K": 1.0, "T_i": 1.0, **values})
-    with pytest.raises(nlctl.UnknownNameError, match="nearest: 'u_max'"):
-        nlctl.standard_pid(1.0, 1.0, umax=3.0)
+    with pytest.raises(nlctl.errors.ParameterError, match=rf"^standard_pid needs .*{told}"):
+        nlctl.controllers.standard_pid(**{"K": 1.0, "T_i": 1.0, **values})
+    with pytest.raises(nlctl.errors.UnknownNameError, match="nearest: 'u_max'"):
+        nlctl.controllers.standard_pid(1.0, 1.0, umax=3.0)

@@ -72,18 +72,26 @@ class TestPureFeedback:
 
     def test_states_renamed_by_python_control_keep_their_initial_values(self):
         """`update_names` changes labels, not where a plant starts from."""
-        plant = nlctl.block(nlctl.Genesio(), "plant")
+        plant = nlctl.block(nlctl.plants.Genesio(), "plant")
         plant.update_names(states=["position", "speed", "acceleration"])
         np.testing.assert_array_equal(nlctl.initial_state(plant), [1, 0, 0])
 
     @each_row(
         ("changed", "error", "told"),
         [
-            ({"initial": {"x4": 1.0}}, nlctl.UnknownNameError, "'x4' in initial of PureFeedback"),
-            ({"initial": {"y": 1.0}}, nlctl.UnknownNameError, "known: 'x1', 'x2', 'x3'"),
-            ({"initial": {"x1": np.nan}}, nlctl.ParameterError, "finite initial x1, got nan"),
-            ({"order": 0}, nlctl.ParameterError, "PureFeedback needs an order >= 1, got 0"),
-            ({"order": 2.0}, nlctl.ParameterError, "order >= 1, got 2.0"),
+            (
+                {"initial": {"x4": 1.0}},
+                nlctl.errors.UnknownNameError,
+                "'x4' in initial of PureFeedback",
+            ),
+            ({"initial": {"y": 1.0}}, nlctl.errors.UnknownNameError, "known: 'x1', 'x2', 'x3'"),
+            (
+                {"initial": {"x1": np.nan}},
+                nlctl.errors.ParameterError,
+                "finite initial x1, got nan",
+            ),
+            ({"order": 0}, nlctl.errors.ParameterError, "PureFeedback needs an order >= 1, got 0"),
+            ({"order": 2.0}, nlctl.errors.ParameterError, "order >= 1, got 2.0"),
         ],
     )
     def test_bad_orders_and_initial_states_are_refused(self, changed, error, told):
@@ -93,7 +101,7 @@ class TestPureFeedback:
 
 
 class TestForcedDuffing:
-    PLANT = nlctl.block(nlctl.ForcedDuffing(), "plant")
+    PLANT = nlctl.block(nlctl.plants.ForcedDuffing(), "plant")
 
     @given(x=vectors(2), v=numbers, t=times, p1=numbers)
     def test_the_equation_written_out(self, x, v, t, p1):
@@ -111,14 +119,16 @@ class TestForcedDuffing:
     def test_the_integral_phase_is_the_integral_of_w(self, t, mean, ripple):
         """Forcing q cos(int_0^t w), by quadrature."""
         phase, _ = quad(lambda s: mean + ripple * np.sin(s), 0, t, epsabs=1e-12, limit=200)
-        spec = nlctl.ForcedDuffing(integrate_w=True, w_mean=mean, w_ripple=ripple, q_ripple=0)
+        spec = nlctl.plants.ForcedDuffing(
+            integrate_w=True, w_mean=mean, w_ripple=ripple, q_ripple=0
+        )
         got = nlctl.block(spec, "plant").dynamics(t, [0, 0], [0.0])[1]
         assert got == pytest.approx(5 * np.cos(phase), abs=1e-9)
 
     def test_energy_is_conserved_without_damping_and_forcing(self):
         """x2^2 / 2 + p1 x1^2 / 2 + x1^4 / 4 is a constant of the free motion."""
         off = dict.fromkeys(["p_mean", "p_ripple", "q_mean", "q_ripple", "d_amplitude"], 0.0)
-        plant = nlctl.block(nlctl.ForcedDuffing(**off, p1=0.7), "plant")
+        plant = nlctl.block(nlctl.plants.ForcedDuffing(**off, p1=0.7), "plant")
         run = ct.input_output_response(
             plant,
             np.linspace(0, 10, 41),
@@ -134,11 +144,11 @@ class TestForcedDuffing:
     @given(x=vectors(2), v=st.floats(-60, 60))
     def test_assumption_3(self, x, v):
         """F(x, v) v lies between 0.9 0.8 v^2 and 1.1 1.2 v^2, by the ripples of the gain."""
-        check_sector(nlctl.ForcedDuffing(), x, v, 0.9 * 0.8, 1.1 * 1.2)
+        check_sector(nlctl.plants.ForcedDuffing(), x, v, 0.9 * 0.8, 1.1 * 1.2)
 
 
 class TestGenesio:
-    PLANT = nlctl.block(nlctl.Genesio(), "plant")
+    PLANT = nlctl.block(nlctl.plants.Genesio(), "plant")
 
     @given(x=vectors(3), v=numbers, t=times, a=numbers)
     def test_the_equation_written_out(self, x, v, t, a):
@@ -167,7 +177,7 @@ class TestGenesio:
     @given(x=vectors(3), v=st.floats(-60, 60))
     def test_assumption_3(self, x, v):
         """F(x, v) v lies between v^2 and 3 1.2 v^2."""
-        check_sector(nlctl.Genesio(), x, v, 1.0, 3 * 1.2)
+        check_sector(nlctl.plants.Genesio(), x, v, 1.0, 3 * 1.2)
 
 
 def check_sector(spec, x, v, low, high):
@@ -178,7 +188,7 @@ def check_sector(spec, x, v, low, high):
     assert low * v**2 - rounding <= work <= high * v**2 + rounding
 
 
-@pytest.mark.parametrize("spec", [nlctl.ForcedDuffing(), nlctl.Genesio()])
+@pytest.mark.parametrize("spec", [nlctl.plants.ForcedDuffing(), nlctl.plants.Genesio()])
 def test_the_update_is_f_plus_d(spec):
     """The two terms of (1) that the analysis takes apart are those that are simulated."""
     x, p = tuple(0.3 * (i + 1) for i in range(len(spec.states))), equation_arguments(spec)

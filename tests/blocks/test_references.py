@@ -69,7 +69,7 @@ class TestSumOfSines:
     @each_row("field", ["amplitudes", "frequencies", "phases"])
     def test_as_many_of_each(self, field):
         """One amplitude, frequency and phase per sine."""
-        with pytest.raises(nlctl.ParameterError, match=r"SumOfSines needs as many .* 1"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"SumOfSines needs as many .* 1"):
             nlctl.SumOfSines(**{field: (1.0,)})
 
 
@@ -152,7 +152,9 @@ class TestFunctionReference:
     )
     def test_too_few_or_too_many_values_are_refused(self, order, function, told):
         """When the record is made, not in the middle of a run."""
-        with pytest.raises(nlctl.ParameterError, match=rf"FunctionReference .*needs .*{told}"):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match=rf"FunctionReference .*needs .*{told}"
+        ):
             nlctl.FunctionReference(order=order, function=function)
 
 
@@ -160,7 +162,7 @@ class TestBandLimitedNoise:
     @given(seed=seeds, t=times, u=st.tuples(st.floats(-5, 5), st.floats(-5, 5)))
     def test_it_adds_its_own_noise_to_each_signal(self, seed, t, u):
         """out_i = in_i + n_i(t); n_i is `band_limited` with the seed (seed, i)."""
-        spec = nlctl.BandLimitedNoise(seed=seed, rms=0.3, high=20.0)
+        spec = nlctl.references.BandLimitedNoise(seed=seed, rms=0.3, high=20.0)
         noise = [
             nlctl.functions.band_limited(0.3, low=0.0, high=20.0, seed=[seed, i])(t) for i in (0, 1)
         ]
@@ -172,14 +174,16 @@ class TestBandLimitedNoise:
     @settings(max_examples=5)
     def test_noises_of_two_signals_are_uncorrelated(self, seed, rms):
         """Over a long window each has its rms, and their product averages out."""
-        spec = nlctl.BandLimitedNoise(seed=seed, rms=rms, low=10.0, high=40.0)
+        spec = nlctl.references.BandLimitedNoise(seed=seed, rms=rms, low=10.0, high=40.0)
         p, zero = equation_arguments(spec), np.zeros(2)
         n = np.array([spec.output(t, zero, zero, p) for t in np.arange(0, 300, 0.05)]) / rms
         np.testing.assert_allclose(n.T @ n / len(n), np.eye(2), atol=0.1)
 
     def test_every_solver_sees_the_same_noise(self):
         """An integral of the noise does not depend on method and step, but on the tolerance."""
-        spec = nlctl.BandLimitedNoise(inputs=("a",), outputs=("b",), rms=1.0, high=10.0, seed=2)
+        spec = nlctl.references.BandLimitedNoise(
+            inputs=("a",), outputs=("b",), rms=1.0, high=10.0, seed=2
+        )
         integral = ct.tf(1, [1, 0], inputs="b", outputs="y", name="integral")
         diagram = ct.interconnect([nlctl.block(spec, "n"), integral], inputs=["a"], outputs=["y"])
         ends = [
@@ -213,5 +217,5 @@ class TestBandLimitedNoise:
     )
     def test_bad_bands_and_signals_are_refused(self, changed, told):
         """The message names rule and value."""
-        with pytest.raises(nlctl.ParameterError, match=f"BandLimitedNoise needs {told}"):
-            nlctl.BandLimitedNoise(**changed)
+        with pytest.raises(nlctl.errors.ParameterError, match=f"BandLimitedNoise needs {told}"):
+            nlctl.references.BandLimitedNoise(**changed)

@@ -36,20 +36,20 @@ class TestNothingIsSteppedOver:
     @each_row("width", [1.0, 1e-3, 1e-6])
     def test_a_pulse(self, width, engine):
         """Height times width, one pulse in 1000 s."""
-        spec = nlctl.Pulse(height=2.0, t_start=612.3, width=width)
+        spec = nlctl.sources.Pulse(height=2.0, t_start=612.3, width=width)
         assert integral(spec, 1000.0, engine) == pytest.approx(2.0 * width, rel=1e-5)
 
     @every_engine
     def test_a_train(self, engine):
         """Every one of 200 pulses of a millisecond; the last is cut in half by the end."""
-        spec = nlctl.PulseTrain(height=3.0, t_start=0.25, width=1e-3, period=0.5)
+        spec = nlctl.sources.PulseTrain(height=3.0, t_start=0.25, width=1e-3, period=0.5)
         assert integral(spec, 100.0, engine) == pytest.approx(200 * 3e-3, rel=1e-6)
         assert integral(spec, 99.7505, engine) == pytest.approx(199.5 * 3e-3, rel=1e-6)
 
     @every_engine
     def test_a_square(self, engine):
         """The mean of a period is amplitude (2 duty - 1), here of 20 and a fifth, all high."""
-        spec = nlctl.Square(amplitude=2.0, period=0.7, duty=0.3)
+        spec = nlctl.sources.Square(amplitude=2.0, period=0.7, duty=0.3)
         expected = 20 * 0.7 * 2.0 * (-0.4) + 0.14 * 2.0
         assert integral(spec, 20.2 * 0.7, engine) == pytest.approx(expected, rel=1e-7)
 
@@ -57,7 +57,7 @@ class TestNothingIsSteppedOver:
     @each_row("periodic", [False, True])
     def test_a_spike_in_a_table(self, periodic, engine):
         """A triangle of 0.1 ms, once or a hundred times."""
-        spec = nlctl.TimeTable(
+        spec = nlctl.sources.TimeTable(
             times=(0.0, 0.6, 0.6001, 0.6002, 1.0), values=(0, 0, 1, 0, 0), periodic=periodic
         )
         wanted = 1e-4 * (100 if periodic else 1)
@@ -71,12 +71,12 @@ class TestNothingIsSteppedOver:
         times = np.append(0.0, np.cumsum(rng.exponential(size=999)))
         values = rng.normal(size=1000)
         exact = np.diff(times) @ values[:-1] if hold else np.trapezoid(values, times)
-        spec = nlctl.TimeTable(times=times, values=values, hold=hold)
+        spec = nlctl.sources.TimeTable(times=times, values=values, hold=hold)
         assert integral(spec, times[-1]) == pytest.approx(exact, rel=1e-6)
 
     def test_the_jumps_are_solved_before_the_run(self):
         """At t_start + k period and a width later, to the last digits; nothing is opaque."""
-        train = nlctl.PulseTrain(t_start=0.3, width=0.1, period=0.7)
+        train = nlctl.sources.PulseTrain(t_start=0.3, width=0.1, period=0.7)
         integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
         loop = nlctl.interconnect({"train": train, "integrator": integrator}, outputs=["y"])
         run = nlctl.input_output_response(loop, [0.0, 10.0])
@@ -91,7 +91,7 @@ class TestNothingIsSteppedOver:
         integrator = ct.ss(0, 1, 1, 0, inputs="ref", outputs="y", name="integrator")
         times = np.array([0.0, 100.3, 700.1, 700.10001, 1000.0])
         for periodic, until in ((False, 1000.0), (True, 2500.0)):
-            table = nlctl.TimeTable(times=times, values=(1, 2, 3, 4, 1), periodic=periodic)
+            table = nlctl.sources.TimeTable(times=times, values=(1, 2, 3, 4, 1), periodic=periodic)
             loop = nlctl.interconnect({"table": table, "integrator": integrator}, outputs=["y"])
             run = nlctl.input_output_response(loop, [0.0, until])
             every = np.unique(np.add.outer((0.0, 1000.0, 2000.0), times).ravel())
@@ -105,7 +105,7 @@ class TestStepRampSine:
     @given(st.floats(-5, 5), st.floats(-5, 5))
     def test_a_ramp_is_the_integral_of_a_step(self, t, start):
         """And its offset is where it begins."""
-        ramp = nlctl.Ramp(slope=1.5, t_start=start, offset=0.5)
+        ramp = nlctl.sources.Ramp(slope=1.5, t_start=start, offset=0.5)
         step = nlctl.Step(height=1.5, t_step=start)
         assert value(ramp, t)[0] == 0.5 + value(step, t)[0] * (t - start)
 
@@ -120,7 +120,7 @@ class TestSquare:
     @each_row("duty", [0.5, 0.2])
     def test_its_fourier_coefficients(self, duty):
         """Of period T: a_n - i b_n = 4 A / (2 pi i n) (1 - exp(-2 pi i n duty))."""
-        spec = nlctl.Square(amplitude=1.5, period=2.0, duty=duty, t_start=0.0)
+        spec = nlctl.sources.Square(amplitude=1.5, period=2.0, duty=duty, t_start=0.0)
         n, count = np.arange(1, 8), 1_000_000
         t = (np.arange(count) + 0.5) / count * 2.0  # between the jumps, which are at samples / 2
         high = (t % 2.0) < duty * 2.0
@@ -133,7 +133,7 @@ class TestSquare:
     @given(st.integers(0, 10_000), st.floats(1e-3, 10), st.floats(-10, 10))
     def test_a_period_that_has_begun_has_begun(self, k, period, start):
         """At start + k period the wave is high, however the sum was rounded."""
-        spec = nlctl.Square(period=period, t_start=start, duty=0.5)
+        spec = nlctl.sources.Square(period=period, t_start=start, duty=0.5)
         t = start + k * period
         if abs(start) <= k * period or k == 0:
             assert value(spec, t)[0] == 1.0
@@ -141,14 +141,14 @@ class TestSquare:
 
     def test_a_sampled_block_sees_it_at_its_own_instants(self):
         """A wave of two samples a period alternates, sample for sample."""
-        square = nlctl.Square(period=0.2)
+        square = nlctl.sources.Square(period=0.2)
         hold = nlctl.sampled(ct.ss([], [], [], 1, 0.1, inputs="ref", outputs="y", name="hold"))
         loop = nlctl.interconnect({"square": square, "hold": hold}, outputs=["y"])
         y = nlctl.input_output_response(loop, np.arange(200) * 0.1).outputs.ravel()
         np.testing.assert_array_equal(y, np.tile([1.0, -1.0], 100))
 
     def test_before_its_start_it_is_in_the_middle(self):
-        spec = nlctl.Square(t_start=1.0, offset=0.25)
+        spec = nlctl.sources.Square(t_start=1.0, offset=0.25)
         np.testing.assert_array_equal(value(spec, [0.0, 0.9, 1.0, 1.6]), [0.25, 0.25, 1.25, -0.75])
 
 
@@ -157,7 +157,7 @@ class TestChirp:
     def test_it_is_scipys(self, sweep, method):
         """`scipy.signal.chirp` within the sweep; SciPy's is a cosine, and its phase in degrees."""
         t = np.linspace(0, 8, 400)
-        spec = nlctl.Chirp(sweep=sweep, omega_0=0.7, omega_1=9.0, t_1=8.0, phase=0.3)
+        spec = nlctl.sources.Chirp(sweep=sweep, omega_0=0.7, omega_1=9.0, t_1=8.0, phase=0.3)
         other = scipy.signal.chirp(
             t, 0.7 / (2 * np.pi), 8.0, 9.0 / (2 * np.pi), method, np.degrees(0.3 - np.pi / 2)
         )
@@ -166,11 +166,11 @@ class TestChirp:
     @each_row(
         "spec",
         [
-            nlctl.Chirp(omega_0=1.0, omega_1=4.0, t_1=2.0),
-            nlctl.Chirp(omega_0=4.0, omega_1=1.0, t_1=2.0),
-            nlctl.Chirp(omega_0=3.0, omega_1=3.0, t_1=2.0),
-            nlctl.Chirp(omega_0=3.0, omega_1=3.0, t_1=2.0, sweep="logarithmic"),
-            nlctl.Chirp(omega_0=1.0, omega_1=4.0, t_1=2.0, sweep="logarithmic"),
+            nlctl.sources.Chirp(omega_0=1.0, omega_1=4.0, t_1=2.0),
+            nlctl.sources.Chirp(omega_0=4.0, omega_1=1.0, t_1=2.0),
+            nlctl.sources.Chirp(omega_0=3.0, omega_1=3.0, t_1=2.0),
+            nlctl.sources.Chirp(omega_0=3.0, omega_1=3.0, t_1=2.0, sweep="logarithmic"),
+            nlctl.sources.Chirp(omega_0=1.0, omega_1=4.0, t_1=2.0, sweep="logarithmic"),
         ],
     )
     def test_its_frequency_is_continuous_and_stays(self, spec):
@@ -191,7 +191,7 @@ class TestChirp:
         """Int_0^T sin(omega_1 t^2 / (2 T)) dt = sqrt(pi T / omega_1) S(sqrt(omega_1 T / pi))."""
         T, omega = 20.0, 30.0
         S, _ = scipy.special.fresnel(np.sqrt(omega * T / np.pi))
-        spec = nlctl.Chirp(omega_0=0.0, omega_1=omega, t_1=T)
+        spec = nlctl.sources.Chirp(omega_0=0.0, omega_1=omega, t_1=T)
         exact = np.sqrt(np.pi * T / omega) * S
         assert integral(spec, T, engine) == pytest.approx(exact, abs=1e-6)
 
@@ -203,7 +203,7 @@ class TestTimeTable:
     def test_straight_lines_are_numpys(self, times, t):
         """And their ends stay, as `numpy.interp` has it."""
         values = np.cos(np.arange(len(times)) * 1.7)
-        spec = nlctl.TimeTable(times=times, values=values)
+        spec = nlctl.sources.TimeTable(times=times, values=values)
         assert value(spec, t)[0] == pytest.approx(np.interp(t, times, values), abs=1e-9)
 
     @given(times)
@@ -211,16 +211,16 @@ class TestTimeTable:
         """Held values are those of the table, bit by bit, and so are lines at their points."""
         values = np.cos(np.arange(len(times)) * 1.7)
         for hold in (False, True):
-            spec = nlctl.TimeTable(times=times, values=values, hold=hold)
+            spec = nlctl.sources.TimeTable(times=times, values=values, hold=hold)
             np.testing.assert_array_equal(value(spec, times), values)
 
     def test_a_held_value_stays_until_the_next(self):
-        spec = nlctl.TimeTable(times=(0, 1, 2), values=(3, 4, 5), hold=True)
+        spec = nlctl.sources.TimeTable(times=(0, 1, 2), values=(3, 4, 5), hold=True)
         np.testing.assert_array_equal(value(spec, [-1, 0.99, 1, 1.99, 2, 9]), [3, 3, 4, 4, 5, 5])
 
     def test_a_periodic_one_repeats(self):
         """Forwards and backwards."""
-        spec = nlctl.TimeTable(times=(1, 2, 4), values=(0, 1, 0), periodic=True)
+        spec = nlctl.sources.TimeTable(times=(1, 2, 4), values=(0, 1, 0), periodic=True)
         t = np.linspace(1, 4, 13)[:-1]
         for k in (-2, 1, 5):
             np.testing.assert_allclose(value(spec, t + 3 * k), value(spec, t), atol=1e-12)
@@ -234,7 +234,7 @@ class TestTimeTable:
             return np.where(s > 0, s - T * (1 - np.exp(-np.maximum(s, 0) / T)), 0.0)
 
         lag = ct.ss(-1 / T, 1 / T, 1, 0, inputs="ref", outputs="y", name="lag")
-        table = nlctl.TimeTable(times=(0, 1, 2), values=(0, 1, 0))
+        table = nlctl.sources.TimeTable(times=(0, 1, 2), values=(0, 1, 0))
         loop = nlctl.interconnect({"table": table, "lag": lag}, outputs=["y"])
         y = nlctl.input_output_response(loop, t, engine=engine).outputs.ravel()
         np.testing.assert_allclose(y, ramp(t) - 2 * ramp(t - 1) + ramp(t - 2), atol=1e-7)
@@ -256,10 +256,10 @@ class TestTimeTable:
 )
 def test_what_is_refused(cls, values, told):
     """By record, rule and value."""
-    with pytest.raises(nlctl.ParameterError, match=rf"^{cls} needs .*{told}"):
-        getattr(nlctl, cls)(**values)
+    with pytest.raises(nlctl.errors.ParameterError, match=rf"^{cls} needs .*{told}"):
+        getattr(nlctl.sources, cls)(**values)
 
 
 def test_the_output_has_the_name_that_it_is_given():
     assert nlctl.Step(outputs="yd").outputs == ("yd",)
-    assert nlctl.block(nlctl.TimeTable(outputs=("load",)), "b").output_labels == ["load"]
+    assert nlctl.block(nlctl.sources.TimeTable(outputs=("load",)), "b").output_labels == ["load"]

@@ -51,7 +51,7 @@ def reaching_time(w_0, k_1, k_2):
 @each_row(("k_1", "k_2"), [(1.0, 2.0), (2.0, 1.1), (1.5, 1.1), (4.0, 1.0)])
 def test_it_reaches_the_surface_when_the_closed_form_says(k_1, k_2):
     """Three with half waves that shrink, one that creeps onto r = 0 from one side."""
-    law, w_0 = nlctl.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=1e-6), 1.0
+    law, w_0 = nlctl.controllers.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=1e-6), 1.0
     loop, expected = loop_of(law), reaching_time(1.0, k_1, k_2)
     times = np.linspace(0, 1.3 * expected, 2601)
     start = nlctl.initial_state(loop, {"law.w": w_0})
@@ -65,7 +65,7 @@ def test_it_reaches_the_surface_when_the_closed_form_says(k_1, k_2):
 @each_row(("slope", "phi"), [(1.0, 0.01), (-3.0, 0.1)])
 def test_behind_a_ramp_the_layer_leaves_phi_times_slope_over_k_2(slope, phi):
     """w' = -slope: r = phi slope / k_2 within the layer; the ramp itself grows without bound."""
-    law = nlctl.SuperTwistingLaw(k_1=3.0, k_2=4.0, phi=phi)
+    law = nlctl.controllers.SuperTwistingLaw(k_1=3.0, k_2=4.0, phi=phi)
     response = nlctl.input_output_response(
         loop_of(law, slope=slope), np.linspace(0, 30, 301), rtol=1e-9, atol=1e-12
     )
@@ -76,7 +76,7 @@ def test_behind_a_ramp_the_layer_leaves_phi_times_slope_over_k_2(slope, phi):
 def test_levants_gains_hold_every_disturbance_of_their_rate():
     """k_1 = 1.5 sqrt(L), k_2 = 1.1 L: |d'| <= L leaves |r| of the layer's size, whatever |d|."""
     L, size, rng = 5.0, 24, np.random.default_rng(2)
-    law = nlctl.SuperTwistingLaw(k_1=1.5 * np.sqrt(L), k_2=1.1 * L, phi=1e-3)
+    law = nlctl.controllers.SuperTwistingLaw(k_1=1.5 * np.sqrt(L), k_2=1.1 * L, phi=1e-3)
     omega = rng.uniform(0.2, 5, size)
     params = {"surface.omega": omega, "surface.a": L / omega}  # |d'| = L, |d| up to 25
     many = nlctl.ensemble_response(
@@ -90,7 +90,7 @@ def test_levants_gains_hold_every_disturbance_of_their_rate():
 @given(numbers, numbers, positive, positive, st.floats(1e-3, 1))
 def test_the_law_is_odd_continuous_and_the_authors_outside_of_the_layer(r, w, k_1, k_2, phi):
     """Against the printed formula where |r| >= phi; (-r, -w) gives -u; no jump at the edges."""
-    law = nlctl.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=phi)
+    law = nlctl.controllers.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=phi)
     p = equation_arguments(law)
     u, rate = law.output(0.0, (w,), (r,), p)[0], law.update(0.0, (w,), (r,), p)[0]
     assert law.output(0.0, (-w,), (-r,), p)[0] == -u
@@ -106,7 +106,10 @@ def test_it_stands_in_the_place_of_the_sliding_mode_law():
     """Example 1 behind its dead zone: the error stays, the input no longer jumps."""
     times = np.linspace(0, 20, 4001)
     found = {}
-    for law in (nlctl.SlidingModeLaw(K=12.0, phi=0.01), nlctl.SuperTwistingLaw()):
+    for law in (
+        nlctl.controllers.SlidingModeLaw(K=12.0, phi=0.01),
+        nlctl.controllers.SuperTwistingLaw(),
+    ):
         loop = nlctl.paper.example_1(controller=nlctl.sliding_mode(law=law), actuator=nlctl.Gain())
         response = nlctl.input_output_response(loop, times)
         e, u = (response.outputs[loop.output_index[name]] for name in ("e", "u"))

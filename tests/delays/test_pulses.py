@@ -85,7 +85,7 @@ def test_a_jump_of_how_a_delay_varies_is_refused_wherever_it_is(place):
     loop = integrated(delay=2.0, varying=lambda t: -0.5 * (t >= place))
     for engine in ENGINES:
         with pytest.raises(
-            nlctl.ParameterError, match=r"continuous variation, got a jump .* to -0.5"
+            nlctl.errors.ParameterError, match=r"continuous variation, got a jump .* to -0.5"
         ):
             nlctl.input_output_response(loop, [0, 5], np.zeros(2), 0, engine=engine)
 

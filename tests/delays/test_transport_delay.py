@@ -263,7 +263,7 @@ def test_a_delay_longer_than_the_run_shows_the_history_alone():
     ],
 )
 def test_bad_fields_are_refused_in_one_sentence(fields, message):
-    with pytest.raises(nlctl.ParameterError, match=message):
+    with pytest.raises(nlctl.errors.ParameterError, match=message):
         nlctl.TransportDelay(**fields)
 
 
@@ -271,15 +271,15 @@ def test_bad_fields_are_refused_in_one_sentence(fields, message):
 @pytest.mark.parametrize("history", [lambda t: np.nan, lambda t: [0.0, 1.0], lambda t: 1 / 0])
 def test_a_bad_history_is_refused_by_the_block(engine, history):
     loop, x0 = delayed_integrator(delay=0.5, history=history)
-    with pytest.raises(nlctl.ParameterError, match="needs a history"):
+    with pytest.raises(nlctl.errors.ParameterError, match="needs a history"):
         nlctl.input_output_response(loop, [0, 1], 0, x0, engine=engine)
 
 
 def test_bad_delays_of_a_run_are_refused():
     loop, x0 = delayed_integrator(delay=0.5)
-    with pytest.raises(nlctl.ParameterError, match=r"delay > 0, got 0 \(block 'wire'\)"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"delay > 0, got 0 \(block 'wire'\)"):
         nlctl.input_output_response(loop, [0, 1], 0, x0, params={"wire.delay": 0.0})
-    with pytest.raises(nlctl.ParameterError, match=r"member 1"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"member 1"):
         nlctl.ensemble_response(loop, [0, 1], params={"wire.delay": np.array([0.1, -1.0])})
 
 
@@ -298,20 +298,20 @@ def test_linearization_is_refused_and_names_the_delay():
     wire = nlctl.block(nlctl.TransportDelay(delay=0.5), "wire")
     plant = ct.ss(0, 1, 1, 0, inputs="y", outputs="x", name="plant")
     system = ct.interconnect([wire, plant], inputs=["u"], outputs=["x"])
-    with pytest.raises(nlctl.CompileError, match=r"transport delays 'wire'.*ct\.pade"):
+    with pytest.raises(nlctl.errors.CompileError, match=r"transport delays 'wire'.*ct\.pade"):
         nlctl.compile(system).linearize([0.0], [0.0])
 
 
 def test_the_stiff_method_is_refused():
     loop, x0 = delayed_integrator(delay=0.5)
-    with pytest.raises(nlctl.ParameterError, match="tsit5"):
+    with pytest.raises(nlctl.errors.ParameterError, match="tsit5"):
         nlctl.input_output_response(loop, [0, 1], 0, x0, method="rodas5p")
 
 
 def test_discrete_time_is_refused():
-    with pytest.raises(nlctl.ParameterError, match="continuous time"):
+    with pytest.raises(nlctl.errors.ParameterError, match="continuous time"):
         nlctl.block(nlctl.TransportDelay(delay=0.5), "wire", dt=0.1)
     wire = nlctl.block(nlctl.TransportDelay(delay=0.5), "wire")
     for engine in ENGINES:
-        with pytest.raises(nlctl.DiagramError, match="continuous time"):
+        with pytest.raises(nlctl.errors.DiagramError, match="continuous time"):
             nlctl.input_output_response(nlctl.sampled(wire, 0.1), [0, 1], 0, engine=engine)

@@ -163,12 +163,12 @@ def test_members_differ_in_their_delay_and_have_the_same_bits_on_any_number_of_t
 def test_what_cannot_vary_so_is_refused_by_both_engines(fields, message):
     loop, x0 = delayed(-1.0, delay=2.0, **fields)
     for engine in ENGINES:
-        with pytest.raises(nlctl.ParameterError, match=message):
+        with pytest.raises(nlctl.errors.ParameterError, match=message):
             nlctl.input_output_response(loop, [0, 5], 0, x0, engine=engine)
 
 
 def test_a_constant_is_not_a_function():
-    with pytest.raises(nlctl.ParameterError, match="a constant belongs to delay"):
+    with pytest.raises(nlctl.errors.ParameterError, match="a constant belongs to delay"):
         nlctl.TransportDelay(varying=0.2)
 
 

@@ -73,7 +73,7 @@ def test_params_of_records_are_checked_and_kept_in_a_larger_diagram():
     outer = nlctl.interconnect([inner], inputs=["u"], outputs=["v"], name="out")
     assert nlctl.input_output_response(outer, [0, 1], 1.0).outputs[-1] == 3.0
     assert nlctl.parameters(outer)["value"]["in.gain.k"] == 3.0
-    with pytest.raises(nlctl.ParameterError, match="b_r >= 0, got -1"):
+    with pytest.raises(nlctl.errors.ParameterError, match="b_r >= 0, got -1"):
         nlctl.interconnect(
             {"zone": nlctl.DeadZone()}, inputs=["u"], outputs=["v"], params={"zone.b_r": -1.0}
         )
@@ -88,18 +88,20 @@ def test_every_output_of_every_block_without_an_outlist():
 @each_row(
     ("lists", "error", "message"),
     [
-        ({"connections": [["b.u", "a.z"]]}, nlctl.UnknownNameError, "signal 'z' of block 'a'"),
-        ({"connections": [["c.u", "a.x"]]}, nlctl.UnknownNameError, "block 'c' in 'c.u'"),
-        ({"connections": [["b.u", "a.x"]]}, nlctl.DiagramError, "'u' of block 'a' is fed by"),
+        ({"connections": [["b.u", "a.z"]]}, nlctl.errors.UnknownNameError,
+         "signal 'z' of block 'a'"),
+        ({"connections": [["c.u", "a.x"]]}, nlctl.errors.UnknownNameError, "block 'c' in 'c.u'"),
+        ({"connections": [["b.u", "a.x"]]}, nlctl.errors.DiagramError,
+         "'u' of block 'a' is fed by"),
         (
-            {"connections": [["b.u", "a.x"]], "inplist": "b.x"}, nlctl.DiagramError,
+            {"connections": [["b.u", "a.x"]], "inplist": "b.x"}, nlctl.errors.DiagramError,
             "cannot connect these lists",
         ),
         (
             {"connections": [["b.u", "a.x"]], "inplist": "a.u", "params": {"a.ta": 1}},
-            nlctl.UnknownNameError, "nearest: 'a.tau'",
+            nlctl.errors.UnknownNameError, "nearest: 'a.tau'",
         ),
-        ({"inplist": ["ab"]}, nlctl.UnknownNameError, "'ab' in a list of connections"),
+        ({"inplist": ["ab"]}, nlctl.errors.UnknownNameError, "'ab' in a list of connections"),
     ],
 )  # fmt: skip
 def test_mistakes_are_refused_by_name(lists, error, message):
@@ -146,6 +148,6 @@ def test_a_memory_keeps_its_law_under_other_names():
 )
 def test_names_that_cannot_be_given_are_refused(names, message):
     """Too many, empty ones, those that look like a path, and of signals that do not exist."""
-    with pytest.raises(nlctl.UsageError) as error:
+    with pytest.raises(nlctl.errors.UsageError) as error:
         nlctl.block(nlctl.Lag(), "lag", **names)
     assert message in str(error.value)

@@ -5,7 +5,7 @@ import pytest
 from small_systems import chain, gain, out
 
 import nlctl
-from nlctl import UnknownNameError
+from nlctl.errors import UnknownNameError
 from nlctl.names import Parameters
 
 MAKERS = {"control": ct.interconnect, "nlctl": nlctl.interconnect}

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from small_systems import chain, gain, out, third_party
 
 import nlctl
-from nlctl import AmbiguousNameError, UnknownNameError
 from nlctl.diagrams import leaves
+from nlctl.errors import AmbiguousNameError, UnknownNameError
 from nlctl.paper import example_1, example_2
 
 MAKERS = [ct.interconnect, nlctl.interconnect]
@@ -97,7 +97,9 @@ class TestForeignBlocks:
 
 def two_controllers():
     """Make a diagram with states on two levels, some of them third-party."""
-    one = nlctl.interconnect({"law": nlctl.NussbaumLaw()}, inputs=LAW, outputs=["u"], name="c1")
+    one = nlctl.interconnect(
+        {"law": nlctl.controllers.NussbaumLaw()}, inputs=LAW, outputs=["u"], name="c1"
+    )
     two = one.copy(name="c2")
     two.update_names(inputs=[f"{s}2" for s in LAW], outputs=["u2"])
     theirs = ct.tf(1, [1, 2, 1], inputs="u", outputs="w", name="filter")
@@ -198,7 +200,7 @@ class TestExamples:
         for name, make in nlctl.paper.EXAMPLES.items():
             assert make().name == name
             assert nlctl.paper.named_example(name.replace("_", "-")) is make
-        with pytest.raises(nlctl.UnknownNameError, match="'example-3'; nearest: 'example-"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="'example-3'; nearest: 'example-"):
             nlctl.paper.named_example("example-3")
 
     @pytest.mark.parametrize("order", PAPER)
@@ -244,7 +246,7 @@ class TestExamples:
         make = PAPER[order]
         values = {c: probe(make(centres=c))[0]["u"] for c in ("diagonal", "3x9", "9x3", "27")}
         assert len(set(values.values())) == 4
-        array = nlctl.grid_centres([3, 9])
+        array = nlctl.controllers.grid_centres([3, 9])
         assert probe(make(centres=array))[0]["u"] == values["3x9"]
         default = {2: "diagonal", 3: "3x3x3"}[order]
         assert probe(make(centres=default))[0] == probe(make())[0]
@@ -254,7 +256,9 @@ class TestExamples:
         """e = y + n_1 - yd with the noise of signal 1, and y itself as before."""
         takes = tuple(f"x{i + 1}" for i in range(order))
         names = {"inputs": takes, "outputs": tuple(f"{s}_measured" for s in takes)}
-        sensors = (nlctl.BandLimitedNoise(**names, seed=5, rms=rms) for rms in (0.1, 0.0))
+        sensors = (
+            nlctl.references.BandLimitedNoise(**names, seed=5, rms=rms) for rms in (0.1, 0.0)
+        )
         noisy, silent = (probe(PAPER[order](sensor=sensor))[0] for sensor in sensors)
         clean, _, _ = probe(PAPER[order]())
         n = nlctl.functions.band_limited(0.1, low=0, high=50, seed=[5, 0])(0.7)

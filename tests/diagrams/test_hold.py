@@ -70,7 +70,9 @@ def test_in_discrete_time_inputs_are_held_anyway():
 def test_another_word_is_refused():
     """With the two that there are."""
     for run in (nlctl.input_output_response, nlctl.ensemble_response):
-        with pytest.raises(nlctl.ParameterError, match="hold to be 'foh' or 'zoh', got 'zero'"):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match="hold to be 'foh' or 'zoh', got 'zero'"
+        ):
             run(OSCILLATOR, T, 0.0, hold="zero")
 
 
@@ -136,5 +138,5 @@ def test_arguments_that_do_not_exist_are_refused():
     lag = nlctl.block(nlctl.Lag(), "lag")
     with pytest.raises(TypeError, match="unknown argument 't_eval' of ensemble_response"):
         nlctl.ensemble_response(lag, T, t_eval=[0.0])
-    with pytest.raises(nlctl.ParameterError, match="given twice"):
+    with pytest.raises(nlctl.errors.ParameterError, match="given twice"):
         nlctl.ensemble_response(lag, T, T=T)

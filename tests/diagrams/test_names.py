@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from small_systems import chain, gain, out
 
 import nlctl
-from nlctl import AmbiguousNameError, ParameterError, UnknownNameError
+from nlctl.errors import AmbiguousNameError, ParameterError, UnknownNameError
 
 MAKERS = [ct.interconnect, nlctl.interconnect]
 makers = pytest.mark.parametrize("join", MAKERS, ids=["control", "nlctl"])
@@ -151,7 +151,7 @@ class TestNested:
         c2.update_names(inputs=["m"])
         try:
             top = nlctl.interconnect([c1, c2], inputs=["u"], outputs=["y"])
-        except nlctl.DiagramError:
+        except nlctl.errors.DiagramError:
             return
         assert out(top) == 4.0
         assert out(top, {"c1.law.k": 10.0}) == 20.0

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl import AmbiguousNameError, ParameterError, UnknownNameError
 from nlctl.analysis.robustness import Space, Uncertain, resolved
 from nlctl.diagrams import leaves
+from nlctl.errors import AmbiguousNameError, ParameterError, UnknownNameError
 from nlctl.upstream.control_internals import current_parameters
 
 T = np.linspace(0.0, 1.0, 11)

@@ -106,5 +106,5 @@ def test_a_relative_tolerance_of_one_is_refused(name, rtol, file, monkeypatch):
     monkeypatch.setitem(globals(), "study_file", file)
     if name == "study" and rtol is True:
         rtol = 1.0
-    with pytest.raises(nlctl.UsageError, match=r"rtol|less than 1"):
+    with pytest.raises(nlctl.errors.UsageError, match=r"rtol|less than 1"):
         ENTRIES[name](rtol)

@@ -133,7 +133,7 @@ def test_proofs_write_nothing_into_a_users_loop(enter):
     """Another thread may run it meanwhile, with parameters of its own."""
     loop = nlctl.paper.example_1()
     before = parameters_now(loop)
-    with contextlib.suppress(nlctl.UsageError):  # refused or not, nothing was written
+    with contextlib.suppress(nlctl.errors.UsageError):  # refused or not, nothing was written
         enter(loop)
     assert parameters_now(loop) == before
 

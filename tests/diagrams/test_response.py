@@ -22,7 +22,7 @@ def escaping_plant(x0):
 @pytest.mark.parametrize("method", ["LSODA", "RK45", "DOP853"])
 def test_finite_escape_is_reported_with_its_time(method):
     """x' = x^2 from 1 escapes at t = 1: an error with that time, no calm response."""
-    with pytest.raises(nlctl.DivergedError, match="'plant' diverged") as caught:
+    with pytest.raises(nlctl.errors.DivergedError, match="'plant' diverged") as caught:
         nlctl.input_output_response(escaping_plant(1.0), [0, 0.5, 2], method=method)
     assert caught.value.time == pytest.approx(1, abs=1e-6)
 
@@ -37,7 +37,7 @@ def test_before_the_escape_the_solution_is_the_closed_form():
 def test_overflow_of_the_nussbaum_gain_is_divergence_with_a_time():
     """exp(zeta^2) overflows at 26.64: neither an exception from inside nor calm numbers."""
     loop = nlctl.paper.example_1()
-    with pytest.raises(nlctl.DivergedError, match=r"after t = 0"):
+    with pytest.raises(nlctl.errors.DivergedError, match=r"after t = 0"):
         nlctl.input_output_response(loop, [0, 0.1], 0, {"law.zeta": 30.0})
 
 
@@ -54,7 +54,7 @@ def test_an_algebraic_loop_keeps_its_own_message():
 @each_row("times", [[0], [], [0, 1, 1], [1, 0], [0, np.nan], [0, np.inf], [[0, 1], [2, 3]]])
 def test_bad_time_grids_are_refused(times):
     """Times must be finite, increasing, at least two."""
-    with pytest.raises(nlctl.ParameterError, match="timepts needs"):
+    with pytest.raises(nlctl.errors.ParameterError, match="timepts needs"):
         nlctl.input_output_response(escaping_plant(0.1), times)
 
 

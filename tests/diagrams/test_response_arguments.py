@@ -31,7 +31,7 @@ numbers = st.floats(-3, 3)
 
 def simulate(system, *arguments: Any, **how: Any) -> Any:
     """Run a compiled diagram as it is, any other in python-control by default."""
-    if not isinstance(system, nlctl.Compiled | list):
+    if not isinstance(system, nlctl.native.Compiled | list):
         how = {"engine": "python-control"} | how
     return nlctl.input_output_response(system, *arguments, **how)
 
@@ -169,7 +169,7 @@ class TestAsInPythonControl:
 
         (first,) = simulate(COMPILED["sampled"], t, np.sin(t), 1.0, t_eval=[0.3]).time
         assert first == 0.3
-        with pytest.raises(nlctl.ParameterError, match="needs two times, got one"):
+        with pytest.raises(nlctl.errors.ParameterError, match="needs two times, got one"):
             simulate(SAMPLED, t, np.sin(t), 1.0, t_eval=[0.3])
 
     def test_the_steps_of_the_integrator(self):
@@ -264,20 +264,22 @@ class TestRefused:
     def test_in_machine_code(self, how, told):
         """Of a compiled diagram, and of one that is to run as machine code."""
         for system, engine in ((COMPILED["three"], None), (THREE, "native")):
-            with pytest.raises(nlctl.ParameterError, match=told):
+            with pytest.raises(nlctl.errors.ParameterError, match=told):
                 simulate(system, T, engine=engine, **how)
 
     @pytest.mark.parametrize(("how", "told"), REFUSED_BY_BOTH)
     @pytest.mark.parametrize("engine", ENGINES)
     def test_in_both_engines(self, engine, how, told):
         """With the same words."""
-        with pytest.raises(nlctl.ParameterError, match=told):
+        with pytest.raises(nlctl.errors.ParameterError, match=told):
             simulate(system_for("three", engine), T, **how)
 
     @pytest.mark.parametrize("how", [{"max_steps": 10}, {"step": 0.1}])
     def test_in_python_control(self, how):
         """Settings of machine code."""
-        with pytest.raises(nlctl.ParameterError, match="has no meaning in python-control: engine="):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match="has no meaning in python-control: engine="
+        ):
             simulate(ONE, T, **how)
 
     @pytest.mark.parametrize("engine", ENGINES)
@@ -285,21 +287,23 @@ class TestRefused:
         """The nearest name is given; it is Python's own kind of error as well."""
         system = system_for("one", engine)
         told = "unknown argument 'sqeeze' of input_output_response; nearest: 'squeeze'"
-        with pytest.raises(nlctl.UnknownNameError, match=told):
+        with pytest.raises(nlctl.errors.UnknownNameError, match=told):
             simulate(system, T, sqeeze=True)
         with pytest.raises(TypeError, match=r"'initial_states'.*nearest: 'initial_state'"):
             simulate(system, T, initial_states=[1.0])
-        with pytest.raises(nlctl.ParameterError, match="timepts is missing"):
+        with pytest.raises(nlctl.errors.ParameterError, match="timepts is missing"):
             simulate(system)
 
     def test_an_unknown_keyword_for_scipy(self):
         """In ``solve_ivp_kwargs``."""
-        with pytest.raises(nlctl.UnknownNameError, match=r"'rtoll' in solve_ivp_kwargs.*'rtol'"):
+        with pytest.raises(
+            nlctl.errors.UnknownNameError, match=r"'rtoll' in solve_ivp_kwargs.*'rtol'"
+        ):
             simulate(COMPILED["one"], T, solve_ivp_kwargs={"rtoll": 1e-3})
 
     def test_what_is_no_diagram(self):
         """A list of diagrams, which python-control would run one by one."""
-        with pytest.raises(nlctl.ParameterError, match=r"system needs a diagram .*got list"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"system needs a diagram .*got list"):
             simulate([ONE, THREE], T)
 
 
@@ -309,15 +313,17 @@ class TestEnsembles:
     def test_values_that_are_no_numbers(self):
         """The member is named."""
         run: Any = nlctl.ensemble_response
-        with pytest.raises(nlctl.ParameterError, match=r"nan at 'three\.q', member 1"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"nan at 'three\.q', member 1"):
             run(COMPILED["three"], T, 0, {"q": [0.0, np.nan]})
-        with pytest.raises(nlctl.ParameterError, match=r"inf at 'three\.q':"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"inf at 'three\.q':"):
             run(COMPILED["three"], T, 0, {"q": np.inf})
-        with pytest.raises(nlctl.ParameterError, match=r"'three\.q' needs a number, or one for"):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match=r"'three\.q' needs a number, or one for"
+        ):
             run(COMPILED["three"], T, 0, {"q": [[0.0]]})
-        with pytest.raises(nlctl.ParameterError, match="inputs has nan at 'c', t = 0 s"):
+        with pytest.raises(nlctl.errors.ParameterError, match="inputs has nan at 'c', t = 0 s"):
             run(COMPILED["three"], T, [0.0, 1.0, np.nan])
-        with pytest.raises(nlctl.ParameterError, match=r"needs real numbers, got '0.5'"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"needs real numbers, got '0.5'"):
             run(COMPILED["three"], T, 0, "0.5")
-        with pytest.raises(nlctl.ParameterError, match=r"nan at 'three\.p.*\(member 1\)"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"nan at 'three\.p.*\(member 1\)"):
             run(COMPILED["three"], T, 0, [[0.0, 1.0], [np.nan, 1.0]])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl.native.diagram.schedule import AlgebraicLoopError
+from nlctl.errors import AlgebraicLoopError
 
 
 def static(name, depends):

@@ -47,13 +47,13 @@ def test_what_nothing_reads_is_refused(run, name):
     linear = ct.ss(-1.0, 1.0, 1.0, 0.0, inputs="y", outputs="z", name="linear")
     held = nlctl.sampled(nlctl.block(nlctl.Gain(), "held"), 0.05)
     for diagram in (loop(), loop(linear), nlctl.block(nlctl.Gain(), "gain"), held):
-        with pytest.raises(nlctl.UnknownNameError, match=rf"unknown parameter '{name[:3]}"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match=rf"unknown parameter '{name[:3]}"):
             run(diagram, {name: 1.0})
 
 
 def test_the_proof_refuses_it_too():
     """Whatever reads a loop for the ledger, a certificate or constants reads its parts first."""
-    with pytest.raises(nlctl.UnknownNameError, match="unknown parameter 'gain'"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="unknown parameter 'gain'"):
         read_parts(nlctl.paper.example_1(), params={"gain": 1.0})
 
 

@@ -24,6 +24,7 @@ SCRIPTS = GALLERY + sorted([*DOCS.glob("tutorials/*.py"), *DOCS.glob("how-to/*.p
 PUBLIC = [
     *(
         "nlctl",
+        "nlctl.errors",
         "nlctl.paper",
         *(f"nlctl.papers.{name}" for name in ("tabuada_2007", "karason_1994", "chowdhary_2010")),
         "nlctl.papers.canudas_de_wit_1995",

@@ -37,7 +37,7 @@ def extremum_seeking():
         lambda t, x, u, p: [-x[0] + 1.0 - (u[0] - 2.0) ** 2], lambda t, x, u, p: x[:1],
         inputs="u", outputs="y", states=1, name="plant",
     )  # fmt: skip
-    law = nlctl.block(nlctl.ExtremumSeeking(), "law")
+    law = nlctl.block(nlctl.controllers.ExtremumSeeking(), "law")
     return law, plant
 
 
@@ -216,7 +216,7 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_a_target_cannot_hold_is_refused_by_name(name):
     law, keywords, words = REFUSED[name]
-    with pytest.raises((ParameterError, CompileError, nlctl.UnknownNameError)) as error:
+    with pytest.raises((ParameterError, CompileError, nlctl.errors.UnknownNameError)) as error:
         export_controller(a_loop(law()), **{"block": "law", **keywords})
     assert words in str(error.value)
 

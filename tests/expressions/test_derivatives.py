@@ -151,16 +151,18 @@ def test_along_parameters():
         wanted = extrapolated(at, 0.05)
         np.testing.assert_allclose(found[:, k], wanted, rtol=1e-9, atol=1e-9)
     assert outputs.shape == (loop.noutputs, 3)
-    with pytest.raises(nlctl.UnknownNameError, match=r"plant\.p1"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=r"plant\.p1"):
         compiled.parameter_jacobian(["plant.p11"], x)
 
 
 def test_what_follows_from_a_parameter_outside_of_the_equations_is_refused():
     """The inverse's weights follow from those of the operator."""
-    compiled = nlctl.compile(nlctl.block(nlctl.PrandtlIshlinskiiInverse(), "inverse"))
+    compiled = nlctl.compile(nlctl.block(nlctl.actuators.PrandtlIshlinskiiInverse(), "inverse"))
     x = np.zeros(compiled.system.nstates)
     for name in ("inverse.w_0", "inverse.w[0]", "inverse.r[1]"):
-        with pytest.raises(nlctl.CompileError, match=r"'[WR]_?0?' of block 'inverse' follows"):
+        with pytest.raises(
+            nlctl.errors.CompileError, match=r"'[WR]_?0?' of block 'inverse' follows"
+        ):
             compiled.parameter_jacobian([name], x, [3.0])
     sines = nlctl.compile(nlctl.block(nlctl.SumOfSines(order=2), "reference"))
     _, outputs = sines.parameter_jacobian(["reference.amplitudes[1]"], [], t=0.3)
@@ -230,7 +232,7 @@ def test_an_operating_point_is_taken():
     np.testing.assert_allclose(
         nlctl.compile(pendulum).linearize(point).A, [[0, 1], [-np.cos(np.pi / 6), 0]], rtol=1e-15
     )
-    with pytest.raises(nlctl.ParameterError, match="u0 needs 1 finite"):
+    with pytest.raises(nlctl.errors.ParameterError, match="u0 needs 1 finite"):
         nlctl.compile(pendulum).linearize([0.0, 0.0], [1.0, 2.0])
 
 

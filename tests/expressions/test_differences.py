@@ -43,7 +43,9 @@ def expected(x, e):
 def test_a_loop_with_one_opaque_block_is_linearized():
     """-J_1 by differences, the lag's matrices to the last bit; a warning names the block."""
     x = [0.7, -0.4, 0.1]
-    with pytest.warns(nlctl.InexactWarning, match=r"update function of block 'opaque' .*j0.*exact"):
+    with pytest.warns(
+        nlctl.errors.InexactWarning, match=r"update function of block 'opaque' .*j0.*exact"
+    ):
         linear = nlctl.linearize(looped(), x, [0.3])
     A, B = expected(x, 0.3)
     np.testing.assert_allclose(linear.A, A, **CLOSE)
@@ -83,10 +85,10 @@ def test_parameters_and_long_states_are_moved_as_well():
     many = ct.nlsys(lambda t, x, u, p: -p["k"] * special.j0(x), None, inputs=1, outputs=11,
                     states=11, params={"k": 2.0}, name="many")  # fmt: skip
     x = np.linspace(-30.0, 30.0, 11)
-    with pytest.warns(nlctl.InexactWarning):
+    with pytest.warns(nlctl.errors.InexactWarning):
         linear = nlctl.linearize(many, x)
     np.testing.assert_allclose(linear.A, np.diag(2.0 * special.j1(x)), rtol=0, atol=1e-7)
-    with pytest.warns(nlctl.InexactWarning):
+    with pytest.warns(nlctl.errors.InexactWarning):
         rates, _ = nlctl.compile(many).parameter_jacobian(["many.k"], x)
     np.testing.assert_allclose(rates[:, 0], -special.j0(x), **CLOSE)
 

@@ -43,7 +43,7 @@ def test_no_symbol_has_two_subscripts():
         discrete = {"dt": True} if getattr(spec, "discrete", False) else {}
         try:
             (shown,) = nlctl.typeset(nlctl.block(spec, "b", **discrete))
-        except nlctl.CompileError:  # a memory, which has no formula
+        except nlctl.errors.CompileError:  # a memory, which has no formula
             continue
         for line in (*shown.equations, *shown.where):
             assert not re.search(r"_\{(?:[^{}]|\{[^{}]*\})*\}_", line), (name, line)
@@ -207,5 +207,5 @@ def test_what_has_no_formula_is_refused():
         inputs=0,
         name="odd",
     )
-    with pytest.raises(nlctl.CompileError, match="block 'odd' has no formula"):
+    with pytest.raises(nlctl.errors.CompileError, match="block 'odd' has no formula"):
         nlctl.typeset(odd)

@@ -363,7 +363,9 @@ def test_a_fault_in_discrete_time():
     times = 0.1 * np.arange(8)
     made = run(nlctl.with_faults(diagram, fault), times, 1.0)
     np.testing.assert_allclose(made.outputs, [0, 1, 1.5, 1.75, 1.875, 1.9375, 0.96875, 0.484375])
-    with pytest.raises(nlctl.ParameterError, match=r"continuous time, 'sampled' has dt = 0\.1"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match=r"continuous time, 'sampled' has dt = 0\.1"
+    ):
         nlctl.with_faults(diagram, nlctl.Fault("half.u", "stuck", at=0.45))
 
 
@@ -467,17 +469,19 @@ def test_a_bad_fault_is_refused_in_one_sentence(arguments, more, message):
 def test_a_fault_on_an_unknown_signal_names_the_nearest(signal, when, message):
     """And so does a condition."""
     at = None if when else 1.0
-    with pytest.raises(nlctl.UnknownNameError, match=message):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=message):
         nlctl.with_faults(loop(), nlctl.Fault(signal, "bias", 1.0, at=at, when=when))
 
 
 def test_what_is_no_diagram_or_no_fault_is_refused():
     """A block, and a tuple."""
-    with pytest.raises(nlctl.DiagramError, match="needs a diagram, got the block 'lag'"):
+    with pytest.raises(nlctl.errors.DiagramError, match="needs a diagram, got the block 'lag'"):
         nlctl.with_faults(nlctl.block(Lag(), "lag"), KINDS["bias"][0])
-    with pytest.raises(nlctl.ParameterError, match="needs faults"):
+    with pytest.raises(nlctl.errors.ParameterError, match="needs faults"):
         nlctl.with_faults(loop(), ("wave.s", "bias"))
-    with pytest.raises(nlctl.AmbiguousNameError, match=r"controller\.law\.u or controller\.u"):
+    with pytest.raises(
+        nlctl.errors.AmbiguousNameError, match=r"controller\.law\.u or controller\.u"
+    ):
         nlctl.with_faults(nlctl.paper.example_1(), nlctl.Fault("u", "bias", 1.0, at=1.0))
 
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from rows import each_row
 from scipy.integrate import quad, solve_ivp
 
-from nlctl import ParameterError
 from nlctl.analysis.lyapunov import aftermath
 from nlctl.analysis.lyapunov.nussbaum.outcome import outcome
 from nlctl.analysis.lyapunov.nussbaum.property import lobe_around
 from nlctl.analysis.lyapunov.nussbaum.slow_drift import Balance, SlowDrift
+from nlctl.errors import ParameterError
 from nlctl.functions import nussbaum_integral
 
 BETA = 2.0

@@ -141,9 +141,9 @@ def test_a_set_that_closes_on_another_box_is_not_called_false():
     """Example 1 with gains that close, whatever box it was examined on."""
     controller = nlctl.adaptive_neural(
         2,
-        basis=nlctl.GaussianBasis(centres=nlctl.paper.paper_centres("diagonal", 2)),
-        weights=nlctl.AdaptiveWeights(nodes=27, Gamma=10.0),
-        robust=nlctl.RobustTerm(gamma=1e5, sigma_2=1e-4),
+        basis=nlctl.controllers.GaussianBasis(centres=nlctl.paper.paper_centres("diagonal", 2)),
+        weights=nlctl.controllers.AdaptiveWeights(nodes=27, Gamma=10.0),
+        robust=nlctl.controllers.RobustTerm(gamma=1e5, sigma_2=1e-4),
     )
     loop = nlctl.paper.example_1(controller=controller)
     for sides in ((0.6, 0.6), (1.0, 1.1), (3.0, 5.0)):

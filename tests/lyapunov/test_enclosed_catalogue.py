@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl import ParameterError
 from nlctl.analysis.lyapunov import Box, certify, enclose, prove_decrease
+from nlctl.errors import ParameterError
 
 FUNCTIONS = {
     "sign": lambda x, y: np.sign(x) + 0.5 * np.sign(y - 1),
@@ -114,14 +114,16 @@ def test_plants_of_order_one_have_certificates(name, law):
     """The filtered error of order 1 is e itself; what runs do stays within."""
     plant = nlctl.PureFeedback(order=1, f=nlctl.equation(FRICTIONS[name]))
     if law == "sliding mode":
-        own = nlctl.SlidingModeLaw(K=6.0, phi=0.2)
-        controller = nlctl.controllers.sliding_mode(nlctl.FilteredError(lambdas=()), own)
+        own = nlctl.controllers.SlidingModeLaw(K=6.0, phi=0.2)
+        controller = nlctl.controllers.sliding_mode(
+            nlctl.controllers.FilteredError(lambdas=()), own
+        )
     else:
         controller = nlctl.adaptive_neural(
             1,
-            law=nlctl.KnownSignLaw(N_0=2.0),
-            weights=nlctl.AdaptiveWeights(Gamma=10.0),
-            robust=nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5),
+            law=nlctl.controllers.KnownSignLaw(N_0=2.0),
+            weights=nlctl.controllers.AdaptiveWeights(Gamma=10.0),
+            robust=nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5),
         )
     blocks = {
         "reference": nlctl.SumOfSines(order=1, amplitudes=0.2, frequencies=1.0, phases=0.0),

@@ -31,7 +31,7 @@ FUNCTIONS = {
         lambda x: -0.25 * 2**0.25 * (1 + x) ** -1.25,
     ),
 }
-PLANTS = {"duffing": nlctl.ForcedDuffing(), "genesio": nlctl.Genesio()}
+PLANTS = {"duffing": nlctl.plants.ForcedDuffing(), "genesio": nlctl.plants.Genesio()}
 share = st.floats(0, 1)
 
 
@@ -71,7 +71,7 @@ def test_a_plant_equation_on_balls_encloses_itself_on_numbers(name, data):
 
 def test_the_gaussian_basis_works_on_balls():
     """Arrays of balls go through the equations of vector blocks."""
-    basis = nlctl.GaussianBasis()
+    basis = nlctl.controllers.GaussianBasis()
     p = equation_arguments(basis)
     balls = np.array([interval(0.1, 0.2), interval(-0.3, 0.0)], dtype=object)
     psi = basis.output(0.0, (), balls, p)
@@ -160,7 +160,7 @@ def test_a_function_without_value_has_no_bound():
 def test_a_disturbance_is_bounded_for_all_time():
     """q cos(w t) with q = 5 + 0.1 cos t stays within 5.1, chirp or not."""
     for integrate in (False, True):
-        plant = nlctl.ForcedDuffing(integrate_w=integrate, d_amplitude=0.0)
+        plant = nlctl.plants.ForcedDuffing(integrate_w=integrate, d_amplitude=0.0)
         p = equation_arguments(plant)
         found = enclose(lambda z, f=plant.d, p=p: f((0, 0), z[0], p), Box.of(t=(0, np.inf)))
         assert found.magnitude == pytest.approx(5.1, abs=1e-6)

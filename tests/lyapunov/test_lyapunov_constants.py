@@ -89,7 +89,7 @@ def test_a_disturbance_over_a_finite_time_is_no_larger():
     """Over 2 s the forcing and d have not met their worst phases together."""
     box = BOX_1.only("x1", "x2")
     finite, always = (
-        disturbance(nlctl.ForcedDuffing(), box, (0, end), tol=1e-2) for end in (2.0, np.inf)
+        disturbance(nlctl.plants.ForcedDuffing(), box, (0, end), tol=1e-2) for end in (2.0, np.inf)
     )
     assert finite.magnitude <= always.magnitude
     assert finite.low > always.low
@@ -120,7 +120,7 @@ def test_without_sigma_modification_there_is_no_bound():
 
 def test_a_network_may_be_left_out():
     """W_hat vanishes from V and its rate sigma_1 Gamma from alpha_1; eps* is sup |g|."""
-    silent = nlctl.Zero(outputs=("W_psi", "W_norm"))
+    silent = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
     c = constants(example(1, controller=nlctl.adaptive_neural(2, weights=silent)), BOX_1)
     assert c.W.size == 0
     assert c["eps*"] == pytest.approx(given_weights()["eps*"], abs=1e-3)
@@ -186,13 +186,13 @@ def test_a_visited_box_contains_what_was_visited():
 def test_a_loop_outside_the_proof_is_refused_by_name():
     """A sensor, no robust term, a third-party diagram, saturation."""
     with pytest.raises(DiagramError, match="block 'sensor'"):
-        constants(example(1, sensor=nlctl.BandLimitedNoise()), BOX_1)
-    silent = nlctl.Zero(outputs=("robust", "delta_hat"))
+        constants(example(1, sensor=nlctl.references.BandLimitedNoise()), BOX_1)
+    silent = nlctl.controllers.Zero(outputs=("robust", "delta_hat"))
     with pytest.raises(
         DiagramError, match=r"needs gamma, sigma_2, tau of block 'controller.robust'"
     ):
         constants(example(1, controller=nlctl.adaptive_neural(2, robust=silent)), BOX_1)
-    plant_alone = nlctl.interconnect({"plant": nlctl.ForcedDuffing()}, inputs=["v"])
+    plant_alone = nlctl.interconnect({"plant": nlctl.plants.ForcedDuffing()}, inputs=["v"])
     with pytest.raises(DiagramError, match="output r"):
         constants(plant_alone, BOX_1)
     with pytest.raises(DecompositionError, match="Limiter has no known split"):

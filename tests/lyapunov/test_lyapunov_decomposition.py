@@ -161,7 +161,7 @@ def test_a_declared_split_is_used_and_a_wrong_one_refuted():
 
 def test_a_gain_that_is_not_positive_is_refused():
     """Assumption 1 wants 0 < k_1 <= k_2."""
-    with pytest.raises(nlctl.ParameterError, match="k_1"):
+    with pytest.raises(nlctl.errors.ParameterError, match="k_1"):
         decompose(ZONE, k=(0.0, 1.0))
     with pytest.raises(DecompositionError, match="Assumption 1"):
         dataclasses.replace(decompose(Offset()), k_1=-1.0)

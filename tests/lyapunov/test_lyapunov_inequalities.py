@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov import (
     Box,
     NussbaumIntegral,
@@ -28,6 +27,7 @@ from nlctl.analysis.lyapunov.assumptions import assumptions
 from nlctl.analysis.lyapunov.inequalities import terms
 from nlctl.analysis.lyapunov.loop.instrumented import input_gain
 from nlctl.analysis.lyapunov.loop.signals import Signals, inequality
+from nlctl.errors import DiagramError
 from nlctl.functions import nussbaum
 from nlctl.plants import duffing_f
 
@@ -123,7 +123,7 @@ def test_the_rate_of_v_is_its_derivative_along_the_diagram():
 @given(x1=st.floats(-3, 3), v=st.one_of(st.floats(-1e-4, 1e-4), st.floats(-20, 20)))
 def test_the_gain_has_its_limit_at_v_0(x1, v):
     """G = (1 + 0.1 cos x1)(1 + 0.2 cos v) in Example 1, also where F/v has no digits."""
-    p = nlctl.block(nlctl.ForcedDuffing(), "plant")._current_params
+    p = nlctl.block(nlctl.plants.ForcedDuffing(), "plant")._current_params
     exact = (1 + 0.1 * np.cos(x1)) * (1 + 0.2 * np.cos(v))
     assert input_gain(duffing_f)((x1, 0.5), v, p) == pytest.approx(exact, abs=1e-9)
     assert np.isnan(input_gain(duffing_f)((x1, 0.5), np.nan, p))
@@ -141,7 +141,7 @@ def test_no_split_leaves_less_than_the_sharpest_one(u):
 
 
 @nlctl.record
-class WrongRobustTerm(nlctl.RobustTerm):
+class WrongRobustTerm(nlctl.controllers.RobustTerm):
     @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
@@ -149,7 +149,7 @@ class WrongRobustTerm(nlctl.RobustTerm):
 
 
 @nlctl.record
-class WrongWeights(nlctl.AdaptiveWeights):
+class WrongWeights(nlctl.controllers.AdaptiveWeights):
     @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
@@ -157,7 +157,7 @@ class WrongWeights(nlctl.AdaptiveWeights):
 
 
 @nlctl.record
-class WrongNussbaumLaw(nlctl.NussbaumLaw):
+class WrongNussbaumLaw(nlctl.controllers.NussbaumLaw):
     @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
@@ -170,8 +170,8 @@ class WrongNussbaumLaw(nlctl.NussbaumLaw):
         ({"robust": WrongRobustTerm()}, {"(28)"}),
         ({"weights": WrongWeights()}, {"(28)"}),
         ({"law": WrongNussbaumLaw()}, {"(26)", "(27)"}),
-        ({"law": nlctl.LeakyNussbaumLaw(c=0.5)}, {"(26)", "(27)"}),
-        ({"law": nlctl.MonotoneNussbaumLaw()}, {"(27)"}),
+        ({"law": nlctl.controllers.LeakyNussbaumLaw(c=0.5)}, {"(26)", "(27)"}),
+        ({"law": nlctl.controllers.MonotoneNussbaumLaw()}, {"(27)"}),
     ],
 )
 def test_a_wrong_adaptation_law_is_found_by_its_equation(pieces, broken):
@@ -182,7 +182,7 @@ def test_a_wrong_adaptation_law_is_found_by_its_equation(pieces, broken):
 
 
 @nlctl.record
-class PushedDuffing(nlctl.ForcedDuffing):
+class PushedDuffing(nlctl.plants.ForcedDuffing):
     @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
@@ -234,7 +234,7 @@ FORCINGS = {
 @pytest.mark.parametrize("change", FORCINGS, ids=list(FORCINGS))
 def test_a_proof_with_the_forcing_in_g_holds_with_the_eps_of_that_g(change):
     """Every premise of one reading is of the same g: then no step fails at any state."""
-    loop = example(1, plant=nlctl.ForcedDuffing(**FORCINGS[change]))
+    loop = example(1, plant=nlctl.plants.ForcedDuffing(**FORCINGS[change]))
     own = constants(loop, BOXES[1], W=np.linspace(-0.2, 0.3, 27))
     printed = literal(premises(own), own)
     assert printed.d == pytest.approx(0.1 * (1.0**2 + 1.1**2), abs=1e-3)
@@ -266,7 +266,7 @@ def test_nan_violates():
 
 def test_a_law_without_nussbaum_argument_is_refused():
     """The known-sign law has another proof."""
-    loop = example(1, controller=nlctl.adaptive_neural(2, law=nlctl.KnownSignLaw()))
+    loop = example(1, controller=nlctl.adaptive_neural(2, law=nlctl.controllers.KnownSignLaw()))
     with pytest.raises(DiagramError, match="KnownSignLaw: for a known sign see certify"):
         watched(loop)
 

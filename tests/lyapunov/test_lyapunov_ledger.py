@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl import ParameterError, UnknownNameError
 from nlctl.analysis.lyapunov import (
     Box,
     conservatism,
@@ -23,6 +22,7 @@ from nlctl.analysis.lyapunov import (
 )
 from nlctl.analysis.lyapunov.conclusions import slow_drift_of
 from nlctl.analysis.lyapunov.loop.simulation import observed_loop
+from nlctl.errors import ParameterError, UnknownNameError
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from nlctl import ParameterError
 from nlctl.analysis.lyapunov.nussbaum.property import (
     antiderivative,
     lobe_around,
@@ -16,6 +15,7 @@ from nlctl.analysis.lyapunov.nussbaum.property import (
     nussbaum_property,
     running_means,
 )
+from nlctl.errors import ParameterError
 from nlctl.functions import nussbaum, nussbaum_derivative
 
 

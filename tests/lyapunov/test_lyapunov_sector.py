@@ -76,7 +76,7 @@ def test_at_zero_a_slope_is_the_derivative(name):
 def test_the_sector_of_example_1_is_the_closed_form(tol):
     """F/v = (1 + 0.1 cos x1)(1 + 0.2 cos v): least at x1 = 1, v = pi; greatest at 0, v -> 0."""
     box = Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6))
-    found = sector(nlctl.ForcedDuffing(), box, tol=tol)
+    found = sector(nlctl.plants.ForcedDuffing(), box, tol=tol)
     low, high = (1 + 0.1 * np.cos(1)) * 0.8, 1.1 * 1.2
     for least in (found.m1, found.m4):
         assert least <= low <= least + tol
@@ -87,7 +87,7 @@ def test_the_sector_of_example_1_is_the_closed_form(tol):
 def test_the_sector_of_example_2_is_the_closed_form():
     """F/v = (2 + cos x1)(1 + 0.2 sin^2 v): least at x1 = 1.1, v = 0; greatest at 0, pi/2."""
     box = Box.of(x1=(-0.85, 1.1), x2=(-0.55, 0.75), x3=(-0.6, 0.6), v=(-2.5, 4.5))
-    found = sector(nlctl.Genesio(), box, tol=1e-4)
+    found = sector(nlctl.plants.Genesio(), box, tol=1e-4)
     assert found.G_min <= 2 + np.cos(1.1) <= found.G_min + 1e-4
     assert found.G_max - 1e-4 <= 3.6 <= found.G_max
 
@@ -95,9 +95,9 @@ def test_the_sector_of_example_2_is_the_closed_form():
 def test_the_global_sectors_are_those_of_the_paper_s_plants():
     """Periodicity makes one period global: 0.72 and 1.32, 1 and 3.6."""
     period = {"x1": (-np.pi, np.pi), "x2": (-1, 1), "v": (-np.pi, np.pi)}
-    found = sector(nlctl.ForcedDuffing(), Box.of(**period))
+    found = sector(nlctl.plants.ForcedDuffing(), Box.of(**period))
     assert (found.G_min, found.G_max) == pytest.approx((0.72, 1.32), abs=1e-3)
-    found = sector(nlctl.Genesio(), Box.of(**period, x3=(-1, 1)))
+    found = sector(nlctl.plants.Genesio(), Box.of(**period, x3=(-1, 1)))
     assert (found.G_min, found.G_max) == pytest.approx((1, 3.6), abs=1e-3)
 
 
@@ -117,7 +117,7 @@ def test_a_plant_affine_in_v_has_one_sector_for_all_v(first):
 def test_example_1_has_one_sector_for_all_v():
     """An unbounded v is not an obstacle where the quotient stays bounded."""
     box = Box.of(x1=(-1, 1), x2=(-1, 1), v=(-np.inf, np.inf))
-    found = sector(nlctl.ForcedDuffing(), box)
+    found = sector(nlctl.plants.ForcedDuffing(), box)
     assert found.G_min == pytest.approx((1 + 0.1 * np.cos(1)) * 0.8, abs=2e-3)
     assert found.G_max == pytest.approx(1.32, abs=2e-3)
 
@@ -161,7 +161,7 @@ def test_minimum_of_a_constant_and_v_is_a_slope_where_decided():
 
 def test_a_box_on_one_side_of_zero_has_one_pair():
     """Without v < 0 there are no m3 and m4."""
-    found = sector(nlctl.ForcedDuffing(), Box.of(x1=(0, 1), x2=(0, 1), v=(2, 3)))
+    found = sector(nlctl.plants.ForcedDuffing(), Box.of(x1=(0, 1), x2=(0, 1), v=(2, 3)))
     assert np.isnan(found.m3)
     assert np.isnan(found.m4)
     assert found.G_min == found.m1
@@ -171,6 +171,6 @@ def test_a_box_on_one_side_of_zero_has_one_pair():
 def test_a_missing_side_and_a_missing_equation_are_named():
     """The box needs every state, and the plant f and d."""
     with pytest.raises(UnknownNameError, match="x2"):
-        sector(nlctl.ForcedDuffing(), Box.of(x1=(0, 1), v=(0, 1)))
+        sector(nlctl.plants.ForcedDuffing(), Box.of(x1=(0, 1), v=(0, 1)))
     with pytest.raises(DiagramError, match="DeadZone is not a plant"):
         plant_terms(nlctl.DeadZone())

@@ -8,10 +8,10 @@ from rows import each_row
 from scipy.integrate import quad, solve_ivp
 
 import nlctl
-from nlctl import ParameterError, UnknownNameError
 from nlctl.analysis.lyapunov.nussbaum.energy import drift, drift_margin, safe_horizon
 from nlctl.analysis.lyapunov.nussbaum.property import Lobe, lobe_around, lobes
 from nlctl.analysis.lyapunov.nussbaum.slow_drift import burst_peak, slow_drift
+from nlctl.errors import ParameterError, UnknownNameError
 from nlctl.functions import nussbaum, nussbaum_integral
 
 BETA, D = 2.0, 1.5

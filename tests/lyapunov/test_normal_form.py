@@ -111,14 +111,14 @@ def test_what_depends_on_what():
 
 def test_blocks_compute_with_it():
     """The basis of the network and wing rock's own equation."""
-    basis = nlctl.GaussianBasis(centres=((0.0, 1.0), (1.0, 0.0)), widths=(1.0,))
+    basis = nlctl.controllers.GaussianBasis(centres=((0.0, 1.0), (1.0, 0.0)), widths=(1.0,))
     made = nlctl.block(basis, "basis")
     u = np.array([X, Y], dtype=object)
     psi = made.outfcn(0.0, (), u, made._current_params)
     known = made.output(0.0, [], [0.3, 0.4])
     for one, number in zip(psi, known, strict=True):
         assert float(at(one, 0.3, 0.4).mid()) == pytest.approx(number)
-    wing = nlctl.block(nlctl.WingRock(), "wing")
+    wing = nlctl.block(nlctl.plants.WingRock(), "wing")
     rate = wing.updfcn(0.0, u, np.array([indeterminate("v")], dtype=object), wing._current_params)[
         1
     ]

@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov.nussbaum.slow_drift import slow_drift
+from nlctl.errors import DiagramError
 
 NAMES = ("zeta", "r", "u")
 SHARE = 0.5  # of the time until the burst, from which it is forecast
@@ -124,7 +124,7 @@ class TestOfWhichLoop:
         """Of the same blocks with another Nussbaum function, and of another number of states."""
         _, response = example_2()
         controller = nlctl.paper.example_2().syslist[2]
-        law = nlctl.NussbaumLaw(beta=5.0, N=lambda zeta: -np.exp(zeta))
+        law = nlctl.controllers.NussbaumLaw(beta=5.0, N=lambda zeta: -np.exp(zeta))
         other = nlctl.paper.example_2(controller=nlctl.controllers.replaced(controller, law=law))
         with pytest.raises(DiagramError, match=r"not of 'example_2': u is .*, and the loop says"):
             slow_drift(response, loop=other)

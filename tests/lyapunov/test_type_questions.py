@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl import ParameterError
 from nlctl.analysis.intervals.type_questions import type_question
 from nlctl.analysis.lyapunov import Box, certify, enclose, prove, prove_decrease
-from nlctl.errors import UsageError
+from nlctl.errors import ParameterError, UsageError
 
 BOX = Box.of(v=(-1.0, 1.0))
 
@@ -204,7 +203,10 @@ def test_a_level_set_is_refused_so(what, who):
 def test_a_plant_that_asks_has_no_certificate(what, law):
     """Whatever the law, in f and in d: a run had 7.32 where 0.0198 was proved."""
     ask = ASKS[what]
-    laws = {"sliding": nlctl.SlidingModeLaw(K=23.0, phi=0.1), "known sign": nlctl.KnownSignLaw()}
+    laws = {
+        "sliding": nlctl.controllers.SlidingModeLaw(K=23.0, phi=0.1),
+        "known sign": nlctl.controllers.KnownSignLaw(),
+    }
     for more in (
         {"f": lambda x, v: -x[0] + 1.5 * v + 0.1 * ask(v)},
         {"f": lambda x, v: -x[0] + 1.5 * v, "d": lambda x, t: 0.1 * ask(x[0])},

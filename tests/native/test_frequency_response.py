@@ -135,11 +135,11 @@ def test_a_pole_on_the_axis_is_infinite_there_and_nowhere_else():
 
 def test_what_has_no_frequency_response_is_refused_by_name():
     hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="e", outputs="v", name="hold"))
-    with pytest.raises(nlctl.UsageError, match=r"frequency_response.*'hold'"):
+    with pytest.raises(nlctl.errors.UsageError, match=r"frequency_response.*'hold'"):
         nlctl.frequency_response(closed(hold, plant(), error()), W)
-    with pytest.raises(nlctl.CompileError, match="'wire_v' varies"):
+    with pytest.raises(nlctl.errors.CompileError, match="'wire_v' varies"):
         nlctl.frequency_response(closed(delay(1.0, varying=np.sin), plant(), error()), W)
-    with pytest.raises(nlctl.ParameterError, match="continuous time"):
+    with pytest.raises(nlctl.errors.ParameterError, match="continuous time"):
         nlctl.frequency_response(ct.ss(0.5, 1, 1, 0, 0.1), W)
-    with pytest.raises(nlctl.ParameterError, match="increasing omega"):
+    with pytest.raises(nlctl.errors.ParameterError, match="increasing omega"):
         nlctl.frequency_response(plant(), [2.0, 1.0])

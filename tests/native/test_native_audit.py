@@ -6,13 +6,12 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.errors import ParameterError, UsageError
+from nlctl.errors import AuditError, EngineWarning, ParameterError, UsageError
 from nlctl.expressions.graph import Graph
-from nlctl.native import AuditError, audit
+from nlctl.native import audit
 from nlctl.native.codegen import interpret
 from nlctl.native.codegen.ir import numbers
 from nlctl.native.equations.reader import Reader
-from nlctl.response import EngineWarning
 
 TIMES = np.linspace(0, 1, 11)
 N = 12

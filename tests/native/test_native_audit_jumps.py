@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import nlctl
+from nlctl.errors import AuditError
 from nlctl.expressions.arrays import concatenated
-from nlctl.native import AuditError
 from nlctl.native.diagram.program import count_switching_functions
 from nlctl.native.equations import watched
 from nlctl.native.equations.reader import Reader

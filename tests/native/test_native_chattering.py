@@ -64,17 +64,25 @@ def test_chattering_is_found_where_it_begins(loop, exact, rtol, atol):
 
 def test_the_message_names_signal_block_and_both_values():
     system, start = sign_loop()
-    with pytest.raises(nlctl.ChatteringError, match=r"'x\[0\]'' of block 'loop' jumps") as caught:
+    with pytest.raises(
+        nlctl.errors.ChatteringError, match=r"'x\[0\]'' of block 'loop' jumps"
+    ) as caught:
         nlctl.input_output_response(system, TIMES, 0, start)
     assert "between -0.5 and 1.5" in str(caught.value)
     assert caught.value.time == pytest.approx(2.0, abs=1e-4)
-    assert isinstance(caught.value, nlctl.DivergedError)  # whoever handles one handles the other
+    assert isinstance(
+        caught.value, nlctl.errors.DivergedError
+    )  # whoever handles one handles the other
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("actuator", "jump"),
-    [(nlctl.Quantiser(q=0.5), 0.5), (nlctl.Quantiser(), 0.1), (nlctl.DeadZoneInverse(), 0.8)],
+    [
+        (nlctl.Quantiser(q=0.5), 0.5),
+        (nlctl.Quantiser(), 0.1),
+        (nlctl.actuators.DeadZoneInverse(), 0.8),
+    ],
     ids=lambda value: type(value).__name__,
 )
 def test_the_block_inside_of_a_loop_is_named(actuator, jump):
@@ -252,7 +260,7 @@ def oscillation(actuator):
     "actuator",
     [
         lambda h: nlctl.Relay(on=h, off=-h),
-        lambda h: nlctl.Preisach(alpha=(h,), beta=(-h,), w=(1.0,)),
+        lambda h: nlctl.actuators.Preisach(alpha=(h,), beta=(-h,), w=(1.0,)),
     ],
     ids=["Relay", "Preisach"],
 )

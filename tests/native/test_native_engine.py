@@ -7,8 +7,7 @@ import scipy.special
 from numba.core import config
 
 import nlctl
-from nlctl.errors import ParameterError
-from nlctl.response import EngineWarning
+from nlctl.errors import EngineWarning, ParameterError
 
 TIMES = np.linspace(0, 1, 5)
 WITHOUT_JIT = pytest.mark.skipif(
@@ -48,7 +47,7 @@ def test_what_cannot_be_compiled_falls_back_with_a_warning():
     """The warning names block, line and reason; "native" raises instead."""
     line = cautious.__code__.co_firstlineno + 1
     said = rf"'decay' .* has try .* \(.*test_native_engine.py, line {line}\)"
-    with pytest.raises(nlctl.CompileError, match=said):
+    with pytest.raises(nlctl.errors.CompileError, match=said):
         nlctl.input_output_response(decay(cautious), TIMES, 0, [1.0], engine="native")
     with pytest.warns(EngineWarning, match=f"python-control takes over: .*{said}"):
         response = nlctl.input_output_response(
@@ -66,9 +65,11 @@ def test_a_function_that_nothing_can_compile_is_called_by_machine_code():
 
 def test_a_mistake_is_no_reason_to_change_the_engine():
     """Names and values are refused by "auto" as they are by "native"."""
-    with pytest.raises(nlctl.UnknownNameError, match=r"unknown state 'decay\.z'"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=r"unknown state 'decay\.z'"):
         nlctl.input_output_response(decay(), TIMES, 0, {"decay.z": 1.0}, engine="auto")
-    with pytest.raises(nlctl.UnknownNameError, match="unknown engine 'naive'; nearest: 'native'"):
+    with pytest.raises(
+        nlctl.errors.UnknownNameError, match="unknown engine 'naive'; nearest: 'native'"
+    ):
         nlctl.input_output_response(decay(), TIMES, engine="naive")
 
 
@@ -101,7 +102,7 @@ def test_a_block_that_returns_nan_ends_the_run_as_diverged():
     def update(t, x, u, params):
         return [np.nan if x[0] > 0.5 else 1.0]
 
-    with pytest.raises(nlctl.DivergedError) as caught:
+    with pytest.raises(nlctl.errors.DivergedError) as caught:
         nlctl.input_output_response(decay(update), TIMES, 0, [0.0], engine="native")
     assert caught.value.time == pytest.approx(0.5, abs=1e-3)
 
@@ -112,7 +113,7 @@ def test_an_index_out_of_range_is_an_error():
     def update(t, x, u, params):
         return [-x[len(x)]]
 
-    with pytest.raises((IndexError, nlctl.CompileError)):
+    with pytest.raises((IndexError, nlctl.errors.CompileError)):
         nlctl.input_output_response(decay(update), TIMES, 0, [1.0], engine="native")
 
 
@@ -120,7 +121,9 @@ def test_an_index_out_of_range_is_an_error():
 def test_a_wrong_number_of_values_is_an_error(result):
     """The message names the block, what it returned and what it should."""
     short = np.array(result)
-    with pytest.raises(nlctl.CompileError, match=rf"'decay' returns {len(result)} .* needs 1"):
+    with pytest.raises(
+        nlctl.errors.CompileError, match=rf"'decay' returns {len(result)} .* needs 1"
+    ):
         nlctl.compile(decay(lambda t, x, u, params: short))
 
 

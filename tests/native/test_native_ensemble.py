@@ -119,13 +119,21 @@ def test_numbers_hold_for_all_members_and_nothing_varied_is_one_member(loop):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"params": {"gain.k": [1.0, -1.0]}}, nlctl.ParameterError, r"k > 0, got -1.*member 1"),
-        ({"params": {"gain.kk": [1.0]}}, nlctl.UnknownNameError, "nearest: 'gain.k'"),
-        ({"initial_state": {"plant.x2": [1.0]}}, nlctl.UnknownNameError, "nearest: 'plant.x1'"),
-        ({"keep": ["w"]}, nlctl.UnknownNameError, "unknown signal 'w'"),
+        (
+            {"params": {"gain.k": [1.0, -1.0]}},
+            nlctl.errors.ParameterError,
+            r"k > 0, got -1.*member 1",
+        ),
+        ({"params": {"gain.kk": [1.0]}}, nlctl.errors.UnknownNameError, "nearest: 'gain.k'"),
+        (
+            {"initial_state": {"plant.x2": [1.0]}},
+            nlctl.errors.UnknownNameError,
+            "nearest: 'plant.x1'",
+        ),
+        ({"keep": ["w"]}, nlctl.errors.UnknownNameError, "unknown signal 'w'"),
         (
             {"params": {"gain.k": [1.0, 2.0]}, "initial_state": {"x1": [0.1, 0.2, 0.3]}},
-            nlctl.ParameterError,
+            nlctl.errors.ParameterError,
             "arrays of one length",
         ),
     ],
@@ -139,7 +147,7 @@ def test_bad_input_names_the_culprit(loop, arguments, error, message):
 @pytest.mark.parametrize("times", [[0.0], [1.0, 0.0], [0.0, np.nan]])
 def test_bad_time_grids_are_refused_as_for_one_run(loop, times):
     """Times must be finite, increasing, at least two."""
-    with pytest.raises(nlctl.ParameterError, match="timepts needs"):
+    with pytest.raises(nlctl.errors.ParameterError, match="timepts needs"):
         nlctl.ensemble_response(loop, times)
 
 

@@ -94,7 +94,7 @@ class TestDivergence:
     @pytest.mark.parametrize("start", [np.nan, np.inf])
     def test_a_start_that_is_no_number(self, linear, method, start):
         """Diverged at t = 0; nothing else is delivered."""
-        with pytest.raises((nlctl.DivergedError, nlctl.ParameterError)):
+        with pytest.raises((nlctl.errors.DivergedError, nlctl.errors.ParameterError)):
             run(linear, [0, 1], 0, [start], method=method)
 
     @pytest.mark.parametrize("method", ["tsit5", "rodas5p", "auto"])
@@ -115,7 +115,7 @@ class TestDivergence:
             None, lambda t, x, u, params: [np.sqrt(1.0 - t)], inputs=0, outputs="u", name="root"
         )
         play = nlctl.block(nlctl.Backlash(), "play")
-        with pytest.raises(nlctl.DivergedError):
+        with pytest.raises(nlctl.errors.DivergedError):
             run(nlctl.compile(ct.interconnect([root, play], outputs="v")), np.arange(5.0))
 
     def test_a_discontinuity_is_no_divergence(self):
@@ -197,7 +197,7 @@ class TestBadInput:
     )
     def test_time_grids(self, linear, times, message):
         """Empty, one point, unsorted, repeated, not finite."""
-        with pytest.raises(nlctl.ParameterError, match=message):
+        with pytest.raises(nlctl.errors.ParameterError, match=message):
             run(linear, times)
 
     @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ class TestBadInput:
     )
     def test_inputs_of_a_wrong_shape(self, linear, u):
         """Three times, one input."""
-        with pytest.raises(nlctl.ParameterError, match=r"inputs need shape \(1, 3\)"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"inputs need shape \(1, 3\)"):
             run(linear, [0, 1, 2], u)
 
     @pytest.mark.parametrize(
@@ -221,24 +221,28 @@ class TestBadInput:
     )
     def test_settings(self, linear, settings, message):
         """Tolerances, steps, limits."""
-        with pytest.raises(nlctl.ParameterError, match=message):
+        with pytest.raises(nlctl.errors.ParameterError, match=message):
             run(linear, [0, 1], **settings)
 
     def test_names(self, linear):
         """Method, parameter, state."""
-        with pytest.raises(nlctl.UnknownNameError, match=r"unknown method 'rodas5'.*rodas5p"):
+        with pytest.raises(
+            nlctl.errors.UnknownNameError, match=r"unknown method 'rodas5'.*rodas5p"
+        ):
             run(linear, [0, 1], method="rodas5")
         play = nlctl.compile(nlctl.block(nlctl.Backlash(), "play"))
-        with pytest.raises(nlctl.UnknownNameError, match="'c_x' of block 'play'; nearest: 'c_r'"):
+        with pytest.raises(
+            nlctl.errors.UnknownNameError, match="'c_x' of block 'play'; nearest: 'c_r'"
+        ):
             run(play, [0, 1], params={"play.c_x": 1.0})
-        with pytest.raises(nlctl.UnknownNameError, match=r"x\[7\]"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match=r"x\[7\]"):
             run(linear, [0, 1], 0, {"x[7]": 1.0})
         with pytest.raises(TypeError, match="longest"):
             run(linear, [0, 1], longest=1)
 
     def test_states_of_a_wrong_length(self, linear):
         """Three numbers for one state."""
-        with pytest.raises(nlctl.ParameterError, match="needs 1 value for"):
+        with pytest.raises(nlctl.errors.ParameterError, match="needs 1 value for"):
             run(linear, [0, 1], 0, [1.0, 2.0, 3.0])
 
 

@@ -156,14 +156,14 @@ class TestInputs:
     @pytest.mark.parametrize("shape", [(5,), (2, 11), (1, 10)])
     def test_wrong_shapes_are_refused(self, oscillator, shape):
         """The message says which shape is needed."""
-        with pytest.raises(nlctl.ParameterError, match=r"inputs need shape \(1, 11\)"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"inputs need shape \(1, 11\)"):
             nlctl.input_output_response(oscillator, np.linspace(0, 1, 11), np.zeros(shape))
 
     def test_wrong_initial_states_and_methods_are_refused(self, oscillator):
         """The message says how many values there must be, and which method there is."""
-        with pytest.raises(nlctl.ParameterError, match="needs 2 values for 'osc', got 3"):
+        with pytest.raises(nlctl.errors.ParameterError, match="needs 2 values for 'osc', got 3"):
             nlctl.input_output_response(oscillator, [0, 1], 0, [1, 2, 3])
-        with pytest.raises(nlctl.UnknownNameError, match=r"unknown method 'RK45'.*tsit5"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match=r"unknown method 'RK45'.*tsit5"):
             nlctl.input_output_response(oscillator, [0, 1], method="RK45")
 
     def test_several_inputs_by_list(self):
@@ -181,7 +181,7 @@ class TestStatus:
         """x' = x^2 from 1 escapes at t = 1; what was computed before is kept."""
         escaping = exact(lambda t, x, u, params: x * x)
         t = np.linspace(0, 2, 21)
-        with pytest.raises(nlctl.DivergedError) as caught:
+        with pytest.raises(nlctl.errors.DivergedError) as caught:
             nlctl.input_output_response(escaping, t, 0, [1.0])
         assert caught.value.time == pytest.approx(1, abs=1e-7)
         part = nlctl.input_output_response(escaping, t, 0, [1.0], ignore_errors=True)
@@ -192,7 +192,7 @@ class TestStatus:
 
     def test_overflow_of_the_nussbaum_gain(self):
         """A start at zeta = 30 has no finite right-hand side."""
-        with pytest.raises(nlctl.DivergedError, match="no finite state after t = 0 s"):
+        with pytest.raises(nlctl.errors.DivergedError, match="no finite state after t = 0 s"):
             nlctl.input_output_response(
                 nlctl.compile(nlctl.paper.example_1()), [0, 1], 0, {"law.zeta": 30.0}
             )
@@ -200,13 +200,13 @@ class TestStatus:
     def test_nan_from_a_block(self):
         """A block that returns NaN from t = 0.5 on ends the run there."""
         broken = exact(lambda t, x, u, params: np.array([np.nan if t > 0.5 else 1.0]))
-        with pytest.raises(nlctl.DivergedError) as caught:
+        with pytest.raises(nlctl.errors.DivergedError) as caught:
             nlctl.input_output_response(broken, [0, 1])
         assert caught.value.time == pytest.approx(0.5, abs=1e-6)
 
     def test_limit_of_steps(self, oscillator):
         """A run that would take too long stops and says so."""
-        with pytest.raises(nlctl.DivergedError, match="limit of steps"):
+        with pytest.raises(nlctl.errors.DivergedError, match="limit of steps"):
             nlctl.input_output_response(oscillator, [0, 1e6], 0, [1.0, 0.0], max_steps=100)
 
     def test_discrete_time_gives_the_same_response_as_python_control(self):

@@ -6,8 +6,9 @@ import pytest
 from numba.core import config
 
 import nlctl
+from nlctl.errors import AuditError
 from nlctl.expressions.evaluate import evaluate_expressions
-from nlctl.native.audit import AuditError, Trial, rounding
+from nlctl.native.audit import Trial, rounding
 from nlctl.native.rounding.nudged import ROUNDINGS, nudged_values
 from nlctl.native.rounding.shaken import Shaken, unit
 
@@ -78,7 +79,7 @@ needs_jit = pytest.mark.skipif(
 
 @needs_jit
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.filterwarnings("ignore::nlctl.EngineWarning")
+@pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
 def test_what_cancels_is_no_difference(name):
     """Each of 138 starts and times at which terms of the size of 1 cancel to 1e-16 and more."""
     compiled = nlctl.compile(system(CASES[name][0]))
@@ -89,7 +90,7 @@ def test_what_cancels_is_no_difference(name):
 
 @needs_jit
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.filterwarnings("ignore::nlctl.EngineWarning")
+@pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
 def test_a_formula_that_differs_by_one_operation_is_found(name, monkeypatch):
     """Also where its terms cancel: by a sign, an index, or the twelfth digit of a constant."""
     right, wrong = CASES[name]

@@ -156,7 +156,9 @@ def test_passages_that_do_not_become_slower_are_no_rest(gain):
 
 def test_without_a_rate_of_rest_it_ends_with_the_reason_and_the_time():
     system = loop(lagged, relay=nlctl.IdealRelay(rest_rate=0.0), params={"K": 1.0, "T": 0.05})
-    with pytest.raises(nlctl.ChatteringError, match=r"switches of block 'relay'.* accumulate") as e:
+    with pytest.raises(
+        nlctl.errors.ChatteringError, match=r"switches of block 'relay'.* accumulate"
+    ) as e:
         run(system)
     assert "second-order sliding" in str(e.value)
     assert 1.5 < e.value.time < 3

@@ -10,7 +10,8 @@ from rows import each_row
 from scipy.special import j0
 
 import nlctl
-from nlctl.native import AuditError, CompileError, Status
+from nlctl.errors import AuditError, CompileError
+from nlctl.native import Status
 
 TIMES = np.linspace(0, 10, 201)
 FULLER = np.sqrt((np.sqrt(33) - 1) / 24)  # of its optimal switching curve x = -C x' |x'|
@@ -205,7 +206,7 @@ def test_friction_on_a_belt_is_that_of_stick_and_slip():
         lambda t, x, u, p: np.array([x[1] - 0.3, -x[0]]),
         states=2, inputs=["force"], outputs=["velocity", "applied"], name="plant",
     )  # fmt: skip
-    friction = nlctl.StickSlip(F_c=1.0, F_s=1.0, sigma_2=0.0, v0=-1.0)
+    friction = nlctl.actuators.StickSlip(F_c=1.0, F_s=1.0, sigma_2=0.0, v0=-1.0)
     sticks = run(nlctl.interconnect({"friction": friction, "plant": body}), [0.0, 0.0])
     np.testing.assert_allclose(of_plant(slides), of_plant(sticks), rtol=0, atol=1e-6)
     assert np.sum(np.abs(slides.outputs[0]) < 1e-7) > 10  # it has stuck for a while
@@ -462,12 +463,12 @@ def test_python_control_does_not_run_it_wrongly():
 
 def test_a_relay_that_is_sampled_or_stands_twice_is_refused():
     relay = nlctl.block(nlctl.IdealRelay(), "relay")
-    with pytest.raises(nlctl.ParameterError, match="has a memory, 'mode'"):
+    with pytest.raises(nlctl.errors.ParameterError, match="has a memory, 'mode'"):
         nlctl.sampled(relay, 0.1, method="euler")
     ends = {"inplist": ["relay.u"], "outlist": ["relay.v"], "check_unused": False}
     inner = ct.interconnect([relay], name="inner", **ends)
     twice = ct.interconnect([relay, inner], name="outer", **ends)
-    with pytest.raises(nlctl.DiagramError, match="stands in 'outer' twice"):
+    with pytest.raises(nlctl.errors.DiagramError, match="stands in 'outer' twice"):
         nlctl.compile(twice)
 
 

@@ -7,7 +7,7 @@ from rows import each_row
 from scipy.optimize import brentq
 
 import nlctl
-from nlctl.native import CompileError
+from nlctl.errors import CompileError
 
 TIMES = np.linspace(0, 10, 201)
 

@@ -23,13 +23,12 @@ from hypothesis import strategies as st
 from numba.core import config, event
 
 import nlctl
-from nlctl.native import CompileError
+from nlctl.errors import CacheWarning, CompileError
 from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
 from nlctl.native.machine.module import loaded
-from nlctl.native.machine.store import CacheWarning
 from nlctl.native.opaque.called import TAUGHT
 from nlctl.native.opaque.calls import Source
 

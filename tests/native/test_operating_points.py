@@ -136,13 +136,13 @@ def test_more_equations_than_unknowns_are_met_or_not():
     """Angle and rate are fixed and no torque is free: only where it hangs there is a point."""
     asked = {"state_indices": [0, 1], "input_indices": [0], "output_indices": []}
     assert nlctl.find_operating_point(pendulum(), [0.0, 0.0], 0.0, **asked).residual == 0.0
-    with pytest.raises(nlctl.OperatingPointError, match=r"missed by 4\.7") as raised:
+    with pytest.raises(nlctl.errors.OperatingPointError, match=r"missed by 4\.7") as raised:
         nlctl.find_operating_point(pendulum(), [0.5, 0.0], 0.0, **asked)
     assert raised.value.residual == pytest.approx(9.81 * np.sin(0.5))
 
 
 def test_where_there_is_none_the_nearest_place_is_told():
-    with pytest.raises(nlctl.OperatingPointError, match="'pendulum'") as raised:
+    with pytest.raises(nlctl.errors.OperatingPointError, match="'pendulum'") as raised:
         nlctl.find_operating_point(pendulum(), [1.0, 0.0], 20.0)
     assert raised.value.residual == pytest.approx(20 - 9.81, rel=1e-6)
     np.testing.assert_allclose(np.sin(raised.value.states[0]), 1.0, rtol=1e-6)
@@ -151,7 +151,7 @@ def test_where_there_is_none_the_nearest_place_is_told():
 def test_a_point_that_is_not_finite_is_none():
     root = ct.nlsys(lambda t, x, u, params: np.sqrt(x) - 1, inputs=0, states=1, name="root")
     assert nlctl.find_operating_point(root, [2.0]).states == pytest.approx(1.0)
-    with pytest.raises(nlctl.OperatingPointError, match="missed by nan"):
+    with pytest.raises(nlctl.errors.OperatingPointError, match="missed by nan"):
         nlctl.find_operating_point(root, [-2.0])
 
 
@@ -178,12 +178,12 @@ def test_parameters_move_it():
 
 
 def test_wrong_questions_are_refused_by_name():
-    with pytest.raises(nlctl.ParameterError, match="output_indices=\\[\\] fixes none"):
+    with pytest.raises(nlctl.errors.ParameterError, match="output_indices=\\[\\] fixes none"):
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, state_indices=[0])
-    with pytest.raises(nlctl.UnknownNameError, match="angle"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="angle"):
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, 0.5, output_indices=["angel"])
-    with pytest.raises(nlctl.ParameterError, match="root_method='no such'"):
+    with pytest.raises(nlctl.errors.ParameterError, match="root_method='no such'"):
         nlctl.find_operating_point(pendulum(), 0.0, 0.0, root_method="no such")
     hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
-    with pytest.raises(nlctl.UsageError, match="'actuator'"):
+    with pytest.raises(nlctl.errors.UsageError, match="'actuator'"):
         nlctl.find_operating_point(through(hold), 0.0, 1.0)

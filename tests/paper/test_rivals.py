@@ -88,7 +88,7 @@ def test_each_actuator_has_the_same_controllers_on_the_same_samples():
 )
 def test_an_unknown_pair_is_refused(pair, told):
     """With the nearest name."""
-    with pytest.raises(nlctl.UnknownNameError, match=told):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=told):
         rival_loop("example_1", pair)
 
 

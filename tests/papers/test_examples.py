@@ -114,5 +114,5 @@ def test_the_examples_of_lv_are_those_of_nlctl_paper():
 
 def test_what_karason_learns_from_has_a_name():
     """Another word is refused."""
-    with pytest.raises(nlctl.ParameterError, match="learns_from"):
+    with pytest.raises(nlctl.errors.ParameterError, match="learns_from"):
         karason_1994.example_1(learns_from="half")

@@ -98,7 +98,7 @@ def test_what_is_found_of_a_bound():
 def test_a_name_with_hyphens_is_the_same_paper_and_an_unknown_one_is_told():
     """The nearest one is named."""
     assert named_paper("tabuada-2007") is named_paper("tabuada_2007")
-    with pytest.raises(nlctl.UnknownNameError, match="nearest: 'tabuada_2007'"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="nearest: 'tabuada_2007'"):
         named_paper("tabuada_2008")
     refused = nlctl_here("report", "karason_1995")
     assert refused.returncode == 2
@@ -107,7 +107,9 @@ def test_a_name_with_hyphens_is_the_same_paper_and_an_unknown_one_is_told():
 
 def test_far_runs_are_of_papers_that_have_some(tmp_path):
     """A sentence, before anything is run."""
-    with pytest.raises(nlctl.UsageError, match="karason_1994 has no runs beyond its examples"):
+    with pytest.raises(
+        nlctl.errors.UsageError, match="karason_1994 has no runs beyond its examples"
+    ):
         compose_paper(named_paper("karason_1994").paper, tmp_path, whole=True)
 
 

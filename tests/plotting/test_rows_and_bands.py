@@ -102,11 +102,11 @@ def test_what_is_asked_for_is_shown():
     """By name; python-control's arguments are python-control's plot, in a figure of its own."""
     run = nlctl.input_output_response(loop(), T, 1.0)
     assert run.plot(signals=[["r", "b"], "v"]).axes.shape == (2, 1)
-    with pytest.raises(nlctl.UnknownNameError, match="unknown signal 'ref'"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="unknown signal 'ref'"):
         run.plot(signals=["ref"])
     theirs = run.plot(overlay_signals=True)
     assert theirs.axes.shape == (2, 1)
-    with pytest.raises(nlctl.UsageError, match="no meaning next to"):
+    with pytest.raises(nlctl.errors.UsageError, match="no meaning next to"):
         run.plot(signals=["b"], overlay_signals=True)
 
 
@@ -178,10 +178,10 @@ def test_a_table_has_a_row_for_each_member_and_time():
 
 def test_what_cannot_be_plotted_is_refused():
     """Signals that were not kept, and members that do not exist."""
-    with pytest.raises(nlctl.UnknownNameError, match="among those that were kept"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="among those that were kept"):
         many().plot(["u"])
-    with pytest.raises(nlctl.ParameterError, match="members from 0 to 100, got 101"):
+    with pytest.raises(nlctl.errors.ParameterError, match="members from 0 to 100, got 101"):
         many().plot(members=[101])
     nothing = nlctl.ensemble_response(nlctl.block(nlctl.Lag(), "lag"), T)
-    with pytest.raises(nlctl.ParameterError, match="keep="):
+    with pytest.raises(nlctl.errors.ParameterError, match="keep="):
         nothing.plot()

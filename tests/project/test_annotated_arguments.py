@@ -12,8 +12,8 @@ import numpy.typing as npt
 import pytest
 
 import nlctl
-from nlctl import ParameterError
 from nlctl.annotations import as_annotated
+from nlctl.errors import ParameterError
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -100,7 +100,7 @@ def test_files_and_own_sentences_are_left_alone():
 
     with pytest.raises(FileNotFoundError):
         opened("x")  # type: ignore[arg-type]
-    with pytest.raises(nlctl.BlockError, match="is a class"):
+    with pytest.raises(nlctl.errors.BlockError, match="is a class"):
         refused("x")  # type: ignore[arg-type]
 
 

@@ -10,7 +10,8 @@ from rows import each_row
 from small_systems import chain, gain, out, third_party
 
 import nlctl
-from nlctl import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
+from nlctl.analysis.catalogue import block_records
+from nlctl.errors import AmbiguousNameError, DiagramError, ParameterError, UnknownNameError
 from nlctl.paper import example_1, example_2
 from nlctl.params import check_params
 
@@ -62,7 +63,7 @@ def refused(error, *told):
 def test_records(cls, values, told):
     """Numbers out of bounds, not finite, of the wrong shape or number."""
     with refused(ParameterError, f"{cls} needs", *told):
-        getattr(nlctl, cls)(**values)
+        block_records()[cls](**values)
 
 
 def low_order(order):
@@ -83,7 +84,7 @@ def low_order(order):
         (example_1, {"p1": np.nan}, ParameterError, ["ForcedDuffing needs a finite p1", "nan"]),
         (
             example_1,
-            {"plant": nlctl.ForcedDuffing(), "p1": 0.2},
+            {"plant": nlctl.plants.ForcedDuffing(), "p1": 0.2},
             ParameterError,
             ["p1", "plant is"],
         ),
@@ -91,7 +92,7 @@ def low_order(order):
         (example_2, {"lambdas": (1.0, 2.0, 1.0)}, ParameterError, ["needs 2 lambdas", "got 3"]),
         (example_2, {"v0": np.inf}, ParameterError, ["a finite v0", "inf"]),
         (example_2, {"actuator": nlctl.Backlash(), "v0": 0.1}, ParameterError, ["v0", "actuator"]),
-        (example_1, {"actuator": nlctl.Genesio()}, DiagramError, ["'plant'", "'actuator'"]),
+        (example_1, {"actuator": nlctl.plants.Genesio()}, DiagramError, ["'plant'", "'actuator'"]),
         (example_1, {"actuator": nlctl.DeadZone}, TypeError, ["DeadZone is a class"]),
         (example_1, {"actuator": "dead zone"}, TypeError, ["str is not a block"]),
     ],
@@ -238,7 +239,7 @@ class TestNames:
     def test_a_later_override_of_a_vector_beats_an_earlier_default_of_its_element(self):
         """What is asked for in the run counts, however the default was written."""
         signals = [*(f"x{i}" for i in (1, 2, 3)), "yd", "yd1", "yd2", "yd3"]
-        error = nlctl.block(nlctl.FilteredError(lambdas=(2.0, 1.0)), "error")
+        error = nlctl.block(nlctl.controllers.FilteredError(lambdas=(2.0, 1.0)), "error")
         diagram = nlctl.interconnect([error], inputs=signals, outputs=["r"])
         diagram.params.update({"error.lambdas[1]": 5.0})
         u = [1.0, *[0.0] * 6]  # r = lambda_2 x1

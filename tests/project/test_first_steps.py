@@ -54,7 +54,7 @@ def test_a_closed_loop_without_inputs_plots(engine):
 def test_continuous_records_take_no_dt():
     """x' is not x[k+1]."""
     with pytest.raises(UsageError, match="dt"):
-        nlctl.block(nlctl.ForcedDuffing(), "plant", dt=0.1)
+        nlctl.block(nlctl.plants.ForcedDuffing(), "plant", dt=0.1)
 
 
 def test_a_controller_of_another_order_than_the_plant_is_refused():
@@ -62,7 +62,7 @@ def test_a_controller_of_another_order_than_the_plant_is_refused():
         nlctl.interconnect(
             {
                 "reference": nlctl.SumOfSines(order=3),
-                "plant": nlctl.Genesio(),
+                "plant": nlctl.plants.Genesio(),
                 "controller": nlctl.adaptive_neural(),
                 "actuator": nlctl.DeadZone(),
             }
@@ -82,4 +82,4 @@ def test_linearization_of_what_is_compiled_is_its_own_method():
     """python-control looks at the type before it asks; the docstring says what to call."""
     decay = ct.nlsys(lambda t, x, u, p: [u[0] - 2.0 * x[0]], states=1, inputs=1, name="decay")
     assert nlctl.compile(decay).linearize([1.0]).A == [[-2.0]]
-    assert "linearize" in (inspect.getdoc(nlctl.Compiled) or "")
+    assert "linearize" in (inspect.getdoc(nlctl.native.Compiled) or "")

@@ -458,7 +458,7 @@ RUNS = {
     "draw": lambda: nlctl.draw(3),
     "adaptive_neural order": lambda: nlctl.adaptive_neural("two"),
     "adaptive_neural law": lambda: nlctl.adaptive_neural(2, law=3),
-    "cascade": lambda: nlctl.cascade({}),
+    "cascade": lambda: nlctl.actuators.cascade({}),
     "Fault kind": lambda: nlctl.Fault("v", "stuckk", at=1.0),
     "Fault signal": lambda: nlctl.Fault(3, "bias", 1.0, at=1.0),
     "Fault value": lambda: nlctl.Fault("v", "bias", "x", at=1.0),
@@ -468,8 +468,8 @@ RUNS = {
     "with_faults none": lambda: nlctl.with_faults(None),
     "with_faults block": lambda: nlctl.with_faults(nlctl.block(nlctl.DeadZone(), "a")),
     "with_faults text": lambda: nlctl.with_faults(nlctl.paper.example_1(), "v"),
-    "cascade list": lambda: nlctl.cascade([nlctl.DeadZone()]),
-    "cascade number": lambda: nlctl.cascade({"a": 3}),
+    "cascade list": lambda: nlctl.actuators.cascade([nlctl.DeadZone()]),
+    "cascade number": lambda: nlctl.actuators.cascade({"a": 3}),
     "param record": lambda: nlctl.record(3),
     "equation": lambda: nlctl.equation(3),
     "PureFeedback f": lambda: nlctl.PureFeedback(order=2, f=3),
@@ -479,10 +479,10 @@ RUNS = {
     "PureFeedback initial nan": lambda: nlctl.block(
         nlctl.PureFeedback(order=2, f=lambda x, v: v, initial={"x1": NAN}), "p"
     ),
-    "diagonal_centres": lambda: nlctl.diagonal_centres(0, -1, 1),
-    "grid_centres": lambda: nlctl.grid_centres([3, -1]),
-    "latin_hypercube_centres": lambda: nlctl.latin_hypercube_centres(0, 2, seed=1),
-    "replaced": lambda: nlctl.replaced(3),
+    "diagonal_centres": lambda: nlctl.controllers.diagonal_centres(0, -1, 1),
+    "grid_centres": lambda: nlctl.controllers.grid_centres([3, -1]),
+    "latin_hypercube_centres": lambda: nlctl.controllers.latin_hypercube_centres(0, 2, seed=1),
+    "replaced": lambda: nlctl.controllers.replaced(3),
     "named example": lambda: nlctl.paper.named_example("example-3"),
     "linearize": lambda: nlctl.compile(example()).linearize(np.full(31, NAN)),
 }
@@ -490,7 +490,7 @@ RUNS = {
 
 def certified():
     return nlctl.paper.example_1(
-        controller=nlctl.adaptive_neural(2, law=nlctl.KnownSignLaw()),
+        controller=nlctl.adaptive_neural(2, law=nlctl.controllers.KnownSignLaw()),
     )
 
 
@@ -522,8 +522,8 @@ LYAPUNOV = {
     "ledger loop": lambda: lyapunov.ledger(3),
     "ledger setting": lambda: lyapunov.ledger(example(), 1.0, stepp=0.1),
     "sector plant": lambda: lyapunov.sector(None, SQUARE),
-    "sector box": lambda: lyapunov.sector(nlctl.ForcedDuffing(), None),
-    "sector tol": lambda: lyapunov.sector(nlctl.ForcedDuffing(), SQUARE, tol=NAN),
+    "sector box": lambda: lyapunov.sector(nlctl.plants.ForcedDuffing(), None),
+    "sector tol": lambda: lyapunov.sector(nlctl.plants.ForcedDuffing(), SQUARE, tol=NAN),
     "decompose actuator": lambda: lyapunov.decompose(None),
     "decompose k": lambda: lyapunov.decompose(nlctl.DeadZone(), k=(NAN, 1)),
     "decompose k order": lambda: lyapunov.decompose(nlctl.DeadZone(), k=(2, 1)),
@@ -557,10 +557,12 @@ LYAPUNOV = {
     "nussbaum_property end": lambda: lyapunov.nussbaum_property(end=NAN),
     "nussbaum_property end neg": lambda: lyapunov.nussbaum_property(end=-1.0),
     "constants box": lambda: lyapunov.constants(example(), None),
-    "disturbance times": lambda: lyapunov.disturbance(nlctl.ForcedDuffing(), SQUARE, (1.0, 0.0)),
-    "disturbance number": lambda: lyapunov.disturbance(nlctl.ForcedDuffing(), SQUARE, 1.0),
+    "disturbance times": lambda: lyapunov.disturbance(
+        nlctl.plants.ForcedDuffing(), SQUARE, (1.0, 0.0)
+    ),
+    "disturbance number": lambda: lyapunov.disturbance(nlctl.plants.ForcedDuffing(), SQUARE, 1.0),
     "approximation_error": lambda: lyapunov.approximation_error(
-        nlctl.ForcedDuffing(), nlctl.GaussianBasis(), [NAN], SQUARE
+        nlctl.plants.ForcedDuffing(), nlctl.controllers.GaussianBasis(), [NAN], SQUARE
     ),
     "burst_peak": lambda: lyapunov.burst_peak(None, 1.0),
     "aftermath zeta": lambda: lyapunov.aftermath(NAN),

@@ -101,7 +101,9 @@ def test_bounces_accumulate_at_a_time(engine, kind, e, rtol):
     v0 = np.sqrt(2 * G)
     limit = v0 / G * (1 + 2 * e / (1 - e))
     ball = nlctl.block(kind(e=e), "ball")
-    with pytest.raises(nlctl.ZenoError, match=r"block 'ball' jumps without end before") as raised:
+    with pytest.raises(
+        nlctl.errors.ZenoError, match=r"block 'ball' jumps without end before"
+    ) as raised:
         run(ball, [0.0, limit + 5.0], rtol=rtol, atol=0.01 * rtol, engine=engine)
     assert raised.value.time == pytest.approx(limit, rel=1e-3)
     kept = run(ball, np.linspace(0, limit + 5, 500), ignore_errors=True, engine=engine)
@@ -118,10 +120,10 @@ def test_jumps_without_progress_of_time_end_a_run(engine):
         states=("x",), initial={"x": 1.0}, update=lambda t, x, u, p: -np.ones(1),
         guard=lambda t, x, u, p: x, reset=lambda t, x, u, p: 0 * x,
     ).spec  # fmt: skip
-    with pytest.raises(nlctl.ZenoError, match="before t = 1 s") as raised:
+    with pytest.raises(nlctl.errors.ZenoError, match="before t = 1 s") as raised:
         run(nlctl.block(stuck(), "stuck"), [0.0, 2.0], engine=engine)
     assert raised.value.time == pytest.approx(1.0, abs=1e-9)
-    assert isinstance(raised.value, nlctl.DivergedError)
+    assert isinstance(raised.value, nlctl.errors.DivergedError)
 
 
 @nlctl.record
@@ -380,9 +382,9 @@ def test_max_step_bounds_the_steps():
     lag = ct.ss(-1, 1, 1, 0, name="lag")
     run(lag, [0.0, 1.0], 1.0, max_step=0.01, progress=seen.append)
     assert max(np.diff([0.0, *seen])) <= 0.01 * (1 + 1e-9)
-    with pytest.raises(nlctl.ParameterError, match="finite max_step > 0, got -1"):
+    with pytest.raises(nlctl.errors.ParameterError, match="finite max_step > 0, got -1"):
         run(lag, [0.0, 1.0], max_step=-1)
-    with pytest.raises(nlctl.ParameterError, match="'max_step' is given twice"):
+    with pytest.raises(nlctl.errors.ParameterError, match="'max_step' is given twice"):
         run(lag, [0.0, 1.0], max_step=0.1, solve_ivp_kwargs={"max_step": 0.1})
 
 
@@ -391,12 +393,14 @@ def test_wrong_resets_and_guards_are_refused_by_name():
     short = made(**common, guard=lambda t, x, u, p: x + 0.5,
                  reset=lambda t, x, u, p: np.zeros(2)).spec  # fmt: skip
     with pytest.raises(
-        nlctl.BlockError, match=r"block 'one'\) returns 2 values from reset, needs 1"
+        nlctl.errors.BlockError, match=r"block 'one'\) returns 2 values from reset, needs 1"
     ):
         run(nlctl.block(short(), "one"), [0.0, 1.0])
     nan = made(**common, guard=lambda t, x, u, p: x * np.nan, reset=lambda t, x, u, p: x).spec
-    with pytest.raises(nlctl.DivergedError, match="block 'one' has a guard that is NaN at t = 0 s"):
+    with pytest.raises(
+        nlctl.errors.DivergedError, match="block 'one' has a guard that is NaN at t = 0 s"
+    ):
         run(nlctl.block(nan(), "one"), [0.0, 1.0])
     clocked = made(**common, guard=lambda t, x, u, p: x, reset=lambda t, x, u, p: x).spec
-    with pytest.raises(nlctl.UsageError, match="block 'one' has a guard, which falls in"):
+    with pytest.raises(nlctl.errors.UsageError, match="block 'one' has a guard, which falls in"):
         nlctl.sampled(nlctl.block(clocked(), "one"), 0.1, method="euler")

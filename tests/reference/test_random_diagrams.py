@@ -127,7 +127,7 @@ def result(system, start, engine):
         made = nlctl.input_output_response(
             system, TIMES, 0, start, engine=engine, squeeze=False, **TIGHT
         )
-    except (nlctl.DivergedError, nlctl.UsageError) as error:
+    except (nlctl.errors.DivergedError, nlctl.errors.UsageError) as error:
         return type(error)
     events = made.events.sort_values(["block", "which", "direction", "time"])
     return np.concatenate([made.outputs, made.states]), events

@@ -44,7 +44,7 @@ def diagram(*lags):
 def test_a_sign_behind_a_lag_ends_with_the_reason(system, block, start, engine):
     """From switch to switch they come faster as 1 / n: as exp(t), without a finite end."""
     words = rf"switches of block '{block}' \(sign\) accumulate ever faster.*second-order sliding"
-    with pytest.raises(nlctl.ChatteringError, match=words) as ended:
+    with pytest.raises(nlctl.errors.ChatteringError, match=words) as ended:
         nlctl.input_output_response(system, [0, 30.0], 0, start, engine=engine)
     assert 1.0 < ended.value.time < 2.5
 
@@ -54,7 +54,7 @@ def test_twisting_ends_near_the_time_of_its_last_switch(engine):
     """x'' = -3 sign(x) - sign(x'): half a turn takes 1.5 sqrt(|x|), and halves |x|."""
     twisting = own(lambda t, x, u, p: [x[1], -3 * np.sign(x[0]) - np.sign(x[1])], 2)
     limit = 1.5 / (1 - np.sqrt(0.5))
-    with pytest.raises(nlctl.ChatteringError) as ended:
+    with pytest.raises(nlctl.errors.ChatteringError) as ended:
         nlctl.input_output_response(twisting, [0, 30.0], 0, [1.0, 0.0], engine=engine)
     near = re.search(r"block 'own' \(sign\) accumulate near t = ([\d.]+) s", str(ended.value))
     assert near
@@ -107,7 +107,7 @@ def test_an_ideal_relay_is_refused_by_name_where_python_control_is_asked_for():
     plant = ct.ss([[0, 1], [0, -20.0]], [[0], [-20.0]], [[1, 0]], 0, inputs="v", outputs="u",
                   name="plant")  # fmt: skip
     loop = nlctl.interconnect({"plant": plant, "relay": nlctl.IdealRelay()}, outputs=["u"])
-    with pytest.raises(nlctl.UsageError, match="block 'relay' is an ideal relay"):
+    with pytest.raises(nlctl.errors.UsageError, match="block 'relay' is an ideal relay"):
         nlctl.input_output_response(loop, [0, 5.0], 0, {"plant.x[0]": 1}, engine="python-control")
     made = nlctl.input_output_response(loop, [0, 5.0], 0, {"plant.x[0]": 1})
     assert abs(float(np.ravel(made.outputs)[-1])) < 1e-6

@@ -99,7 +99,9 @@ def test_nothing_that_is_watched_moves_the_result(engine):
 def test_an_event_function_that_becomes_nan_ends_the_run_by_name(engine, function, time, how):
     name = "own" if how == "events" else "stop_when"
     given = {how: {"own": function} if how == "events" else function}
-    with pytest.raises(nlctl.DivergedError, match=f"event function '{name}' is NaN") as ended:
+    with pytest.raises(
+        nlctl.errors.DivergedError, match=f"event function '{name}' is NaN"
+    ) as ended:
         run(engine, **given)
     assert ended.value.time == pytest.approx(time, abs=1e-6)
 
@@ -114,9 +116,11 @@ def test_a_run_that_ends_before_its_condition_is_nan_is_fine(engine):
 @engines
 @pytest.mark.parametrize("function", [lambda t, x, u, p: 0.0, lambda t, x, u, p: 0 * x[0]])
 def test_a_condition_that_is_always_zero_is_refused_by_name(engine, function):
-    with pytest.raises(nlctl.ParameterError, match="'stop_when' is 0 at all times of the run"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match="'stop_when' is 0 at all times of the run"
+    ):
         run(engine, stop_when=function)
-    with pytest.raises(nlctl.ParameterError, match="'flat' is 0 at all times of the run"):
+    with pytest.raises(nlctl.errors.ParameterError, match="'flat' is 0 at all times of the run"):
         run(engine, events={"flat": function})
 
 
@@ -130,19 +134,23 @@ def test_a_condition_that_is_zero_at_every_sample_is_not(engine):
 
 @engines
 def test_what_is_not_one_number_is_refused_by_name(engine):
-    with pytest.raises(nlctl.ParameterError, match="'pair' must return one number, got 2"):
+    with pytest.raises(nlctl.errors.ParameterError, match="'pair' must return one number, got 2"):
         run(engine, events={"pair": lambda t, x, u, p: x})
-    with pytest.raises(nlctl.ParameterError, match="'none' must return one number, got None"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match="'none' must return one number, got None"
+    ):
         run(engine, events={"none": lambda t, x, u, p: None})
 
 
 def test_what_cannot_be_watched_is_refused_by_name():
-    with pytest.raises(nlctl.ParameterError, match="event 'x' must be a function"):
+    with pytest.raises(nlctl.errors.ParameterError, match="event 'x' must be a function"):
         run("native", events={"x": 1.0})
-    with pytest.raises(nlctl.ParameterError, match="two events are called 'position'"):
+    with pytest.raises(nlctl.errors.ParameterError, match="two events are called 'position'"):
         run("native", events=[position, position])
     third = way(lambda t, x, u, p: x[0], terminal=3)
-    with pytest.raises(nlctl.ParameterError, match="'third' needs terminal = True or False, got 3"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match="'third' needs terminal = True or False, got 3"
+    ):
         run("native", events={"third": third})
 
 
@@ -171,7 +179,9 @@ def test_two_guards_at_one_instant_are_one_jump(engine):
 def test_a_reset_that_changes_the_number_of_states_is_refused_by_name():
     for wrong in ((0.0,), (0.0, 0.0, 0.0)):
         record = falling(reset=lambda t, x, u, p, wrong=wrong: wrong)
-        with pytest.raises(nlctl.BlockError, match=r"block 'one'\) returns .* from reset, needs 2"):
+        with pytest.raises(
+            nlctl.errors.BlockError, match=r"block 'one'\) returns .* from reset, needs 2"
+        ):
             nlctl.block(record, "one")
 
 
@@ -179,7 +189,7 @@ def test_a_reset_that_changes_the_number_of_states_is_refused_by_name():
 def test_a_reset_that_changes_it_later_is_refused_by_name(engine):
     """At the start it has two values, where it jumps three."""
     record = falling(reset=lambda t, x, u, p: (1.0, 0.0) if t < 0.25 else (1.0, 0.0, 0.0))
-    with pytest.raises(nlctl.BlockError, match=r"block 'one'.* 3 values from (its )?reset"):
+    with pytest.raises(nlctl.errors.BlockError, match=r"block 'one'.* 3 values from (its )?reset"):
         nlctl.input_output_response(nlctl.block(record, "one"), [0.0, 2.0], engine=engine)
 
 
@@ -188,7 +198,7 @@ def test_a_guard_or_a_reset_that_is_nan_ends_the_run_by_name(engine):
     late = falling(guard=lambda t, x, u, p: (np.sqrt(x[0]) + 1.0,))
     jumps = falling(reset=lambda t, x, u, p: (np.nan * x[0], x[1]))
     for record in (late, jumps):
-        with pytest.raises(nlctl.DivergedError, match="block 'one' has a guard that is NaN"):
+        with pytest.raises(nlctl.errors.DivergedError, match="block 'one' has a guard that is NaN"):
             nlctl.input_output_response(nlctl.block(record, "one"), [0.0, 2.0], engine=engine)
 
 

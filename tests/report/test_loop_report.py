@@ -87,11 +87,13 @@ def test_what_was_computed_is_on_the_page_and_in_the_file(tmp_path):
 def test_a_certificate_stands_on_the_page_with_its_constants():
     """What is proved, each constant with its status; one of another loop is refused."""
     plant = nlctl.PureFeedback(order=1, f=lambda x, v: 2.0 * x[0] + v)
-    weights = nlctl.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
+    weights = nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
     blocks = {
         "reference": nlctl.SumOfSines(order=0),
         "plant": plant,
-        "controller": nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=1.0), weights=weights),
+        "controller": nlctl.mrac(
+            nlctl.controllers.ReferenceModel(a=(1.0,), b=1.0), weights=weights
+        ),
         "actuator": nlctl.Gain(),
     }
     loop = nlctl.interconnect(blocks, outputs=["x1"], name="adaptive <loop>")
@@ -105,9 +107,9 @@ def test_a_certificate_stands_on_the_page_with_its_constants():
     other = nlctl.interconnect(
         {**blocks, "actuator": nlctl.Gain(k=2.0)}, outputs=["x1"], name="adaptive <loop>"
     )
-    with pytest.raises(nlctl.DiagramError, match=r"actuator.k was 1.0, now 2.0"):
+    with pytest.raises(nlctl.errors.DiagramError, match=r"actuator.k was 1.0, now 2.0"):
         loop_report(other, title="A namesake", certificate=found)
-    with pytest.raises(nlctl.DiagramError, match="is of another loop 'adaptive <loop>'"):
+    with pytest.raises(nlctl.errors.DiagramError, match="is of another loop 'adaptive <loop>'"):
         loop_report(LOOP, title="Decay", certificate=found)
 
 
@@ -175,7 +177,7 @@ def test_what_is_of_another_loop_is_refused(given, words, tmp_path_factory):
 
         given = {"ledger": ledger(nlctl.paper.example_1(), 1.0)}
     with pytest.raises(
-        nlctl.DiagramError if "signals" not in given else nlctl.UnknownNameError
+        nlctl.errors.DiagramError if "signals" not in given else nlctl.errors.UnknownNameError
     ) as e:
         loop_report(LOOP, title="Decay", **given)
     assert re.search(words, str(e.value))
@@ -189,7 +191,7 @@ def test_values_of_a_run_that_are_not_the_loops_are_told():
     assert set(made.numbers["run"]) == set(loop.output_labels)
     told = render_html(made).replace("\N{NO-BREAK SPACE}", " ")
     assert "This run has values of its own: law.beta = 3.0." in told
-    with pytest.raises(nlctl.DiagramError, match=r"params=\{...\}"):
+    with pytest.raises(nlctl.errors.DiagramError, match=r"params=\{...\}"):
         loop_report(loop, title="Decay", response=response, params={"law.beta": 4.0})
 
 
@@ -202,7 +204,7 @@ def test_the_ledger_of_a_namesake_is_refused():
     other = nlctl.paper.example_1(actuator=nlctl.DeadZone(b_r=0.6))
     found = ledger(other, 0.2)
     assert loop_report(other, title="Its own", ledger=found).verdict
-    with pytest.raises(nlctl.DiagramError, match=r"actuator.b_r was 0.6, now 0.5"):
+    with pytest.raises(nlctl.errors.DiagramError, match=r"actuator.b_r was 0.6, now 0.5"):
         loop_report(one, title="A namesake", ledger=found)
 
 

@@ -103,12 +103,15 @@ def test_a_ledger_shows_each_line_with_its_status():
 @pytest.mark.slow
 def test_a_certificate_shows_each_constant_with_its_status():
     """Of every kind, and of one that proves nothing."""
-    law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    law, robust = (
+        nlctl.controllers.KnownSignLaw(),
+        nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5),
+    )
     known = nlctl.adaptive_neural(2, law=law, robust=robust)
-    sliding = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0))
+    sliding = nlctl.controllers.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=20.0))
     plant = nlctl.PureFeedback(order=1, f=lambda x, v: 2.0 * x[0] + v)
     blocks = {"reference": nlctl.SumOfSines(order=0), "plant": plant, "actuator": nlctl.Gain()}
-    blocks["controller"] = nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=1.0))
+    blocks["controller"] = nlctl.mrac(nlctl.controllers.ReferenceModel(a=(1.0,), b=1.0))
     for loop in (
         nlctl.paper.example_1(controller=known),
         nlctl.paper.example_1(controller=sliding),

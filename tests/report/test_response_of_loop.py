@@ -85,7 +85,7 @@ def test_python_controls_own_response_is_taken_where_it_is_right():
     loop, start = nlctl.paper.example_1(), nlctl.initial_state(nlctl.paper.example_1())
     fine = {"solve_ivp_kwargs": {"rtol": 1e-5}}
     check_response(loop, ct.input_output_response(loop, TIMES, 0, start, **fine))
-    with pytest.raises(nlctl.DiagramError, match="or simulate it with smaller tolerances"):
+    with pytest.raises(nlctl.errors.DiagramError, match="or simulate it with smaller tolerances"):
         check_response(loop, ct.input_output_response(loop, TIMES, 0, start))
 
 
@@ -113,7 +113,9 @@ def test_a_loop_with_the_same_outputs_and_other_rates_is_refused(k, c, start):
     if (k, c) == (1.0, 0.2):
         check_response(oscillator(), run)
         return
-    with pytest.raises(nlctl.DiagramError, match=r"not of 'plant': [xv] is .* and the loop says"):
+    with pytest.raises(
+        nlctl.errors.DiagramError, match=r"not of 'plant': [xv] is .* and the loop says"
+    ):
         check_response(oscillator(), run)
 
 
@@ -136,7 +138,7 @@ def test_other_inputs_other_states_and_fewer_are_refused():
         {"states": None},
         {"states": run.x[:1]},
     ):
-        with pytest.raises(nlctl.DiagramError, match="response"):
+        with pytest.raises(nlctl.errors.DiagramError, match="response"):
             check_response(loop, changed(**parts))
 
 
@@ -148,5 +150,5 @@ def test_a_diverged_run_is_compared_up_to_its_end():
     run = nlctl.input_output_response(loop, times, 0, [1.0], ignore_errors=True)
     assert run.x[0, -1] > 1e8
     check_response(loop, run)
-    with pytest.raises(nlctl.DiagramError, match="x is"):
+    with pytest.raises(nlctl.errors.DiagramError, match="x is"):
         check_response(loop, run, {"a": 0.5})

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_row
 
-from nlctl import Clock, ParameterError
+from nlctl import Clock
+from nlctl.errors import ParameterError
 from nlctl.sampling.clock import Moment, instants, meetings, moments
 
 PERIODS = st.sampled_from([0.1, 0.2, 0.25, 0.3, 0.7, 1 / 3, 0.0123456789])

@@ -14,12 +14,12 @@ T = np.linspace(0, 1.5, 31)
 APART = 1e-7  # of the largest output
 ACTUATORS = {
     "play": nlctl.Backlash(m_r=1.0, m_l=1.3, c_r=0.2, c_l=-0.2),
-    "stop": nlctl.Stop(r=0.3),
-    "Prandtl-Ishlinskii": nlctl.PrandtlIshlinskii(),
-    "its inverse": nlctl.PrandtlIshlinskiiInverse(),
-    "generalised": nlctl.GeneralisedPrandtlIshlinskii(),
+    "stop": nlctl.actuators.Stop(r=0.3),
+    "Prandtl-Ishlinskii": nlctl.actuators.PrandtlIshlinskii(),
+    "its inverse": nlctl.actuators.PrandtlIshlinskiiInverse(),
+    "generalised": nlctl.actuators.GeneralisedPrandtlIshlinskii(),
     "relay": nlctl.Relay(on=0.2, off=-0.2, height=0.5),
-    "Preisach": nlctl.Preisach(),
+    "Preisach": nlctl.actuators.Preisach(),
     "dead zone": nlctl.DeadZone(),
     "rate limiter": nlctl.RateLimiter(),
     "lag": nlctl.Lag(),

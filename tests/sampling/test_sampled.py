@@ -8,9 +8,8 @@ import pytest
 from rows import each_row
 
 import nlctl
-from nlctl import AlgebraicLoopError, Clock, DivergedError, ParameterError
-from nlctl.errors import UsageError
-from nlctl.native import AuditError
+from nlctl import Clock
+from nlctl.errors import AlgebraicLoopError, AuditError, DivergedError, ParameterError, UsageError
 from nlctl.native.equations.reader import Reader
 from nlctl.params import declared_params
 from nlctl.sampling.clock import common_period
@@ -220,7 +219,7 @@ def test_parameters_keep_their_names():
     loop = nlctl.paper.example_1(controller=on_a_computer(0.01, delay=0.004, input_quantum=1e-3))
     known = list(nlctl.parameters(nlctl.paper.example_1()).index)
     assert set(nlctl.parameters(loop).index) - set(known) == {
-        f"controller.sampling.{field}" for field in declared_params(nlctl.Sampling)
+        f"controller.sampling.{field}" for field in declared_params(nlctl.sampling.Sampling)
     }
     assert set(known) <= set(nlctl.parameters(loop).index)
     times = np.linspace(0, 0.5, 11)
@@ -306,7 +305,7 @@ def test_linear_blocks_are_discretised_as_python_control_does(method):
 
 def test_a_record_takes_eulers_steps():
     """x[k+1] = x[k] + dt f(x[k]), by hand."""
-    plant = nlctl.block(nlctl.ForcedDuffing(), "plant")
+    plant = nlctl.block(nlctl.plants.ForcedDuffing(), "plant")
     made = nlctl.discretise(plant, 0.01)
     x = np.array([0.4, -0.3])
     for k in range(50):

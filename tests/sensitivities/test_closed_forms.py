@@ -255,7 +255,7 @@ def test_stick_slip():
         outputs=["velocity", "applied"], states=["position", "velocity"], params={"F": 1.8},
         name="mass",
     )  # fmt: skip
-    friction = nlctl.StickSlip(F_c=1.0, F_s=1.5)
+    friction = nlctl.actuators.StickSlip(F_c=1.0, F_s=1.5)
     loop = nlctl.interconnect({"mass": mass, "friction": friction}, outputs=["velocity"])
     check(
         loop, np.linspace(0, 5, 21), ["velocity"],
@@ -442,7 +442,10 @@ def test_play_behind_a_comparison():
         (nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.2, c_l=-0.2), {"actuator.c_r": 0.2}),
         (nlctl.Relay(on=0.6, off=-0.4), {"actuator.height": 1.0}),
         (nlctl.DeadZone(), {"actuator.b_r": nlctl.DeadZone().b_r}),
-        (nlctl.PrandtlIshlinskii(), {"actuator.w[0]": nlctl.PrandtlIshlinskii().w[0]}),
+        (
+            nlctl.actuators.PrandtlIshlinskii(),
+            {"actuator.w[0]": nlctl.actuators.PrandtlIshlinskii().w[0]},
+        ),
     ],
     ids=["backlash", "relay", "dead zone", "Prandtl-Ishlinskii"],
 )

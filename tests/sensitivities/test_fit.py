@@ -196,7 +196,7 @@ def shaken_mass():
         rates, lambda t, x, u, p: x, inputs=["push", "force"], outputs=["y", "velocity"],
         states=["y", "velocity"], params={"c": 10.0, "k": 5e4}, name="mass",
     )  # fmt: skip
-    spring = nlctl.BoucWen()
+    spring = nlctl.actuators.BoucWen()
     return nlctl.interconnect({"shaker": source, "mass": mass, "spring": spring}, outputs=["y"])
 
 

@@ -118,11 +118,11 @@ def test_no_derivative():
 
 def test_bad_input():
     """Signals that are not there, and times."""
-    with pytest.raises(nlctl.UnknownNameError, match="for metric 'm'"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="for metric 'm'"):
         nlctl.metric_gradient(Metric(key="m", signal="q", function=final), response())
     late = Metric(key="late", signal="x", function=final, start=7.0)
     with pytest.raises(nlctl.errors.ParameterError, match="no sample"):
         nlctl.metric_gradient(late, response())
     found = nlctl.metric_gradient(Metric(key="m", signal="x", function=final), response())
-    with pytest.raises(nlctl.UnknownNameError, match="of this gradient"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="of this gradient"):
         found["plant.v"]

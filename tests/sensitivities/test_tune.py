@@ -191,18 +191,18 @@ def test_nothing_is_lost_by_an_interrupt():
 )
 def test_bad_input(space, spec, more, words):
     """One sentence with the rule and the value."""
-    with pytest.raises(nlctl.ParameterError) as told:
+    with pytest.raises(nlctl.errors.ParameterError) as told:
         tuned(space, spec(), **more)
     assert words in str(told.value)
 
 
 def test_unknown_names():
     """The nearest one is named; a block refuses what it does not take."""
-    with pytest.raises(nlctl.UnknownNameError, match=r"plant\.a"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=r"plant\.a"):
         tuned({"plant.aa": (0.1, 1.0)}, small())
     lag = nlctl.block(nlctl.Lag(T=1.0), "lag")
     near = Requirement(key="near", formula=in_band("v", lower=0.5), until=1.0)
-    with pytest.raises(nlctl.ParameterError, match=r"bounds in \[0, inf\], as its block"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"bounds in \[0, inf\], as its block"):
         nlctl.tune(lag, {"lag.T": (-1.0, 2.0)}, near, inputs=1.0)
 
 

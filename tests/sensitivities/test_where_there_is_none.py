@@ -176,25 +176,25 @@ def test_jump_that_comes_back():
 def test_condition_on_a_delayed_signal():
     """Its rate is not kept: refused."""
     loop = delayed(lambda t, x, u, p: [np.where(u[0] > 0.5, 1.0, 2.0), 0.0])
-    with pytest.raises(nlctl.CompileError, match="depends on a delayed signal"):
+    with pytest.raises(nlctl.errors.CompileError, match="depends on a delayed signal"):
         nlctl.sensitivity_response(loop, [0, 1], with_respect_to=["plant.x(0)"])
 
 
 def test_what_is_refused():
     """Delays, clocks, discrete time, and names."""
     loop = delayed(lambda t, x, u, p: [-u[0], 0.0])
-    with pytest.raises(nlctl.CompileError, match=r"'wire.delay' is a delay"):
+    with pytest.raises(nlctl.errors.CompileError, match=r"'wire.delay' is a delay"):
         nlctl.sensitivity_response(loop, [0, 1], with_respect_to=["wire.delay"])
     law = ct.nlsys(None, lambda t, x, u, p: [-u[0]], inputs=["y"], outputs=["u"], name="law")
     plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
     sampled = nlctl.interconnect({"plant": plant, "law": nlctl.sampled(law, 0.1)}, outputs=["y"])
-    with pytest.raises(nlctl.CompileError, match="says when samples are taken"):
+    with pytest.raises(nlctl.errors.CompileError, match="says when samples are taken"):
         nlctl.sensitivity_response(sampled, [0, 1], with_respect_to=["law.sampling.dt"])
     discrete = ct.nlsys(
         lambda t, x, u, p: [0.5 * x[0]], lambda t, x, u, p: x, states=1, inputs=0, outputs=1,
         dt=0.1, name="d",
     )  # fmt: skip
-    with pytest.raises(nlctl.CompileError, match="discrete time"):
+    with pytest.raises(nlctl.errors.CompileError, match="discrete time"):
         nlctl.sensitivity_response(discrete, [0, 0.1], with_respect_to=["d.x[0](0)"])
 
 
@@ -218,9 +218,9 @@ def test_names(of, by, error, match):
 def test_names_of_a_response():
     """Labels of a response are looked up; a table has a column for each derivative."""
     made = nlctl.sensitivity_response(jumping_rate(), [0, 1], with_respect_to="plant.p")
-    with pytest.raises(nlctl.UnknownNameError, match="unknown signal"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="unknown signal"):
         made["y", "plant.p"]
-    with pytest.raises(nlctl.UnknownNameError, match="unknown quantity"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="unknown quantity"):
         made["x", "p"]
     table = made.to_pandas()
     assert list(table.columns) == ["time", "x", "d(x)/d(plant.p)"]
@@ -231,7 +231,7 @@ def test_names_of_a_response():
 def test_diverged_run():
     """x' = x^2 from 1 has no state at t = 1: the error of the run itself."""
     plant = block(lambda t, x, u, p: [p["a"] * x[0] ** 2], {"a": 1.0})
-    with pytest.raises(nlctl.DivergedError, match="t = 1 s"):
+    with pytest.raises(nlctl.errors.DivergedError, match="t = 1 s"):
         nlctl.sensitivity_response(plant, [0, 2], 0, [1.0], with_respect_to=["plant.a"])
 
 
@@ -246,7 +246,7 @@ def test_opaque_function():
         update, lambda t, x, u, p: x, inputs=0, outputs=["x"], states=["x"], params={"a": 1.0},
         name="plant",
     )  # fmt: skip
-    with pytest.warns(nlctl.InexactWarning, match="called as it stands"):
+    with pytest.warns(nlctl.errors.InexactWarning, match="called as it stands"):
         made = nlctl.sensitivity_response(plant, [0, 1], with_respect_to=["plant.a", "plant.x(0)"])
     known = block(lambda t, x, u, p: [-p["a"] * x[0] + np.sin(x[0]) / x[0]], {"a": 1.0})
     exact = nlctl.sensitivity_response(

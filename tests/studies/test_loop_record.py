@@ -186,7 +186,7 @@ def loop():
         ("Soft(limit=30.0)", "Soft(limit=31.0)", "parameters", "actuator.limit"),
         ('{"x1": 0.5}', '{"x1": 0.6}', "initial_state", "plant.x1"),
         ('"actuator": Soft', '"motor": Soft', "wiring", "diagram"),
-        ("neural(order=2)", "neural(order=2, law=nlctl.KnownSignLaw())",
+        ("neural(order=2)", "neural(order=2, law=nlctl.controllers.KnownSignLaw())",
          "blocks", "controller.law"),
     ],
 )  # fmt: skip

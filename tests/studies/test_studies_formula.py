@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_row
 
-from nlctl import ParameterError
 from nlctl.analysis.robustness.stl.formula import (
     And,
     SampledSignals,
@@ -17,6 +16,7 @@ from nlctl.analysis.robustness.stl.formula import (
     margin_trace,
 )
 from nlctl.analysis.robustness.stl.text import parse_formula
+from nlctl.errors import ParameterError
 
 numbers = st.integers(-400, 400).map(lambda n: n / 8)
 names = st.sampled_from(["e", "u", "x1", "plant.x2", "y[0]", "W_norm", "s_1", "inner"])

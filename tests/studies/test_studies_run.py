@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 from studies_example import HEAD, ROWS, write
 
-from nlctl import ParameterError, UnknownNameError
 from nlctl.analysis.robustness import (
     clopper_pearson,
     elementary_effects,
@@ -35,6 +34,7 @@ from nlctl.analysis.studies.file.schema import keyed
 from nlctl.analysis.studies.folder import load_finding, load_run, save_finding
 from nlctl.analysis.studies.sealed import origin_key
 from nlctl.analysis.studies.whole.contents import seal
+from nlctl.errors import ParameterError, UnknownNameError
 
 EVERY_KIND = """
 [runs]

@@ -3,8 +3,8 @@
 import pytest
 from places import ROOT
 
-from nlctl import UnknownNameError
 from nlctl.analysis.studies import read_study, shipped
+from nlctl.errors import UnknownNameError
 
 NAMES = sorted(path.stem for path in (ROOT / "reports").glob("*.toml"))
 

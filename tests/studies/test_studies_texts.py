@@ -3,8 +3,8 @@
 import pytest
 from studies_example import HEAD, write
 
-from nlctl import ParameterError
 from nlctl.analysis.studies import load_result, read_study, replay, run, verify
+from nlctl.errors import ParameterError
 
 
 @pytest.mark.slow

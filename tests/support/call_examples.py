@@ -18,6 +18,16 @@ from nlctl.analysis.intervals.box import Box
 from nlctl.analysis.loop_report import loop_report
 from nlctl.analysis.robustness import Choice, Requirement, Space, Spec, Uncertain, always, in_band
 
+
+def public_things():
+    """What nlctl has at its top and in its rooms, each once."""
+    top = [getattr(nlctl, name) for name in dir(nlctl)]
+    rooms = [thing for thing in top if inspect.ismodule(thing)]
+    inside = [getattr(room, name) for room in rooms for name in room.__all__]
+    found = {id(thing): thing for thing in (*top, *inside)}.values()
+    return sorted(found, key=lambda thing: getattr(thing, "__name__", ""))
+
+
 T = np.linspace(0.0, 1.0, 11)
 X = Uncertain(name="x", bounds=(-1.0, 1.0), nominal=0.0)
 Y = Uncertain(name="y", bounds=(-1.0, 1.0), nominal=0.0)
@@ -68,7 +78,7 @@ NLCTL = {
     nlctl.interconnect: lambda: {"blocks": {"a": nlctl.Gain()}, "inputs": ["u"], "outputs": ["v"],
                                  "name": "d"},
     nlctl.block: lambda: {"spec": nlctl.Lag(), "name": "lag", "dt": None},
-    nlctl.cascade: lambda: {"stages": {"lag": nlctl.Lag(), "dead": nlctl.DeadZone()},
+    nlctl.actuators.cascade: lambda: {"stages": {"lag": nlctl.Lag(), "dead": nlctl.DeadZone()},
                             "name": "c"},
     nlctl.compile: lambda: {"system": chain(), "params": {"first.k": 1.0},
                             "algebraic_loops": "error"},
@@ -95,20 +105,22 @@ NLCTL = {
     nlctl.with_faults: lambda: {"diagram": lag()},
     nlctl.adaptive_neural: lambda: {"order": 2, "filtered_error": None, "basis": None,
                                     "weights": None, "robust": None, "law": None, "name": "c"},
-    nlctl.mrac: lambda: {"model": nlctl.ReferenceModel(), "error": None, "basis": None,
-                         "weights": None, "law": None, "name": "c"},
-    nlctl.l1_adaptive: lambda: {"predictor": nlctl.StatePredictor(), "error": None, "basis": None,
-                                "weights": None, "law": None, "name": "c"},
+    nlctl.mrac: lambda: {"model": nlctl.controllers.ReferenceModel(), "error": None,
+                         "basis": None, "weights": None, "law": None, "name": "c"},
+    nlctl.l1_adaptive: lambda: {"predictor": nlctl.controllers.StatePredictor(), "error": None,
+                                "basis": None, "weights": None, "law": None, "name": "c"},
     nlctl.sliding_mode: lambda: {"filtered_error": None, "law": None, "name": "c"},
-    nlctl.dynamic_surface_control: lambda: {"surface": nlctl.DynamicSurface(), "basis": None,
-                                            "weights": None, "law": None, "name": "c"},
-    nlctl.ablations: lambda: {"controller": nlctl.adaptive_neural(), "kappa": 10.0},
-    nlctl.replaced: lambda: {"controller": nlctl.adaptive_neural(), "robust": nlctl.RobustTerm()},
-    nlctl.diagonal_centres: lambda: {"count": 3, "inputs": 2, "low": -1.0, "high": 1.0},
-    nlctl.grid_centres: lambda: {"counts": [2, 2], "low": -1.0, "high": 1.0},
-    nlctl.latin_hypercube_centres: lambda: {"count": 3, "inputs": 2, "low": -1.0, "high": 1.0,
-                                            "seed": 1},
-    nlctl.relay_grid: lambda: {"levels": [-1.0, 0.0, 1.0]},
+    nlctl.dynamic_surface_control: lambda: {
+        "surface": nlctl.controllers.DynamicSurface(), "basis": None, "weights": None, "law": None,
+        "name": "c"},
+    nlctl.controllers.ablations: lambda: {"controller": nlctl.adaptive_neural(), "kappa": 10.0},
+    nlctl.controllers.replaced: lambda: {"controller": nlctl.adaptive_neural(),
+                                         "robust": nlctl.controllers.RobustTerm()},
+    nlctl.controllers.diagonal_centres: lambda: {"count": 3, "inputs": 2, "low": -1.0, "high": 1.0},
+    nlctl.controllers.grid_centres: lambda: {"counts": [2, 2], "low": -1.0, "high": 1.0},
+    nlctl.controllers.latin_hypercube_centres: lambda: {"count": 3, "inputs": 2, "low": -1.0,
+                                                        "high": 1.0, "seed": 1},
+    nlctl.actuators.relay_grid: lambda: {"levels": [-1.0, 0.0, 1.0]},
     nlctl.param: lambda: {"default": 1.0, "unit": "1", "meaning": "gain", "above": 0.0,
                           "below": 2.0, "at_least": None, "at_most": None, "symbol": "k",
                           "may_be_empty": False},
@@ -126,8 +138,8 @@ RECORDS = {
         for field in kind.__dataclass_fields__.values()
         if field.init and field.default is not dataclasses.MISSING
     }
-    for name in dir(nlctl)
-    if isinstance(kind := getattr(nlctl, name), type) and "nlctl" in str(
+    for kind in public_things()
+    if isinstance(kind, type) and "nlctl" in str(
         [f.metadata for f in getattr(kind, "__dataclass_fields__", {}).values()])
 }  # fmt: skip
 DESIGNS = {
@@ -320,9 +332,9 @@ PROOFS = {
     lyapunov.drift: lambda: {"response": short_run()},
     lyapunov.nussbaum_property: lambda: {"end": 10.0},
     lyapunov.signals_of: lambda: {"response": short_run()},
-    lyapunov.sector: lambda: {"plant": nlctl.Genesio(), "box": CUBE, "tol": 1.0,
+    lyapunov.sector: lambda: {"plant": nlctl.plants.Genesio(), "box": CUBE, "tol": 1.0,
                               "max_boxes": 100},
-    lyapunov.disturbance: lambda: {"plant": nlctl.ForcedDuffing(), "box": SQUARE,
+    lyapunov.disturbance: lambda: {"plant": nlctl.plants.ForcedDuffing(), "box": SQUARE,
                                    "times": (0.0, 1.0), "tol": 1.0},
     lyapunov.slow_drift: lambda: {"response": short_run(), "loop": None, "window": 0.03, "skip": 1,
                                   "kG": 1.0},
@@ -350,9 +362,9 @@ METHODS = {
         "parameters": ["plant.k"], "x0": (0.5,), "u0": (1.0,), "t": 0.0, "params": None},
     ready().linearize: lambda: {
         "x0": (0.5,), "u0": (1.0,), "t": 0.0, "params": None, "copy_names": True},
-    nlctl.Sampled: lambda: {
+    nlctl.sampling.Sampled: lambda: {
         "inner": nlctl.block(nlctl.Lag(), "lag"),
-        "sampling": nlctl.block(nlctl.Sampling(dt=0.1), "sampling"), "euler": True,
+        "sampling": nlctl.block(nlctl.sampling.Sampling(dt=0.1), "sampling"), "euler": True,
         "delays": False, "converters": ("", "")},
     lyapunov.aftermath: lambda: {"zeta": 2.0, "kG": (1.0, 1.0), "energy": 0.0, "drag": 0.0},
 }  # fmt: skip

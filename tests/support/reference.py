@@ -81,13 +81,13 @@ def methods():
     contract = {name for head in heads for name in head.split(", ")}
     for home, name in documented_names():
         made = getattr(importlib.import_module(home), name)
-        if not inspect.isclass(made) or made is nlctl.Sampled:
+        if not inspect.isclass(made) or made is nlctl.sampling.Sampled:
             continue
         for key, method in vars(made).items():
             method = getattr(method, "__func__", method)  # of a class method, say
             if (
                 key.startswith("_")
-                or (key in contract and made is not nlctl.Stepper)
+                or (key in contract and made is not nlctl.native.Stepper)
                 or getattr(method, "__name__", "") != key
             ):
                 continue

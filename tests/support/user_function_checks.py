@@ -128,7 +128,7 @@ def shown(name: str, found: np.ndarray, wanted: np.ndarray | None) -> str:
 class Plain:
     """The lowered program of a diagram, run as plain Python."""
 
-    def __init__(self, compiled: nlctl.Compiled) -> None:
+    def __init__(self, compiled: nlctl.native.Compiled) -> None:
         self.compiled, self.system = compiled, compiled.system
         self.programs: dict[int, Any] = {}
 

@@ -62,7 +62,7 @@ def verdict(args: tuple, kwargs: dict) -> tuple[str, str]:
             return "not compared", f"python-control raises {type(error).__name__}: {error}"
         try:
             found = native(given)
-        except (UsageError, nlctl.DivergedError) as error:
+        except (UsageError, nlctl.errors.DivergedError) as error:
             return "refused", f"{type(error).__name__}: {error}"
         except Exception as error:
             return "error", f"{type(error).__name__}: {error}"

@@ -117,7 +117,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     Parameters
     ----------
     plant : record
-        Plant of the class (1) with f(x, v), for instance `nlctl.ForcedDuffing`.
+        Plant of the class (1) with f(x, v), for instance `nlctl.plants.ForcedDuffing`.
     box : Box
         Sides x1, ..., xn and v.
     tol : float, optional
@@ -144,7 +144,7 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, sector
     >>> box = Box(names=("x1", "x2", "v"), low=(-1.0, -1.0, 0.0), high=(1.0, 1.0, 5.0))
-    >>> found = sector(nlctl.ForcedDuffing(), box).positive
+    >>> found = sector(nlctl.plants.ForcedDuffing(), box).positive
     >>> 0.9 * 0.8 <= found.low and found.high <= 1.1 * 1.2 + 1e-6
     True
     """

@@ -227,7 +227,7 @@ def approximation_error(
     plant : record
         Plant of the class (1).
     basis : record or None
-        `nlctl.GaussianBasis`, of the first states; may be None without weights.
+        `nlctl.controllers.GaussianBasis`, of the first states; may be None without weights.
     W : array_like of shape (l,)
         Any weights of norm up to 1e5.
     box : Box
@@ -254,7 +254,7 @@ def approximation_error(
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import Box, approximation_error
     >>> box = Box(names=("x1", "x2", "x3"), low=(0.0,) * 3, high=(0.1, 0.0, 0.0))
-    >>> found = approximation_error(nlctl.Genesio(), None, (), box)
+    >>> found = approximation_error(nlctl.plants.Genesio(), None, (), box)
     >>> print(round(found.low, 2), round(abs(found.high), 2))
     -0.59 0.0
     """

@@ -45,19 +45,20 @@ def certify(
 ) -> Certificate:
     """Prove a bound of the tracking error for all time, or say why it cannot be proved.
 
-    Which proof it is depends on the controller.  With `nlctl.KnownSignLaw`: |r| <= C_0 by (31) with
-    a known sign.  With a reference model, as `nlctl.mrac` makes one: V = E^T P E + lambda |W_hat -
-    W|^2 / Gamma, for weights with sigma- or e-modification or projection, and without any if
-    nothing disturbs.  With `nlctl.SlidingModeLaw`: |r| falls wherever K dominates.  The box is
-    closed by a monotone iteration bound -> box -> disturbance -> bound from below, in ball
-    arithmetic; every constant is proved on the box that is used.
+    Which proof it is depends on the controller.  With `nlctl.controllers.KnownSignLaw`: |r| <= C_0
+    by (31) with a known sign.  With a reference model, as `nlctl.mrac` makes one: V = E^T P E +
+    lambda |W_hat - W|^2 / Gamma, for weights with sigma- or e-modification or projection, and
+    without any if nothing disturbs.  With `nlctl.controllers.SlidingModeLaw`: |r| falls wherever K
+    dominates.  The box is closed by a monotone iteration bound -> box -> disturbance -> bound from
+    below, in ball arithmetic; every constant is proved on the box that is used.
 
     Parameters
     ----------
     loop : control.InterconnectedSystem
         A plant of class (1), an actuator with a split (2), a reference, and one of these
-        controllers; of the blocks that `nlctl.paper.example_1` connects, with `nlctl.KnownSignLaw`
-        instead of the Nussbaum law and a `nlctl.SumOfSines` reference.
+        controllers; of the blocks that `nlctl.paper.example_1` connects, with
+        `nlctl.controllers.KnownSignLaw` instead of the Nussbaum law and a `nlctl.SumOfSines`
+        reference.
     params : mapping, optional
         Overrides by qualified name, as in a run.
     inputs : mapping, optional
@@ -108,8 +109,9 @@ def certify(
     --------
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
-    >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
-    >>> weights = nlctl.AdaptiveWeights(Gamma=10.0)
+    >>> law = nlctl.controllers.KnownSignLaw()
+    >>> robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    >>> weights = nlctl.controllers.AdaptiveWeights(Gamma=10.0)
     >>> controller = nlctl.adaptive_neural(2, law=law, weights=weights, robust=robust)
     >>> found = certify(nlctl.paper.example_1(controller=controller))
     >>> known = (2 * max(found.V_0, found.alpha_0 / found.alpha_1)) ** 0.5
@@ -123,8 +125,8 @@ def certify(
     >>> plant = nlctl.PureFeedback(
     ...     order=1, f=lambda x, v: 2.0 * x[0] + v, d=lambda x, t: 0.5 * np.sin(t)
     ... )
-    >>> weights = nlctl.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
-    >>> controller = nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=0.0), weights=weights)
+    >>> weights = nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
+    >>> controller = nlctl.mrac(nlctl.controllers.ReferenceModel(a=(1.0,), b=0.0), weights=weights)
     >>> blocks = {"reference": nlctl.SumOfSines(order=0), "actuator": nlctl.Gain()}
     >>> found = certify(nlctl.interconnect({**blocks, "plant": plant, "controller": controller}))
     >>> print(found.holds, round(found.V_max, 6))

@@ -149,7 +149,8 @@ def design(
     --------
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import design
-    >>> law, robust = nlctl.KnownSignLaw(), nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    >>> law = nlctl.controllers.KnownSignLaw()
+    >>> robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
     >>> no_network = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
     >>> controller = nlctl.adaptive_neural(2, law=law, weights=no_network, robust=robust)
     >>> loop = nlctl.paper.example_1(controller=controller)

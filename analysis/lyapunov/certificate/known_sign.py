@@ -1,4 +1,4 @@
-r"""A bound that holds for all time: the loop with `nlctl.KnownSignLaw`, proved by intervals.
+r"""A bound for all time: the loop with `nlctl.controllers.KnownSignLaw`, proved by intervals.
 
 With W = 0 in (19), which is as good as any other fixed W, and as long as x stays in a box on which
 delta* >= |g + d + G eps_u| and k G >= 1/N_0 hold,
@@ -59,7 +59,7 @@ _LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 @dataclass(frozen=True, kw_only=True)
 class KnownSignLoop(FilteredLoop):
-    """The records of a loop with `nlctl.KnownSignLaw`, and where it starts."""
+    """The records of a loop with `nlctl.controllers.KnownSignLaw`, and where it starts."""
 
     parts: Parts  # records of the blocks, and the gains
     delta_hat_0: arb
@@ -78,7 +78,7 @@ class KnownSignLoop(FilteredLoop):
 
 @dataclass(frozen=True, kw_only=True)
 class KnownSignCertificate(FilteredCertificate):
-    """What `certify` proved of a loop with `nlctl.KnownSignLaw`: |r| <= C_0 for all time.
+    """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def read_known_sign(
     inputs: Mapping[str, float] | None = None,
     starts: Any = None,
 ) -> KnownSignLoop:
-    """Read a loop that is made of the paper's blocks and `nlctl.KnownSignLaw`."""
+    """Read a loop that is made of the paper's blocks and `nlctl.controllers.KnownSignLaw`."""
     read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
     parts = loop_parts(read.given, read.roles)
     return KnownSignLoop(

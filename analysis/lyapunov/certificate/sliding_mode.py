@@ -69,7 +69,7 @@ class SlidingModeCertificate(FilteredCertificate):
 
     >>> import nlctl
     >>> from nlctl.analysis.lyapunov import certify
-    >>> controller = nlctl.controllers.sliding_mode(law=nlctl.SlidingModeLaw(K=20.0, phi=0.1))
+    >>> controller = nlctl.sliding_mode(law=nlctl.controllers.SlidingModeLaw(K=20.0, phi=0.1))
     >>> loop = nlctl.paper.example_1(controller=controller, actuator=nlctl.Gain())
     >>> found = certify(loop)
     >>> print(found.holds, found.ultimate < 0.1, found.u_max)

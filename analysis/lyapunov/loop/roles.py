@@ -338,7 +338,7 @@ class Parts:
     plant, actuator, filtered_error, robust, law : record
         With the parameters of the run.
     basis, weights : record or None
-        None where `nlctl.Zero` replaces the network.
+        None where `nlctl.controllers.Zero` replaces the network.
     roles : Roles
         Places of the blocks in the diagram.
     gains : Gains

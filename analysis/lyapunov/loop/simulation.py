@@ -13,8 +13,7 @@ from nlctl import native
 from nlctl.arguments import number
 from nlctl.diagrams import initial_state
 from nlctl.diagrams import state_names as all_states
-from nlctl.errors import DiagramError, ParameterError
-from nlctl.native import AlgebraicLoopError
+from nlctl.errors import AlgebraicLoopError, DiagramError, ParameterError
 from nlctl.response import input_output_response
 from nlctl.wording import counted
 

@@ -5,9 +5,10 @@ With v = k u + eps_u and lambda = beta k / gain > 0, whatever beta, W and k are,
 .. math:: E_n' = -K^T E - \lambda (\hat{W} - W)^T \psi + \delta, \quad
    \delta = x_n' - \beta v - c (\nu + \nu_e) - \lambda W^T \psi + \beta\, \epsilon_u,
 
-with c = 1 - lambda for `nlctl.ModelReferenceLaw` and c = 1 for `nlctl.DirectLaw`.  beta is the
-coefficient of v in the plant's own equation, and W takes away as much of it as the regressor spans,
-in rational arithmetic: where it spans all, nothing of delta is left but disturbances.
+with c = 1 - lambda for `nlctl.controllers.ModelReferenceLaw` and c = 1 for
+`nlctl.controllers.DirectLaw`.  beta is the coefficient of v in the plant's own equation, and W
+takes away as much of it as the regressor spans, in rational arithmetic: where it spans all, nothing
+of delta is left but disturbances.
 """
 
 from __future__ import annotations

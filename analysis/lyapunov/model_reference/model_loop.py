@@ -95,7 +95,7 @@ class ModelReferenceLoop:
 
     @property
     def own_feedback(self) -> bool:
-        """Whether the law adds nu + nu_e itself; `nlctl.DirectLaw` learns it."""
+        """Whether the law adds nu + nu_e itself; `nlctl.controllers.DirectLaw` learns it."""
         return isinstance(self.spec("law"), ModelReferenceLaw)
 
     @property

@@ -9,8 +9,7 @@ import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
-from nlctl.errors import DivergedError, UsageError
-from nlctl.native import AuditError
+from nlctl.errors import AuditError, DivergedError, UsageError
 from nlctl.sensitivities import sensitivity_response
 
 from ..runs.experiment import Prepared, by_diagram

@@ -63,7 +63,8 @@ MADE_OF = tuple(
     f"nlctl.{room}"
     for room in ("actuators", "blocks", "controllers", "delays", "diagrams", "faults", "functions")
 ) + (
-    *(f"nlctl.{room}" for room in ("paper", "plants", "references", "sampling", "sliding")),
+    *(f"nlctl.{room}" for room in ("observers", "paper", "plants", "references", "sampling")),
+    *(f"nlctl.{room}" for room in ("sliding", "sources")),
     *(f"nlctl.analysis.paper.{part}" for part in ("controllers", "loops", "rivals")),
     *(
         "nlctl.analysis.metrics",

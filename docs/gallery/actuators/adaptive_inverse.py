@@ -26,7 +26,7 @@ t = np.linspace(0, 40, 20_001)
 figure, axes = plt.subplots(figsize=(6, 3))
 spent = {}
 for label, gamma in (("fixed estimates", 1e-9), ("adaptive", 0.5)):
-    inverse = nlctl.AdaptiveDeadZoneInverse(gamma=gamma, b_0=1.5)
+    inverse = nlctl.controllers.AdaptiveDeadZoneInverse(gamma=gamma, b_0=1.5)
     loop = nlctl.interconnect(
         {"plant": plant, "inverse": inverse, "actuator": zone}, outputs=["r", "b_r_hat"]
     )

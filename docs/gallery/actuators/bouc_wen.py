@@ -12,7 +12,7 @@ import numpy as np
 
 import nlctl
 
-record = nlctl.BoucWen(gamma=0.9, delta=0.3)
+record = nlctl.actuators.BoucWen(gamma=0.9, delta=0.3)
 block = nlctl.block(record, "spring")
 t = np.linspace(0, 3, 3001)
 forces = []

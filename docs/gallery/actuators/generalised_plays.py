@@ -16,10 +16,10 @@ import nlctl
 
 c, t = 0.6, np.linspace(0, 1, 4001)
 shown = {
-    "between two equal saturations": nlctl.GeneralisedPrandtlIshlinskii(
+    "between two equal saturations": nlctl.actuators.GeneralisedPrandtlIshlinskii(
         rising=(1, 1, -c, 0), falling=(1, 1, c, 0), w=(1,), r=(0,)
     ),
-    "four plays, another falling envelope": nlctl.GeneralisedPrandtlIshlinskii(
+    "four plays, another falling envelope": nlctl.actuators.GeneralisedPrandtlIshlinskii(
         rising=(1, 1, -0.4, 0), falling=(1.2, 1.2, 0.6, 0.25), r=(0, 0.1, 0.2, 0.3)
     ),
 }

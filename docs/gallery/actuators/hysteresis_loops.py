@@ -15,12 +15,12 @@ import nlctl
 A, t = 2.0, np.linspace(0, 4 * np.pi, 16_001)
 u = A * np.sin(t)
 w, r = (0.25, 0.15, 0.1), (0.2, 0.6, 1.2)
-alpha, beta = nlctl.relay_grid(np.linspace(-1.5, 1.5, 7))
+alpha, beta = nlctl.actuators.relay_grid(np.linspace(-1.5, 1.5, 7))
 shown = {
     "Relay": nlctl.Relay(on=0.7, off=-0.7, height=1.0),
-    "Stop": nlctl.Stop(r=1.0),
-    "PrandtlIshlinskii": nlctl.PrandtlIshlinskii(w=w, r=r),
-    "Preisach": nlctl.Preisach(alpha=alpha, beta=beta, w=(1 / len(alpha),) * len(alpha)),
+    "Stop": nlctl.actuators.Stop(r=1.0),
+    "PrandtlIshlinskii": nlctl.actuators.PrandtlIshlinskii(w=w, r=r),
+    "Preisach": nlctl.actuators.Preisach(alpha=alpha, beta=beta, w=(1 / len(alpha),) * len(alpha)),
 }
 known = {
     "Relay": 4 * 0.7 * 1.0,

@@ -13,8 +13,8 @@ import numpy as np
 
 import nlctl
 
-inverse, operator = nlctl.PrandtlIshlinskiiInverse(), nlctl.PrandtlIshlinskii()
-series = nlctl.cascade({"inverse": inverse, "operator": operator})
+inverse, operator = nlctl.actuators.PrandtlIshlinskiiInverse(), nlctl.actuators.PrandtlIshlinskii()
+series = nlctl.actuators.cascade({"inverse": inverse, "operator": operator})
 t = np.linspace(0, 20, 4001)
 u = np.sin(t) + 0.6 * np.sin(2.3 * t)
 v = nlctl.input_output_response(series, t, u).outputs.ravel()
@@ -32,7 +32,7 @@ assert np.abs(v - u).max() < 1e-6
 # %%
 # The backlash follows once its gap has been crossed; its inverse jumps by the whole gap.
 wave = nlctl.SumOfSines(order=1, amplitudes=(1.0, 0.6), frequencies=(1.0, 2.3))
-parts = {"wave": wave, "inverse": nlctl.BacklashInverse(), "gap": nlctl.Backlash()}
+parts = {"wave": wave, "inverse": nlctl.actuators.BacklashInverse(), "gap": nlctl.Backlash()}
 loop = ct.interconnect(
     [nlctl.block(record, name) for name, record in parts.items()],
     connections=[["inverse.u", "wave.yd"], ["inverse.u1", "wave.yd1"], ["gap.u", "inverse.v"]],

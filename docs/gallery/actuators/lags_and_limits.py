@@ -15,7 +15,7 @@ t = np.linspace(0, 1.5, 3001)
 zeta, omega = 0.4, 20.0
 shown = {
     "Lag": nlctl.Lag(T=0.1),
-    "SecondOrderLag": nlctl.SecondOrderLag(omega=omega, zeta=zeta),
+    "SecondOrderLag": nlctl.actuators.SecondOrderLag(omega=omega, zeta=zeta),
     "RateLimiter": nlctl.RateLimiter(rise=2.0, fall=-2.0),
 }
 v = {}

@@ -12,8 +12,8 @@ import numpy as np
 import nlctl
 
 levels = np.linspace(-1, 1, 21)
-alpha, beta = nlctl.relay_grid(levels)
-operator = nlctl.Preisach(alpha=alpha, beta=beta, w=(1 / len(alpha),) * len(alpha))
+alpha, beta = nlctl.actuators.relay_grid(levels)
+operator = nlctl.actuators.Preisach(alpha=alpha, beta=beta, w=(1 / len(alpha),) * len(alpha))
 block = nlctl.block(operator, "operator")
 corners = {"calm": [0, 0.1, 0, 1.2, -0.45, 0.33], "busy": [0, 0.9, -0.6, 1.2, -0.45, 0.33]}
 t = np.linspace(0, 5, 2001)

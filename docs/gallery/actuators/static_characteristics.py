@@ -25,10 +25,10 @@ dead_zone = nlctl.block(nlctl.DeadZone(ripple_r=0, ripple_l=0, **zone), "dead_zo
 shown = {
     "Gain": nlctl.Gain(k=0.7),
     "Saturation": nlctl.Saturation(limit=1.5),
-    "AsymmetricSaturation": nlctl.AsymmetricSaturation(limit_r=2.0, limit_l=-1.0),
+    "AsymmetricSaturation": nlctl.actuators.AsymmetricSaturation(limit_r=2.0, limit_l=-1.0),
     "Quantiser": nlctl.Quantiser(q=0.5),
-    "OneSidedDeadZones": nlctl.OneSidedDeadZones(),
-    "DeadZoneInverse": nlctl.DeadZoneInverse(**zone),
+    "OneSidedDeadZones": nlctl.actuators.OneSidedDeadZones(),
+    "DeadZoneInverse": nlctl.actuators.DeadZoneInverse(**zone),
 }
 v = {name: characteristic(record) for name, record in shown.items()}
 figure, axes = plt.subplots(2, 3, sharex=True, figsize=(8, 4.5), layout="constrained")

@@ -11,14 +11,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 r, psi = 0.3, np.array([0.8, 0.2])
 t = np.linspace(0, 10, 1001)
 tight = {"rtol": 1e-10, "atol": 1e-12}
-weights = nlctl.block(nlctl.AdaptiveWeights(nodes=2, Gamma=2.0, sigma_1=0.5), "weights")
+weights = nlctl.block(controllers.AdaptiveWeights(nodes=2, Gamma=2.0, sigma_1=0.5), "weights")
 inputs = np.repeat([[r], [psi[0]], [psi[1]]], t.size, axis=1)
 W = nlctl.input_output_response(weights, t, inputs, **tight).states
-robust = nlctl.block(nlctl.RobustTerm(gamma=1.0, sigma_2=0.5, tau=0.2), "robust")
+robust = nlctl.block(controllers.RobustTerm(gamma=1.0, sigma_2=0.5, tau=0.2), "robust")
 delta = nlctl.input_output_response(robust, t, r, **tight).states[0]
 
 figure, axes = plt.subplots(figsize=(6, 3))
@@ -32,8 +33,8 @@ assert np.abs(delta - r * np.tanh(r / 0.2) / 0.5 * (1 - np.exp(-0.5 * t))).max()
 # %%
 # The error itself is filtered: (14) with :math:`\lambda_{1} = 1.5` is :math:`r = 1.5 e + \dot{e}`. A piece that is left out
 # is ``Zero``.
-error = nlctl.block(nlctl.FilteredError(lambdas=(1.5,)), "filtered_error")
+error = nlctl.block(controllers.FilteredError(lambdas=(1.5,)), "filtered_error")
 values = {"x1": 0.5, "x2": 0.2, "yd": 0.1, "yd1": -0.3}
 u = [values.get(name, 0.0) for name in error.input_labels]
 assert np.isclose(error.output(0, [], u)[error.output_index["r"]], 1.5 * 0.4 + 0.5)
-assert not any(nlctl.block(nlctl.Zero(outputs=("W_psi", "W_norm")), "none").output(0, [], []))
+assert not any(nlctl.block(controllers.Zero(outputs=("W_psi", "W_norm")), "none").output(0, [], []))

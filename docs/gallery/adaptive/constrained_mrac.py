@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 
 @nlctl.equation
@@ -25,8 +26,8 @@ blocks = {
     "actuator": nlctl.Gain(),
 }
 errors = {
-    "all of the error": nlctl.ModelError(K=(1.0,), Q=(2.0,)),
-    "its controllable part": nlctl.ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0),
+    "all of the error": controllers.ModelError(K=(1.0,), Q=(2.0,)),
+    "its controllable part": controllers.ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0),
 }
 start = {"controller.model.xm1": -9.9}
 start |= {"controller.weights.W_hat[0]": 2.2, "controller.weights.W_hat[1]": -1.1}
@@ -34,10 +35,10 @@ t, gains = np.linspace(0, 20, 4001), {}
 figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6, 4))
 for label, error in errors.items():
     controller = nlctl.mrac(
-        nlctl.ReferenceModel(a=(1.0,), b=1.0),
+        controllers.ReferenceModel(a=(1.0,), b=1.0),
         error=error,
-        weights=nlctl.AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
-        law=nlctl.ConstrainedLaw(u_max=10.0),
+        weights=controllers.AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
+        law=controllers.ConstrainedLaw(u_max=10.0),
     )
     loop = nlctl.interconnect({**blocks, "controller": controller}, outputs=["x1", "u", "r"])
     response = nlctl.input_output_response(loop, t, 0, nlctl.initial_state(loop, start))

@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 
 @nlctl.equation
@@ -23,11 +24,11 @@ command = nlctl.SumOfSines(
     order=0, amplitudes=(1.0, 1.0), frequencies=(1.0, 3.0), phases=(0.0, 1.0)
 )
 controller = nlctl.mrac(
-    nlctl.ReferenceModel(a=(3.0,), b=3.0),
-    error=nlctl.ModelError(K=(3.0,), Q=(1.0,)),
-    basis=nlctl.LinearRegressor(order=1),
-    weights=nlctl.AdaptiveWeights(nodes=2, Gamma=20.0, sigma_1=0.0),
-    law=nlctl.DirectLaw(),
+    controllers.ReferenceModel(a=(3.0,), b=3.0),
+    error=controllers.ModelError(K=(3.0,), Q=(1.0,)),
+    basis=controllers.LinearRegressor(order=1),
+    weights=controllers.AdaptiveWeights(nodes=2, Gamma=20.0, sigma_1=0.0),
+    law=controllers.DirectLaw(),
 )
 plant = nlctl.PureFeedback(order=1, f=unstable)
 loop = nlctl.interconnect(

@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 
 @nlctl.equation
@@ -25,9 +26,9 @@ def pendulum(x, v):
 
 
 tau, omega = 0.02, 1.3
-grid = nlctl.GaussianBasis(centres=nlctl.grid_centres([7, 7], -2, 2), widths=(0.8,))
-learning = nlctl.AdaptiveWeights(nodes=49, Gamma=50.0, sigma_1=0.001)
-none = nlctl.Zero(outputs=("W_psi", "W_norm"))
+grid = controllers.GaussianBasis(centres=controllers.grid_centres([7, 7], -2, 2), widths=(0.8,))
+learning = controllers.AdaptiveWeights(nodes=49, Gamma=50.0, sigma_1=0.001)
+none = controllers.Zero(outputs=("W_psi", "W_norm"))
 loops = {
     "known plant": (integrator, nlctl.Gain(), none),
     "pendulum, no network": (pendulum, nlctl.DeadZone(), none),
@@ -36,9 +37,8 @@ loops = {
 t, late = np.linspace(0, 40, 8001), {}
 _, axes = plt.subplots(figsize=(6, 3))
 for label, (f, actuator, weights) in loops.items():
-    controller = nlctl.dynamic_surface_control(
-        nlctl.DynamicSurface(c=(2.0, 8.0), tau=(tau,)), basis=grid, weights=weights
-    )
+    surface = controllers.DynamicSurface(c=(2.0, 8.0), tau=(tau,))
+    controller = nlctl.dynamic_surface_control(surface, basis=grid, weights=weights)
     blocks = {
         "reference": nlctl.SumOfSines(order=1, amplitudes=1.0, frequencies=omega, phases=0.0),
         "plant": nlctl.PureFeedback(order=2, f=f, initial={"x1": 0.3}),

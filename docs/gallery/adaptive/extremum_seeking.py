@@ -18,7 +18,7 @@ k, a, omega, omega_l = 8.0, 0.2, 60.0, 1.5
 performance = ct.nlsys(
     None, lambda t, x, u, params: 5 - (u[0] - 2) ** 2, inputs=["theta"], outputs=["y"], name="map"
 )
-seeking = nlctl.ExtremumSeeking(k=k, a=a, omega=omega, omega_l=omega_l)
+seeking = nlctl.controllers.ExtremumSeeking(k=k, a=a, omega=omega, omega_l=omega_l)
 loop = nlctl.interconnect({"map": performance, "seeking": seeking}, outputs=["theta", "y"])
 start = nlctl.initial_state(loop, {"seeking.theta_hat": 1.0, "seeking.eta": 4.0})
 t = np.linspace(0, 12, 6001)

@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 W, k, Gamma = 2.0, 1.0, 10.0
 P = 1 / (2 * k)  # 2 k P = Q = 1
@@ -33,24 +34,23 @@ def d(x, t):
 nothing = nlctl.SumOfSines(order=0, amplitudes=0.0, frequencies=1.0, phases=0.0)
 plant = nlctl.PureFeedback(order=1, f=f, d=d)
 remedies = {
-    "gradient": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
-    "sigma-modification": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.02),
-    "e-modification": nlctl.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=0.05),
-    "projection": nlctl.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5, width=0.1),
+    "gradient": controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
+    "sigma-modification": controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.02),
+    "e-modification": controllers.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=0.05),
+    "projection": controllers.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5, width=0.1),
 }
 t, found = np.linspace(0, 2000, 4001), {}
 figure, axes = plt.subplots(figsize=(6, 3))
+model, law = controllers.ReferenceModel(a=(k,), b=0.0), controllers.ModelReferenceLaw(gain=1.0)
 for label, weights in remedies.items():
-    model = nlctl.ReferenceModel(a=(k,), b=0.0)
-    controller = nlctl.mrac(model, weights=weights, law=nlctl.ModelReferenceLaw(gain=1.0))
+    controller = nlctl.mrac(model, weights=weights, law=law)
     blocks = {"nothing": nothing, "plant": plant, "controller": controller, "a": nlctl.Gain()}
     loop = nlctl.interconnect(blocks, outputs=["x1", "W_norm"])
     start = nlctl.initial_state(loop, {"plant.x1": x_0, "controller.weights.W_hat[0]": 1.0})
     x, found[label] = nlctl.input_output_response(loop, t, 0, start).outputs
     axes.plot(t, found[label], label=label)
-axes.set(xlabel="t (s)", ylabel=r"$|\hat{W}|$")
+axes.set(xlabel="t (s)", ylabel=r"$|\hat{W}|$", ylim=(None, 6))
 axes.legend(ncols=2, loc="upper left")
-axes.set_ylim(top=6)
 
 # %%
 # The closed form of the drift to infinity, and the bounds of those that do not drift.

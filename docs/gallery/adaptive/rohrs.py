@@ -14,33 +14,33 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 plant = ct.tf([2 * 229], np.polymul([1, 1], [1, 30, 229]), inputs="v", outputs="x1", name="plant")
-command = nlctl.SumOfSines(
-    order=0, amplitudes=(0.3, 1.85), frequencies=(0.0, 16.1), phases=(np.pi / 2, 0.0)
-)
-model, error = nlctl.ReferenceModel(a=(3.0,), b=3.0), nlctl.ModelError(K=(3.0,), Q=(6.0,))
-plain = nlctl.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.0)
-ball = nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=8.0)
-predictor = nlctl.StatePredictor(a=(3.0,), gain=3.0)
-filtered = nlctl.FilteredLaw(omega=5.0, b=3.0, gain=3.0)
-fast = nlctl.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0)
-basis = nlctl.AffineRegressor(order=1)
-controllers = {
-    "MRAC": nlctl.mrac(model, error=error, weights=plain, law=nlctl.DirectLaw()),
-    "MRAC, projection": nlctl.mrac(model, error=error, weights=ball, law=nlctl.DirectLaw()),
+sines = {"amplitudes": (0.3, 1.85), "frequencies": (0.0, 16.1), "phases": (np.pi / 2, 0.0)}
+command = nlctl.SumOfSines(order=0, **sines)
+model, law = controllers.ReferenceModel(a=(3.0,), b=3.0), controllers.DirectLaw()
+error, basis = controllers.ModelError(K=(3.0,), Q=(6.0,)), controllers.AffineRegressor(order=1)
+plain = controllers.AdaptiveWeights(nodes=2, Gamma=1.0, sigma_1=0.0)
+ball = controllers.ProjectedWeights(nodes=2, Gamma=1.0, W_max=8.0)
+predictor = controllers.StatePredictor(a=(3.0,), gain=3.0)
+filtered = controllers.FilteredLaw(omega=5.0, b=3.0, gain=3.0)
+fast = controllers.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0)
+compared = {
+    "MRAC": nlctl.mrac(model, error=error, weights=plain, law=law),
+    "MRAC, projection": nlctl.mrac(model, error=error, weights=ball, law=law),
     "L1": nlctl.l1_adaptive(predictor, basis=basis, weights=fast, law=filtered),
 }
 largest, lost = {}, None
 figure, axes = plt.subplots(3, sharex=True, figsize=(6, 5))
-for (label, controller), axis in zip(controllers.items(), axes, strict=True):
+for (label, controller), axis in zip(compared.items(), axes, strict=True):
     blocks = {"command": command, "plant": plant, "controller": controller, "a": nlctl.Gain()}
     loop = nlctl.interconnect(blocks, outputs=["x1"])
     start = {"controller.weights.W_hat[0]": 0.65, "controller.weights.W_hat[1]": -1.14}
     start = nlctl.initial_state(loop, {} if label == "L1" else start)
     try:
         nlctl.input_output_response(loop, np.linspace(0, 60, 601), 0, start)
-    except nlctl.DivergedError as error_at:
+    except nlctl.errors.DivergedError as error_at:
         lost = error_at.time
     t = np.linspace(0, 21 if label == "MRAC" else 60, 4001)
     y = nlctl.input_output_response(loop, t, 0, start).outputs

@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 from nlctl.analysis.lyapunov import Box, certify, prove_decrease
 
 W, k, Gamma, sigma, D, P = 2.0, 1.0, 5.0, 0.2, 0.5, 0.5  # 2 k P = 1
@@ -18,15 +19,15 @@ f = nlctl.equation(lambda x, v: 2.0 * x[0] + v)
 d = nlctl.equation(lambda x, t: 0.5 * np.sin(0.3 * t))
 nothing = nlctl.SumOfSines(order=0, amplitudes=0.0, frequencies=1.0, phases=0.0)
 remedies = {
-    "gradient": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
-    "sigma-modification": nlctl.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=sigma),
-    "e-modification": nlctl.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=sigma),
-    "projection": nlctl.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5),
+    "gradient": controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=0.0),
+    "sigma-modification": controllers.AdaptiveWeights(nodes=2, Gamma=Gamma, sigma_1=sigma),
+    "e-modification": controllers.EModifiedWeights(nodes=2, Gamma=Gamma, sigma=sigma),
+    "projection": controllers.ProjectedWeights(nodes=2, Gamma=Gamma, W_max=2.5),
 }
 t, proved = np.linspace(0, 60, 6001), {}
 figure, axes = plt.subplots(figsize=(6, 3), layout="constrained")
 for label, weights in remedies.items():
-    controller = nlctl.mrac(nlctl.ReferenceModel(a=(k,), b=0.0), weights=weights)
+    controller = nlctl.mrac(controllers.ReferenceModel(a=(k,), b=0.0), weights=weights)
     parts = {"nothing": nothing, "plant": nlctl.PureFeedback(order=1, f=f, d=d)}
     blocks = {**parts, "controller": controller, "actuator": nlctl.Gain()}
     loop = nlctl.interconnect(blocks, outputs=["x1"], name=label)

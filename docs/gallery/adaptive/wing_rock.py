@@ -13,29 +13,30 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 W = np.array([0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214])
 common = {
     "command": nlctl.SumOfSines(order=0, amplitudes=0.0, frequencies=1.0, phases=0.0),
-    "plant": nlctl.WingRock(),
+    "plant": nlctl.plants.WingRock(),
     "actuator": nlctl.Gain(),
-    "model": nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0),
-    "error": nlctl.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
-    "basis": nlctl.WingRockRegressor(),
-    "law": nlctl.ModelReferenceLaw(gain=3.0),
+    "model": controllers.ReferenceModel(a=(4.0, 2.0), b=4.0),
+    "error": controllers.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
+    "basis": controllers.WingRockRegressor(),
+    "law": controllers.ModelReferenceLaw(gain=3.0),
 }
-grid = nlctl.GaussianBasis(centres=nlctl.grid_centres([5, 5], -2, 2), widths=(1.0,))
-stack = nlctl.sampled(nlctl.HistoryStack(gain=3.0), 0.05)
-controllers = {
-    "MRAC": {"weights": nlctl.AdaptiveWeights(nodes=6, Gamma=5.0, sigma_1=0.0)},
+grid = controllers.GaussianBasis(centres=controllers.grid_centres([5, 5], -2, 2), widths=(1.0,))
+stack = nlctl.sampled(controllers.HistoryStack(gain=3.0), 0.05)
+compared = {
+    "MRAC": {"weights": controllers.AdaptiveWeights(nodes=6, Gamma=5.0, sigma_1=0.0)},
     "RBF-MRAC": {
-        "basis": grid, "weights": nlctl.AdaptiveWeights(nodes=25, Gamma=5.0, sigma_1=0.0)
+        "basis": grid, "weights": controllers.AdaptiveWeights(nodes=25, Gamma=5.0, sigma_1=0.0)
     },
-    "concurrent": {"weights": nlctl.ConcurrentWeights(nodes=6, Gamma=5.0), "stack": stack},
+    "concurrent": {"weights": controllers.ConcurrentWeights(nodes=6, Gamma=5.0), "stack": stack},
 }  # fmt: skip
 t, found, late = np.linspace(0, 60, 1201), {}, {}
 figure, axes = plt.subplots(1, 2, sharey=True, figsize=(7, 3))
-for label, own in controllers.items():
+for label, own in compared.items():
     loop = nlctl.interconnect({**common, **own}, outputs=["e", "W_norm"])
     response = nlctl.input_output_response(loop, t)
     states = dict(zip(nlctl.state_names(loop), response.states, strict=True))

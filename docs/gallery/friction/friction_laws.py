@@ -23,7 +23,12 @@ def settled(record, velocity):
     ]
 
 
-laws = [nlctl.Coulomb(), nlctl.Stribeck(), nlctl.Dahl(), nlctl.LuGre()]
+laws = [
+    nlctl.actuators.Coulomb(),
+    nlctl.actuators.Stribeck(),
+    nlctl.actuators.Dahl(),
+    nlctl.actuators.LuGre(),
+]
 force = {type(law).__name__: np.array([settled(law, v) for v in velocities]) for law in laws}
 figure, axes = plt.subplots(figsize=(6, 3.2))
 for (name, curve), style in zip(force.items(), ("-", "-", "--", "o"), strict=True):

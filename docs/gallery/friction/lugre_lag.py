@@ -3,7 +3,7 @@ Frictional lag
 ==============
 
 Friction lags behind a velocity that changes, the more the faster it changes: a figure of Canudas de Wit, Olsson, Astrom and
-Lischinsky (IEEE Trans. Automatic Control 40, 1995, not read; its parameters are the defaults of ``nlctl.LuGre``). For slow
+Lischinsky (IEEE Trans. Automatic Control 40, 1995, not read; its parameters are the defaults of ``nlctl.actuators.LuGre``). For slow
 changes :math:`z = g(v)/\sigma_0 - \tau \, g'(v) \dot v/\sigma_0` with :math:`\tau = g(v)/(\sigma_0 v)` to first order, so that
 the loop of the force over the velocity has the area :math:`-\int (\sigma_0 \tau - \sigma_1) \, g'(v) \, \dot v^2 / \sigma_0 \, dt`.
 """
@@ -13,7 +13,7 @@ import numpy as np
 
 import nlctl
 
-p = nlctl.LuGre()
+p = nlctl.actuators.LuGre()
 friction = nlctl.compile(nlctl.block(p, "friction"))
 figure, axes = plt.subplots(figsize=(5, 3.2), layout="constrained")
 

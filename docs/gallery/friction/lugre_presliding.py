@@ -22,7 +22,7 @@ body = ct.nlsys(
     mass, None, states=["position", "velocity"], inputs=["push", "force"], name="body",
     outputs=["position", "velocity"],
 )  # fmt: skip
-friction = nlctl.block(nlctl.LuGre(), "friction")
+friction = nlctl.block(nlctl.actuators.LuGre(), "friction")
 loop = ct.interconnect(
     [body, friction], inputs=["push"], outputs=["position", "force"], name="pushed"
 )

@@ -4,8 +4,8 @@ Stick-slip and break-away of the LuGre model
 
 A mass that a spring pulls sticks and slips, and it breaks away at a smaller force where the force rises faster: two
 figures of Canudas de Wit, Olsson, Astrom and Lischinsky (IEEE Trans. Automatic Control 40, 1995, not read; its parameters
-are the defaults of ``nlctl.LuGre``). The period is near that with Coulomb's law, for the Stribeck velocity is small beside
-the slips; pushed slowly, the mass breaks away at the static friction :math:`F_s = 1.5` N.
+are the defaults of ``nlctl.actuators.LuGre``). The period is near that with Coulomb's law, for the Stribeck velocity is
+small next to the slips; pushed slowly, the mass breaks away at the static friction :math:`F_s = 1.5` N.
 """
 
 import control as ct
@@ -19,7 +19,8 @@ pulled = ct.ss(
     inputs=["force", "one"], outputs=["velocity", "applied"],
 )  # fmt: skip
 pushed = ct.ss(0, [[1, -1]], 1, 0, inputs=["push", "force"], outputs="velocity", name="pushed")
-lugre, law = nlctl.block(nlctl.LuGre(), "friction"), nlctl.block(nlctl.StickSlip(), "law")
+lugre = nlctl.block(nlctl.actuators.LuGre(), "friction")
+law = nlctl.block(nlctl.actuators.StickSlip(), "law")
 figure, (stick, away) = plt.subplots(1, 2, figsize=(8, 3), layout="constrained")
 
 
@@ -46,8 +47,7 @@ def break_away(rate):
     return rate * t[np.argmax(velocity > 1e-3)]
 
 
-with_bristles, with_coulomb = period(lugre), period(law)
-rates = np.geomspace(0.1, 20, 8)
+with_bristles, with_coulomb, rates = period(lugre), period(law), np.geomspace(0.1, 20, 8)
 forces = np.array([break_away(rate) for rate in rates])
 stick.set(xlabel="t (s)", ylabel="velocity (m/s)", xlim=(0, 20))
 stick.legend(loc="upper left")

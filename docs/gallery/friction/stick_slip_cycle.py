@@ -29,7 +29,7 @@ mass = ct.nlsys(
     body, felt, states=["stretch", "slip"], inputs=["force"],
     outputs=["velocity", "applied", "stretch"], name="mass",
 )  # fmt: skip
-rough = nlctl.block(nlctl.StickSlip(F_s=F_s, F_c=F_c, sigma_2=0.0), "rough")
+rough = nlctl.block(nlctl.actuators.StickSlip(F_s=F_s, F_c=F_c, sigma_2=0.0), "rough")
 loop = ct.interconnect([mass, rough], inputs=[], outputs=["stretch", "force"], name="loop")
 t = np.linspace(0, 40, 80_001)
 response = nlctl.input_output_response(nlctl.compile(loop), t, rtol=1e-8, atol=1e-10)

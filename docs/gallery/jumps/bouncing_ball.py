@@ -50,7 +50,7 @@ assert abs(bounces - known).max() < 1e-8
 zeno = None
 try:
     nlctl.input_output_response(ball, [0, 5])
-except nlctl.ZenoError as error:
+except nlctl.errors.ZenoError as error:
     zeno = error.time
     print(error)
 assert zeno is not None

@@ -11,8 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
-basis = nlctl.block(nlctl.GaussianBasis(centres=((-1.0,), (0.0,), (1.0,)), widths=(0.5,)), "basis")
+basis = nlctl.block(
+    controllers.GaussianBasis(centres=((-1.0,), (0.0,), (1.0,)), widths=(0.5,)), "basis"
+)
 x = np.linspace(-2, 2, 401)
 psi = np.array([basis.output(0, [], [value]) for value in x])
 zeta = np.linspace(0, 3.05, 400)
@@ -28,13 +31,13 @@ def gain(record):
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3), layout="constrained")
 left.plot(x, psi)
 left.set(xlabel="x", title="GaussianBasis")
-for law in (nlctl.NussbaumLaw(beta=1.0), nlctl.MonotoneNussbaumLaw(beta=1.0)):
+for law in (controllers.NussbaumLaw(beta=1.0), controllers.MonotoneNussbaumLaw(beta=1.0)):
     right.plot(zeta, gain(law), label=type(law).__name__)
 right.set(xlabel="zeta", ylim=(-60, 20), title="u for r = 1")
 right.legend()
 
 assert np.allclose(psi[[100, 200, 300]].max(axis=1), 1)
-N = gain(nlctl.NussbaumLaw(beta=1.0))
+N = gain(controllers.NussbaumLaw(beta=1.0))
 assert np.allclose(N, np.exp(zeta**2) * np.cos(np.pi * zeta / 2))
 changes = zeta[1:][np.diff(np.sign(N)) != 0]
 assert np.allclose(changes, [1, 3], atol=0.01)

@@ -11,21 +11,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nlctl
+from nlctl import controllers
 
 laws = {
-    "NussbaumLaw": nlctl.NussbaumLaw(),
-    "DeadZoneNussbaumLaw": nlctl.DeadZoneNussbaumLaw(),
-    "LeakyNussbaumLaw": nlctl.LeakyNussbaumLaw(),
-    "MonotoneNussbaumLaw": nlctl.MonotoneNussbaumLaw(),
-    "KnownSignLaw": nlctl.KnownSignLaw(),
-    "FixedGainLaw": nlctl.FixedGainLaw(),
+    "NussbaumLaw": controllers.NussbaumLaw(),
+    "DeadZoneNussbaumLaw": controllers.DeadZoneNussbaumLaw(),
+    "LeakyNussbaumLaw": controllers.LeakyNussbaumLaw(),
+    "MonotoneNussbaumLaw": controllers.MonotoneNussbaumLaw(),
+    "KnownSignLaw": controllers.KnownSignLaw(),
+    "FixedGainLaw": controllers.FixedGainLaw(),
 }
-controllers = {name: nlctl.adaptive_neural(2, law=law) for name, law in laws.items()}
-controllers["SlidingModeLaw"] = nlctl.sliding_mode()
+compared = {name: nlctl.adaptive_neural(2, law=law) for name, law in laws.items()}
+compared["SlidingModeLaw"] = nlctl.sliding_mode()
 t = np.linspace(0, 20, 4001)
 figure, axes = plt.subplots(figsize=(7, 4))
 late = {}
-for name, controller in controllers.items():
+for name, controller in compared.items():
     loop = nlctl.paper.example_1(controller=controller)
     e = nlctl.input_output_response(loop, t).outputs[loop.output_index["e"]]
     axes.plot(t, e, label=name, linewidth=1)

@@ -24,7 +24,7 @@ car = ct.ss(A, B, C, 0, name="car", inputs=["v"], outputs=["x1", "x2"])
 assert (C @ B)[0] == 0 < (C @ B)[1]  # relative degree two, positive gain
 
 reference = nlctl.SumOfSines(amplitudes=1.0, frequencies=1.0, phases=np.pi / 2)
-controller = nlctl.FunnelControl(order=2, rho_0=5.1, rho_inf=0.1, decay=2.0)
+controller = nlctl.controllers.FunnelControl(order=2, rho_0=5.1, rho_inf=0.1, decay=2.0)
 loop = nlctl.interconnect(
     {"reference": reference, "car": car, "controller": controller, "actuator": nlctl.Gain()},
     outputs=["e", "u", "rho"],

@@ -32,10 +32,11 @@ plant = ct.nlsys(
 linear = ct.ss([[0, 1], [1, 0]], [[0], [1]], [[1, 0]], 0, inputs="u", outputs="y")
 law = ct.ss([], [], [], [[-3, -2]], inputs=["x1_hat", "x2_hat"], outputs="asked", name="law")
 limit = nlctl.block(nlctl.Saturation(limit=2.0), "limit", inputs="asked", outputs="u")
+covariance = ((1.0, 0.0), (0.0, 10.0))
 observers = {
-    "Luenberger": nlctl.luenberger(linear, poles=[-4, -5]),
-    "high gain": nlctl.HighGainObserver(epsilon=0.05, known="u", model=acceleration),
-    "Kalman": nlctl.ExtendedKalmanFilter(f=pendulum, Q=((1.0, 0.0), (0.0, 10.0)), R=((0.01,),)),
+    "Luenberger": nlctl.observers.luenberger(linear, poles=[-4, -5]),
+    "high gain": nlctl.observers.HighGainObserver(epsilon=0.05, known="u", model=acceleration),
+    "Kalman": nlctl.observers.ExtendedKalmanFilter(f=pendulum, Q=covariance, R=((0.01,),)),
 }
 t, speeds = np.linspace(0, 5, 2001), {}
 figure, axes = plt.subplots(2, sharex=True, figsize=(6, 4.5), layout="constrained")

@@ -14,7 +14,7 @@ import nlctl
 
 plant = ct.ss([[0, 1], [-1, -2]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y", name="plant")
 add = ct.summing_junction(["u", "load"], "v", name="add")
-load = nlctl.Pulse(height=-2.0, t_start=10.0, width=100.0, outputs="load")
+load = nlctl.sources.Pulse(height=-2.0, t_start=10.0, width=100.0, outputs="load")
 t = np.linspace(0, 20, 2001)
 
 
@@ -28,12 +28,12 @@ figure, axes = plt.subplots(2, 2, sharex=True, figsize=(7, 4.5), layout="constra
 tuned = {"K": 8.0, "T_i": 1.2, "T_d": 0.25, "N": 10.0}
 weights, wide = {}, {"u_min": -100, "u_max": 100}
 for b, c in ((1.0, 1.0), (0.3, 0.0)):
-    weights[b], u = response(nlctl.standard_pid(**tuned, b=b, c=c, **wide))
+    weights[b], u = response(nlctl.controllers.standard_pid(**tuned, b=b, c=c, **wide))
     axes[0, 0].plot(t, weights[b], label=f"b = {b:g}, c = {c:g}")
     axes[1, 0].plot(t, u)
 limited, narrow = {}, {"u_min": -1.5, "u_max": 3.2}
 for kind in ("none", "clamping", "back-calculation"):
-    limited[kind], u = response(nlctl.standard_pid(**tuned, anti_windup=kind, **narrow))
+    limited[kind], u = response(nlctl.controllers.standard_pid(**tuned, anti_windup=kind, **narrow))
     axes[0, 1].plot(t, limited[kind], label=kind)
     axes[1, 1].plot(t, u)
 axes[0, 0].set(ylabel="y", title="no limit")

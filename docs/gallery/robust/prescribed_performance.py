@@ -21,7 +21,7 @@ def van_der_pol(x, v):
     return -2 * (x1**2 - 1) * x2 - x1 + 1 + (2 + np.sin(x1 * x2)) * v
 
 
-controller = nlctl.PrescribedPerformance(
+controller = nlctl.controllers.PrescribedPerformance(
     k=(4.0, 5.0), rho_0=(5.0, 5.0), rho_inf=(0.01, 0.01), decay=(3.0, 3.0)
 )
 reference = nlctl.SumOfSines(amplitudes=(1.0, 0.3), frequencies=(2.0, 5.0), phases=(0.0, np.pi / 2))

@@ -23,7 +23,7 @@ figure, (above, below) = plt.subplots(2, sharex=True, figsize=(6, 4))
 for phi in (1e-2, 1e-4, 1e-6):
     blocks = {
         "surface": ct.ss(0, 1, 1, 0, inputs="v", outputs="r", name="surface"),
-        "law": nlctl.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=phi),
+        "law": nlctl.controllers.SuperTwistingLaw(k_1=k_1, k_2=k_2, phi=phi),
         "actuator": nlctl.Gain(),
     }
     loop = nlctl.interconnect(blocks, outputs=["r", "u"])

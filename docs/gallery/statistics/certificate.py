@@ -14,8 +14,8 @@ from nlctl.analysis.lyapunov import certify
 
 loop = nlctl.paper.example_1(
     controller=nlctl.adaptive_neural(
-        2, law=nlctl.KnownSignLaw(), weights=nlctl.AdaptiveWeights(Gamma=10.0),
-        robust=nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5),
+        2, law=nlctl.controllers.KnownSignLaw(), weights=nlctl.controllers.AdaptiveWeights(Gamma=10.0),
+        robust=nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5),
     )
 )  # fmt: skip
 certificate = certify(loop)

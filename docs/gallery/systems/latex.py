@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 
 import nlctl
 
-(law,) = nlctl.typeset(nlctl.block(nlctl.NussbaumLaw(), "law"))
+(law,) = nlctl.typeset(nlctl.block(nlctl.controllers.NussbaumLaw(), "law"))
 for line in law.equations:
     print(line)
 
@@ -21,7 +21,7 @@ for height, line in zip((0.7, 0.2), law.equations, strict=True):
 # %%
 # The Nussbaum function of (24) has :math:`N(0) = 1`: with :math:`\zeta = 0`, :math:`r = 1` and the other inputs
 # zero, the law is :math:`u = \beta`.
-record = nlctl.NussbaumLaw(beta=2.5)
+record = nlctl.controllers.NussbaumLaw(beta=2.5)
 block = nlctl.block(record, "law")
 u = [1.0 if name == "r" else 0.0 for name in block.input_labels]
 print(block.input_labels, block.output(0, [0.0], u))

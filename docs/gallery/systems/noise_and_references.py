@@ -34,7 +34,7 @@ for ax, (name, record) in zip(axes, shown.items(), strict=False):
         slope = np.gradient(yd[order], t, edge_order=2)
         assert np.abs(slope - yd[order + 1])[5:-5].max() < 0.02 * np.abs(yd[2]).max()
 
-noise = nlctl.block(nlctl.BandLimitedNoise(rms=0.1, high=20.0), "noise")
+noise = nlctl.block(nlctl.references.BandLimitedNoise(rms=0.1, high=20.0), "noise")
 long = np.linspace(0, 2000, 200_001)
 samples = nlctl.input_output_response(noise, long, 0.0).outputs.ravel()
 axes[3].plot(long[:1001], samples[:1001])

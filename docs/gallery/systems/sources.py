@@ -15,13 +15,13 @@ import nlctl
 
 shown = {
     "Step": nlctl.Step(t_step=2.0),
-    "Ramp": nlctl.Ramp(slope=0.2, t_start=2.0),
+    "Ramp": nlctl.sources.Ramp(slope=0.2, t_start=2.0),
     "Sine": nlctl.Sine(),
-    "Square": nlctl.Square(period=4.0, duty=0.25),
-    "Pulse": nlctl.Pulse(t_start=3.0, width=1.5),
-    "PulseTrain": nlctl.PulseTrain(period=2.0, width=0.2),
-    "Chirp": nlctl.Chirp(omega_0=0.0, omega_1=20.0, t_1=10.0),
-    "TimeTable": nlctl.TimeTable(times=(0, 3, 4, 8, 10), values=(0, 1, -1, 0.5, 0)),
+    "Square": nlctl.sources.Square(period=4.0, duty=0.25),
+    "Pulse": nlctl.sources.Pulse(t_start=3.0, width=1.5),
+    "PulseTrain": nlctl.sources.PulseTrain(period=2.0, width=0.2),
+    "Chirp": nlctl.sources.Chirp(omega_0=0.0, omega_1=20.0, t_1=10.0),
+    "TimeTable": nlctl.sources.TimeTable(times=(0, 3, 4, 8, 10), values=(0, 1, -1, 0.5, 0)),
 }
 S, _ = fresnel(np.sqrt(20.0 * 10.0 / np.pi))
 integrals = {  # from 0 to 10 s

@@ -42,7 +42,8 @@ class DynamicSurface:
     --------
     On both surfaces, with a reference that stands still, nothing is left to do: e, r, nu, nu_e.
 
-    >>> surfaces = nlctl.block(nlctl.DynamicSurface(c=(2.0, 4.0), tau=(0.02,)), "surfaces")
+    >>> record = nlctl.controllers.DynamicSurface(c=(2.0, 4.0), tau=(0.02,))
+    >>> surfaces = nlctl.block(record, "surfaces")
     >>> print(surfaces.output(0, [0.0], [0.5, 0.0, 0.5, 0.0]) + 0.0)
     [0. 0. 0. 0.]
     >>> print(surfaces.output(0, [0.0], [0.5, 0.1, 0.5, 0.0])[3])  # -c_2 s_2

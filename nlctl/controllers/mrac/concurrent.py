@@ -54,7 +54,7 @@ class HistoryStack:
     --------
     A point psi = 2 with Delta = x2' - gain u = 7 - 1 is recorded: count, z, Omega.
 
-    >>> stack = nlctl.block(nlctl.HistoryStack(nodes=1), "stack", dt=0.1)
+    >>> stack = nlctl.block(nlctl.controllers.HistoryStack(nodes=1), "stack", dt=0.1)
     >>> recorded = stack.dynamics(0, [0.0, 0.0, 0.0, 0.0], [2.0, 7.0, 1.0])
     >>> print(stack.output(0, recorded, [2.0, 7.0, 1.0]))
     [ 1. 12.  4.]
@@ -128,7 +128,7 @@ class ConcurrentWeights(NetworkWeights):
     --------
     One regressor, recorded once with psi = 2 and Delta = 6: W_hat = 3 is what was measured.
 
-    >>> weights = nlctl.block(nlctl.ConcurrentWeights(nodes=1, Gamma=1.0), "weights")
+    >>> weights = nlctl.block(nlctl.controllers.ConcurrentWeights(nodes=1, Gamma=1.0), "weights")
     >>> r, psi, z, Omega = 0.0, 0.5, 12.0, 4.0
     >>> [float(weights.dynamics(0, [W_hat], [r, psi, z, Omega])[0]) for W_hat in (0.0, 3.0)]
     [12.0, 0.0]

@@ -27,7 +27,7 @@ class ConstrainedLaw:
 
     Examples
     --------
-    >>> law = nlctl.block(nlctl.ConstrainedLaw(u_max=10.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.ConstrainedLaw(u_max=10.0), "law")
     >>> print(law.output(0, [], [-12.0]))  # u, and what is missing
     [10. -2.]
     """
@@ -71,7 +71,7 @@ class ConstrainedError:
     --------
     What the estimate E_d explains of an error, weights do not learn from: r = 0.
 
-    >>> error = nlctl.block(nlctl.ConstrainedError(K=(2.0,), Q=(1.0,)), "error")
+    >>> error = nlctl.block(nlctl.controllers.ConstrainedError(K=(2.0,), Q=(1.0,)), "error")
     >>> e, r, nu_e, E_norm, beta_hat = error.output(0, [2.0, 0.0], [3.0, 1.0, -1.0])
     >>> print(e, r)
     2.0 0.0

@@ -36,7 +36,7 @@ class StatePredictor:
 
     Examples
     --------
-    >>> predictor = nlctl.block(nlctl.StatePredictor(a=(2.0,), gain=3.0), "predictor")
+    >>> predictor = nlctl.block(nlctl.controllers.StatePredictor(a=(2.0,), gain=3.0), "predictor")
     >>> print(predictor.dynamics(0, [0.5], [1.0, 0.25]))  # -a xm + gain u + W_psi
     [2.25]
     """
@@ -85,7 +85,7 @@ class FilteredLaw:
     --------
     It goes to (b yd - W_psi) / gain at the rate omega:
 
-    >>> law = nlctl.block(nlctl.FilteredLaw(omega=10.0, b=4.0, gain=2.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.FilteredLaw(omega=10.0, b=4.0, gain=2.0), "law")
     >>> [float(law.dynamics(0, [u], [1.0, 1.0])[0]) for u in (0.0, 1.0)]
     [15.0, 5.0]
     """

@@ -27,7 +27,7 @@ class ModelReferenceLaw:
 
     Examples
     --------
-    >>> law = nlctl.block(nlctl.ModelReferenceLaw(gain=2.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.ModelReferenceLaw(gain=2.0), "law")
     >>> print(law.output(0, [], [1.0, -3.0, 4.0]))  # (nu + nu_e - W_psi) / gain
     [-3.]
     """
@@ -63,7 +63,7 @@ class DirectLaw:
 
     Examples
     --------
-    >>> print(nlctl.block(nlctl.DirectLaw(), "law").output(0, [], [4.0]))
+    >>> print(nlctl.block(nlctl.controllers.DirectLaw(), "law").output(0, [], [4.0]))
     [-4.]
     """
 

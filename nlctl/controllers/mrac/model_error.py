@@ -51,7 +51,7 @@ class ModelError:
     --------
     Of order 1 with K = 2 and Q = 1, P = 1/4; the outputs are e, r = P E, -K E and |E|:
 
-    >>> error = nlctl.block(nlctl.ModelError(K=(2.0,), Q=(1.0,)), "error")
+    >>> error = nlctl.block(nlctl.controllers.ModelError(K=(2.0,), Q=(1.0,)), "error")
     >>> print(error.output(0, [], [3.0, 1.0]))
     [ 2.   0.5 -4.   2. ]
     """

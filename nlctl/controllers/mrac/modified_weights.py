@@ -1,6 +1,7 @@
 """Adaptive weights that stay bounded: e-modification and projection.
 
-Sigma-modification is `nlctl.AdaptiveWeights`, (25); with ``sigma_1=0`` it is the gradient law.
+Sigma-modification is `nlctl.controllers.AdaptiveWeights`, (25); with ``sigma_1=0`` it is the
+gradient law.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ class EModifiedWeights(NetworkWeights):
     --------
     Without an error it forgets nothing:
 
-    >>> weights = nlctl.block(nlctl.EModifiedWeights(nodes=2, Gamma=1.0, sigma=0.5), "weights")
+    >>> record = nlctl.controllers.EModifiedWeights(nodes=2, Gamma=1.0, sigma=0.5)
+    >>> weights = nlctl.block(record, "weights")
     >>> print(weights.dynamics(0, [3.0, 4.0], [0.0, 1.0, 1.0]))
     [0. 0.]
     >>> print(weights.dynamics(0, [3.0, 4.0], [-2.0, 1.0, 1.0]))  # r psi - sigma |r| W_hat
@@ -76,7 +78,8 @@ class ProjectedWeights(NetworkWeights):
     --------
     On the boundary of the ball nothing points outwards any more:
 
-    >>> weights = nlctl.block(nlctl.ProjectedWeights(nodes=2, Gamma=1.0, W_max=5.0), "weights")
+    >>> record = nlctl.controllers.ProjectedWeights(nodes=2, Gamma=1.0, W_max=5.0)
+    >>> weights = nlctl.block(record, "weights")
     >>> rate = weights.dynamics(0, [3.0, 4.0], [2.0, 3.0, 4.0])
     >>> print(abs(round(float(rate @ [3.0, 4.0]), 9)))
     0.0

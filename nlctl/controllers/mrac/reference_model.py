@@ -35,7 +35,7 @@ class ReferenceModel:
     --------
     With b = a_1 it settles at the command: there nu = 0.
 
-    >>> model = nlctl.block(nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0), "model")
+    >>> model = nlctl.block(nlctl.controllers.ReferenceModel(a=(4.0, 2.0), b=4.0), "model")
     >>> print(model.output(0, [0.5, 0.0], [0.5]))
     [0.5 0.  0. ]
     """

@@ -58,7 +58,7 @@ class AffineRegressor(_StateRegressor):
 
     Examples
     --------
-    >>> regressor = nlctl.block(nlctl.AffineRegressor(order=2), "basis")
+    >>> regressor = nlctl.block(nlctl.controllers.AffineRegressor(order=2), "basis")
     >>> print(regressor.output(0, [], [0.1, 0.2]))
     [0.1 0.2 1. ]
     """
@@ -83,7 +83,7 @@ class LinearRegressor(_StateRegressor):
 
     Examples
     --------
-    >>> regressor = nlctl.block(nlctl.LinearRegressor(order=2), "basis")
+    >>> regressor = nlctl.block(nlctl.controllers.LinearRegressor(order=2), "basis")
     >>> print(regressor.output(0, [], [0.1, 0.2, 5.0]))
     [0.1 0.2 5. ]
     """
@@ -108,7 +108,7 @@ class WingRockRegressor:
 
     Examples
     --------
-    >>> regressor = nlctl.block(nlctl.WingRockRegressor(), "basis")
+    >>> regressor = nlctl.block(nlctl.controllers.WingRockRegressor(), "basis")
     >>> print(regressor.output(0, [], [-2.0, 3.0]))
     [ 1. -2.  3.  6.  9. -8.]
     """

@@ -45,7 +45,7 @@ class FunnelControl:
     --------
     Half way to the boundary the gain is 1 / (1 - 1/4):
 
-    >>> record = nlctl.FunnelControl(order=1, k=3.0, rho_0=1.0)
+    >>> record = nlctl.controllers.FunnelControl(order=1, k=3.0, rho_0=1.0)
     >>> print(nlctl.block(record, "controller").output(0, [], [0.5, 0.0]))
     [ 0.5 -2.   1. ]
     """

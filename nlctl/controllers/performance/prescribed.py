@@ -43,7 +43,9 @@ class PrescribedPerformance:
     Half way to its bound the error is answered by k ln 3; at the bound there is no law:
 
     >>> import numpy as np
-    >>> record = nlctl.PrescribedPerformance(k=(2.0,), rho_0=(1.0,), rho_inf=(0.1,), decay=(1.0,))
+    >>> record = nlctl.controllers.PrescribedPerformance(
+    ...     k=(2.0,), rho_0=(1.0,), rho_inf=(0.1,), decay=(1.0,)
+    ... )
     >>> controller = nlctl.block(record, "controller")
     >>> print(controller.output(0, [], [0.5, 0.0]).round(6), round(-2 * np.log(3), 6))
     [ 0.5      -2.197225  1.      ] -2.197225

@@ -29,7 +29,7 @@ class SlidingModeLaw:
 
     Examples
     --------
-    >>> law = nlctl.block(nlctl.SlidingModeLaw(K=12.0, phi=0.1), "law")
+    >>> law = nlctl.block(nlctl.controllers.SlidingModeLaw(K=12.0, phi=0.1), "law")
     >>> [round(float(law.output(0, [], [r])[0]), 6) for r in (-1.0, 0.05, 1.0)]
     [12.0, -6.0, -12.0]
     """

@@ -26,7 +26,7 @@ class SuperTwistingLaw:
 
     Examples
     --------
-    >>> law = nlctl.block(nlctl.SuperTwistingLaw(k_1=6.0, k_2=8.0), "law")
+    >>> law = nlctl.block(nlctl.controllers.SuperTwistingLaw(k_1=6.0, k_2=8.0), "law")
     >>> print(law.output(0, [1.5], [0.25]), law.dynamics(0, [1.5], [0.25]))  # w - k_1 sqrt(r), -k_2
     [-1.5] [-8.]
     """

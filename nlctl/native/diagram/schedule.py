@@ -19,6 +19,7 @@ import numpy as np
 from ...blocks import supplied_of, within
 from ...delays.transport import PAST
 from ...diagrams import places, samplings, supplied_blocks
+from ...errors import AlgebraicLoopError
 from ...responses.watched import Watched
 from ...sampling.system import Happening
 from ...sliding.relay import SLIDING
@@ -28,7 +29,7 @@ from .checks import check_functions
 from .feedthrough import closer_feedthrough, feedthrough
 from .nodes import Node
 from .tearing import first_loop, tear
-from .wiring import AlgebraicLoopError, Combination, Signal, Wiring
+from .wiring import Combination, Signal, Wiring
 
 __all__ = [
     "AlgebraicLoop",

@@ -9,28 +9,9 @@ import control as ct
 import numpy as np
 
 from ...diagrams import Place, places
-from ...errors import UsageError
+from ...errors import AlgebraicLoopError
 
 Combination = Mapping["Signal", float]
-
-
-class AlgebraicLoopError(UsageError):
-    """Signals that depend on each other at the same instant; the message prints the loop.
-
-    Examples
-    --------
-    >>> import control as ct
-    >>> def half(t, x, u, params):
-    ...     return 1 + 0.5 * u
-    >>> half = ct.nlsys(None, half, inputs="v", outputs="w", name="half")
-    >>> same = ct.nlsys(None, lambda t, x, u, params: u, inputs="w", outputs="v", name="same")
-    >>> loop = ct.interconnect([half, same], outputs="w", name="loop")
-    >>> nlctl.compile(loop)
-    Traceback (most recent call last):
-    nlctl.native.diagram.wiring.AlgebraicLoopError: ...
-    >>> print(nlctl.compile(loop, algebraic_loops="solve").output(0, []))  # w = 1 + w / 2
-    [2.]
-    """
 
 
 @dataclass(frozen=True)

@@ -21,32 +21,11 @@ from pathlib import Path
 
 import platformdirs
 
+from ...errors import CacheWarning
 from ...host.files import replace_file
 
 MARK = b"nlctl machine code 1\n"  # the number is that of the format
 DIGEST = hashlib.sha256().digest_size
-
-
-class CacheWarning(UserWarning):
-    """Machine code is not kept: others may write to the folder, or it is another user's.
-
-    Examples
-    --------
-    A folder in which others may write keeps no machine code: it would be executed.
-
-    >>> import os, tempfile, warnings
-    >>> from unittest import mock
-    >>> with (
-    ...     tempfile.TemporaryDirectory() as folder,
-    ...     mock.patch.dict(os.environ, NLCTL_CACHE_DIR=folder),
-    ...     warnings.catch_warnings(record=True) as told,
-    ... ):
-    ...     warnings.simplefilter("always")
-    ...     os.chmod(folder, 0o777)
-    ...     outputs = nlctl.compile(nlctl.block(nlctl.Gain(), "gain")).output(0, [], [1.0])
-    >>> {warning.category.__name__ for warning in told}
-    {'CacheWarning'}
-    """
 
 
 def cache_folder() -> Path:

@@ -23,15 +23,15 @@ def half_sine(x, t):
 
 
 def sigma(sigma_1=0.2, Gamma=5.0, nodes=2):
-    return nlctl.AdaptiveWeights(nodes=nodes, Gamma=Gamma, sigma_1=sigma_1)
+    return nlctl.controllers.AdaptiveWeights(nodes=nodes, Gamma=Gamma, sigma_1=sigma_1)
 
 
 def e_modification(own=0.2, Gamma=5.0, nodes=2):
-    return nlctl.EModifiedWeights(nodes=nodes, Gamma=Gamma, sigma=own)
+    return nlctl.controllers.EModifiedWeights(nodes=nodes, Gamma=Gamma, sigma=own)
 
 
 def projection(W_max=2.5, Gamma=5.0, nodes=2):
-    return nlctl.ProjectedWeights(nodes=nodes, Gamma=Gamma, W_max=W_max)
+    return nlctl.controllers.ProjectedWeights(nodes=nodes, Gamma=Gamma, W_max=W_max)
 
 
 def first_order(
@@ -43,11 +43,11 @@ def first_order(
         "reference": QUIET,
         "plant": nlctl.PureFeedback(order=1, f=f, **disturbance),
         "actuator": nlctl.Gain(),
-        "model": nlctl.ReferenceModel(a=(k,), b=b),
-        "error": nlctl.ModelError(K=(k,), Q=(1.0,)),
-        "basis": nlctl.LinearRegressor(order=1),
+        "model": nlctl.controllers.ReferenceModel(a=(k,), b=b),
+        "error": nlctl.controllers.ModelError(K=(k,), Q=(1.0,)),
+        "basis": nlctl.controllers.LinearRegressor(order=1),
         "weights": weights,
-        "law": nlctl.ModelReferenceLaw(gain=gain),
+        "law": nlctl.controllers.ModelReferenceLaw(gain=gain),
     }
     return joined(parts | changed, wires, inputs)
 
@@ -56,13 +56,13 @@ def wing_rock(weights, *, wires=None, inputs=(), **changed):
     """Wing rock with its own regressor, as in the gallery, and a sine as command."""
     parts = {
         "reference": SINE,
-        "plant": nlctl.WingRock(),
+        "plant": nlctl.plants.WingRock(),
         "actuator": nlctl.Gain(),
-        "model": nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0),
-        "error": nlctl.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
-        "basis": nlctl.WingRockRegressor(),
+        "model": nlctl.controllers.ReferenceModel(a=(4.0, 2.0), b=4.0),
+        "error": nlctl.controllers.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
+        "basis": nlctl.controllers.WingRockRegressor(),
         "weights": weights,
-        "law": nlctl.ModelReferenceLaw(gain=3.0),
+        "law": nlctl.controllers.ModelReferenceLaw(gain=3.0),
     }
     return joined(parts | changed, wires, inputs)
 

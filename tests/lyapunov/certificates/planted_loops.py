@@ -9,13 +9,13 @@ import nlctl
 CENTRES = nlctl.adaptive_neural(2).syslist[1].spec.centres[::9]  # three of them: quick to wire
 PARTS = {
     "reference": lambda: nlctl.SumOfSines(order=2),
-    "plant": lambda: nlctl.ForcedDuffing(),
+    "plant": lambda: nlctl.plants.ForcedDuffing(),
     "actuator": lambda: nlctl.DeadZone(),
-    "filtered_error": lambda: nlctl.FilteredError(),
-    "basis": lambda: nlctl.GaussianBasis(centres=CENTRES),
-    "weights": lambda: nlctl.AdaptiveWeights(nodes=3, Gamma=10.0),
-    "robust": lambda: nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5),
-    "law": lambda: nlctl.KnownSignLaw(),
+    "filtered_error": lambda: nlctl.controllers.FilteredError(),
+    "basis": lambda: nlctl.controllers.GaussianBasis(centres=CENTRES),
+    "weights": lambda: nlctl.controllers.AdaptiveWeights(nodes=3, Gamma=10.0),
+    "robust": lambda: nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5),
+    "law": lambda: nlctl.controllers.KnownSignLaw(),
 }
 WIRES = {
     "plant.v": "actuator.v",
@@ -37,7 +37,7 @@ SLIDING = (
     {
         **{k: PARTS[k] for k in ("reference", "plant", "filtered_error")},
         "actuator": lambda: nlctl.Gain(),
-        "law": lambda: nlctl.SlidingModeLaw(K=25.0, phi=0.1),
+        "law": lambda: nlctl.controllers.SlidingModeLaw(K=25.0, phi=0.1),
     },
     {
         k: v
@@ -152,10 +152,10 @@ def plant(update=None, output=None, **more):
         for name, function in (("update", update), ("output", output))
         if function is not None
     }
-    return type("OwnPlant", (nlctl.ForcedDuffing,), changed | more)()
+    return type("OwnPlant", (nlctl.plants.ForcedDuffing,), changed | more)()
 
 
-UPDATE = nlctl.ForcedDuffing.update
+UPDATE = nlctl.plants.ForcedDuffing.update
 
 
 def again(kind, **changed):

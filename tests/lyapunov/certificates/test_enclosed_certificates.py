@@ -8,10 +8,10 @@ from nlctl.analysis.lyapunov import Box, certify, enclose, prove, sector
 
 
 def known_sign(order, Gamma=10.0):
-    robust = nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
-    weights = nlctl.AdaptiveWeights(Gamma=Gamma)
+    robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    weights = nlctl.controllers.AdaptiveWeights(Gamma=Gamma)
     controller = nlctl.adaptive_neural(
-        order, law=nlctl.KnownSignLaw(), weights=weights, robust=robust
+        order, law=nlctl.controllers.KnownSignLaw(), weights=weights, robust=robust
     )
     return {2: nlctl.paper.example_1, 3: nlctl.paper.example_2}[order](controller=controller)
 
@@ -48,7 +48,7 @@ def test_a_range_is_no_wider_than_that_of_balls():
 def test_what_cannot_be_traced_is_proved_on_balls():
     """A sector's own quotient of cos v, for one: the same function, the other arithmetic."""
     box = Box.of(x1=(-1, 1), x2=(-1, 1), v=(0, 5))
-    assert sector(nlctl.ForcedDuffing(), box).positive.arithmetic == "balls"
+    assert sector(nlctl.plants.ForcedDuffing(), box).positive.arithmetic == "balls"
     table = {0.0: 1.0}
     claim = prove(lambda z: z[0] * table.get(0.0), Box.of(x=(0, 1)), high=1.5)
     assert claim.holds

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from scipy.signal import lsim, lti
 
 import nlctl
-from nlctl import DiagramError, ParameterError
 from nlctl.analysis.intervals.branch_and_bound import Box
 from nlctl.analysis.intervals.level_set import prove_decrease
 from nlctl.analysis.lyapunov.bounds.error_bounds import error_bounds, filter_poles, reference_bounds
 from nlctl.analysis.lyapunov.certificate.certify import certify
 from nlctl.analysis.lyapunov.certificate.gains import design
+from nlctl.errors import DiagramError, ParameterError
 
 TIGHT = (0.6, 1.3)  # split of the dead zone
 
@@ -23,9 +23,9 @@ TIGHT = (0.6, 1.3)  # split of the dead zone
 def example_1(*, gamma=1e4, sigma_2=1e-3, Gamma=10.0, tau=0.2, N_0=2.4, **kwargs):
     controller = nlctl.adaptive_neural(
         2,
-        weights=nlctl.AdaptiveWeights(Gamma=Gamma),
-        robust=nlctl.RobustTerm(gamma=gamma, sigma_2=sigma_2, tau=tau),
-        law=nlctl.KnownSignLaw(N_0=N_0),
+        weights=nlctl.controllers.AdaptiveWeights(Gamma=Gamma),
+        robust=nlctl.controllers.RobustTerm(gamma=gamma, sigma_2=sigma_2, tau=tau),
+        law=nlctl.controllers.KnownSignLaw(N_0=N_0),
     )
     return nlctl.paper.example_1(controller=controller, **kwargs)
 
@@ -33,10 +33,10 @@ def example_1(*, gamma=1e4, sigma_2=1e-3, Gamma=10.0, tau=0.2, N_0=2.4, **kwargs
 def example_2(*, gamma=1e5, sigma_2=3e-4, Gamma=34.0, tau=0.5, N_0=0.84):
     controller = nlctl.adaptive_neural(
         3,
-        filtered_error=nlctl.FilteredError(lambdas=(2.0, 1.0)),
-        weights=nlctl.AdaptiveWeights(Gamma=Gamma, sigma_1=0.3),
-        robust=nlctl.RobustTerm(gamma=gamma, sigma_2=sigma_2, tau=tau),
-        law=nlctl.KnownSignLaw(beta=5.0, N_0=N_0),
+        filtered_error=nlctl.controllers.FilteredError(lambdas=(2.0, 1.0)),
+        weights=nlctl.controllers.AdaptiveWeights(Gamma=Gamma, sigma_1=0.3),
+        robust=nlctl.controllers.RobustTerm(gamma=gamma, sigma_2=sigma_2, tau=tau),
+        law=nlctl.controllers.KnownSignLaw(beta=5.0, N_0=N_0),
     )
     return nlctl.paper.example_2(controller=controller)
 
@@ -203,7 +203,7 @@ class TestCertify:
     @pytest.mark.slow
     def test_a_larger_disturbance_needs_a_larger_bound(self):
         """q_mean enters delta* with its whole size."""
-        forced = certified(example_1(plant=nlctl.ForcedDuffing(q_mean=6.0)))
+        forced = certified(example_1(plant=nlctl.plants.ForcedDuffing(q_mean=6.0)))
         assert forced.region.delta_star >= plain().region.delta_star + 1.0 - 0.02
         assert forced.C_0 > plain().C_0
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl import ParameterError, UnknownNameError
 from nlctl.analysis.lyapunov import ledger, tighten
+from nlctl.errors import ParameterError, UnknownNameError
 
 pytestmark = pytest.mark.slow  # one run, or one compiled function, for all of them
 

@@ -27,7 +27,7 @@ from nlctl.analysis.lyapunov.bounds.weights import (
 from nlctl.errors import ParameterError
 from nlctl.paper import paper_centres
 
-DUFFING, GENESIO = nlctl.ForcedDuffing(), nlctl.Genesio()
+DUFFING, GENESIO = nlctl.plants.ForcedDuffing(), nlctl.plants.Genesio()
 BOXES = {
     DUFFING: Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1)),
     GENESIO: Box.of(x1=(-0.85, 1.1), x2=(-0.55, 0.75), x3=(-0.6, 0.6)),
@@ -48,7 +48,7 @@ GAINS = Gains(
 @functools.cache
 def network(plant, layout="diagonal", per_side=None):
     order = len(plant.states)
-    basis = nlctl.GaussianBasis(centres=paper_centres(layout, order))
+    basis = nlctl.controllers.GaussianBasis(centres=paper_centres(layout, order))
     return basis, network_on_grid(plant, basis, BOXES[plant], per_side)
 
 

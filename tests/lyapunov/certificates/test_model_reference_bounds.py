@@ -19,9 +19,9 @@ from mrac_loops import (
 )
 
 import nlctl
-from nlctl import DiagramError, ParameterError
 from nlctl.analysis.lyapunov import certify
 from nlctl.analysis.lyapunov.model_reference.quadratic_form import quadratic_form
+from nlctl.errors import DiagramError, ParameterError
 
 W, D = 2.0, 0.5  # of the plant x' = 2 x + v + 0.5 sin t
 
@@ -90,9 +90,9 @@ def test_the_root_mean_square_does_not_depend_on_Gamma(weights):  # noqa: N802
     assert fast.ultimate < slow.ultimate
     a, h = 0.5 * D, 2 * D + 0.2 * W**2 / 2
     known = {
-        nlctl.AdaptiveWeights: a + np.sqrt(a * a + 0.2 * W**2 / 2),
-        nlctl.EModifiedWeights: 0.5 * h,
-        nlctl.ProjectedWeights: 2 * a,
+        nlctl.controllers.AdaptiveWeights: a + np.sqrt(a * a + 0.2 * W**2 / 2),
+        nlctl.controllers.EModifiedWeights: 0.5 * h,
+        nlctl.controllers.ProjectedWeights: 2 * a,
     }
     assert slow.rms == pytest.approx(known[type(weights)], rel=1e-7)
 
@@ -141,7 +141,7 @@ def test_without_modification_and_with_a_disturbance_the_weights_may_drift(weigh
 def test_weights_that_match_are_exact():
     """lambda W is what the law's own feedback and the regressor leave of the plant's equation."""
     match = certify(wing_rock(sigma(0.1, nodes=6))).matching
-    assert tuple(map(Fraction, nlctl.WingRock().w)) == match.W
+    assert tuple(map(Fraction, nlctl.plants.WingRock().w)) == match.W
     assert not match.rest.terms
     assert match.lam == 1
 
@@ -158,7 +158,9 @@ def test_an_input_gain_that_the_law_takes_for_another():
 def test_direct_adaptive_control_has_its_gains():
     """The gallery's plant x' = 2 x + 0.5 v: 10 and -6, and lambda = 0.5."""
     f = nlctl.equation(lambda x, v: 2.0 * x[0] + 0.5 * v)
-    found = certify(first_order(sigma(0.0, 20.0), f=f, k=3.0, b=3.0, law=nlctl.DirectLaw()))
+    found = certify(
+        first_order(sigma(0.0, 20.0), f=f, k=3.0, b=3.0, law=nlctl.controllers.DirectLaw())
+    )
     assert found.holds
     assert found.W == (10.0, -6.0)
     assert found.matching.lam == Fraction(1, 2)
@@ -168,7 +170,7 @@ def test_direct_adaptive_control_has_its_gains():
 def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
     """sin 2x is below 1, cos x below 1: D is at most what is left of both, by branch and bound."""
     f = nlctl.equation(lambda x, v: np.sin(2 * x[0]) + 0.1 * np.cos(x[0]) + v)
-    basis = nlctl.GaussianBasis(centres=((-1.0,), (0.0,), (1.0,)), widths=(1.0,))
+    basis = nlctl.controllers.GaussianBasis(centres=((-1.0,), (0.0,), (1.0,)), widths=(1.0,))
     plant = nlctl.PureFeedback(order=1, f=f, initial={"x1": 1.2})
     loop = first_order(sigma(0.1, 50.0, nodes=3), plant=plant, basis=basis, k=4.0)
     found = certify(loop)
@@ -184,8 +186,10 @@ def test_a_function_that_a_network_does_not_span_is_bounded_on_the_box():
 @pytest.mark.parametrize(("K", "closes"), [((1.5, 1.3), False), ((25.0, 10.0), True)])
 def test_a_network_of_wing_rock_needs_a_strong_model(K, closes):
     """As the page on rivals says: with W = 0 the whole plant is a disturbance on the box."""
-    basis = nlctl.GaussianBasis(centres=nlctl.grid_centres([5, 5], -2, 2), widths=(1.0,))
-    error = nlctl.ModelError(K=K, Q=(K[0], 1.0))
+    basis = nlctl.controllers.GaussianBasis(
+        centres=nlctl.controllers.grid_centres([5, 5], -2, 2), widths=(1.0,)
+    )
+    error = nlctl.controllers.ModelError(K=K, Q=(K[0], 1.0))
     loop = wing_rock(sigma(0.01, 50.0, nodes=25), basis=basis, error=error)
     found = certify(loop, tol=0.05)
     assert found.holds is closes
@@ -283,7 +287,7 @@ def test_names_and_nesting_do_not_matter():
     blocks = {
         "command": nlctl.SumOfSines(order=3, amplitudes=0.0, frequencies=1.0, phases=0.0),
         "airframe": nlctl.PureFeedback(order=1, f=unstable, d=half_sine),
-        "autopilot": nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=0.0), weights=sigma()),
+        "autopilot": nlctl.mrac(nlctl.controllers.ReferenceModel(a=(1.0,), b=0.0), weights=sigma()),
         "ailerons": nlctl.Gain(),
     }
     nested = nlctl.interconnect(blocks, outputs=["x1"], name="aircraft")
@@ -297,8 +301,9 @@ def test_each_parameter_of_the_run_is_the_one_of_the_proof(name):
     part, field = name.split(".")
     value = (3.0,) if field == "Q" else 3.0
     records = {
-        "weights": sigma(), "error": nlctl.ModelError(K=(1.0,), Q=(1.0,)),
-        "model": nlctl.ReferenceModel(a=(1.0,), b=0.0), "law": nlctl.ModelReferenceLaw(gain=1.0),
+        "weights": sigma(), "error": nlctl.controllers.ModelError(K=(1.0,), Q=(1.0,)),
+        "model": nlctl.controllers.ReferenceModel(a=(1.0,), b=0.0),
+        "law": nlctl.controllers.ModelReferenceLaw(gain=1.0),
     }  # fmt: skip
     one = certify(first_order(d=half_sine, **records), params={name: value})
     records[part] = dataclasses.replace(records[part], **{field: value})
@@ -333,7 +338,7 @@ def test_weights_of_ones_own_choice():
 def test_the_quadratic_form_is_a_lyapunov_function(poles, Q, x):
     """mu, q and the bounds of the errors, against floating point at points."""
     K = np.poly(-np.array(poles))[:0:-1]
-    error = nlctl.ModelError(K=tuple(map(float, K)), Q=tuple(Q[: len(poles)]))
+    error = nlctl.controllers.ModelError(K=tuple(map(float, K)), Q=tuple(Q[: len(poles)]))
     form = quadratic_form("error", error.K, error.lyapunov_matrix)
     P, own_Q = error.lyapunov_matrix, np.diag(error.Q)
     E = np.array(x[: len(poles)])

@@ -10,11 +10,11 @@ from mrac_loops import QUIET, first_order, half_sine, projection, sigma, wing_ro
 from planted_loops import actuator, again, exchanged
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov import DecompositionError, certify
 from nlctl.analysis.lyapunov.model_reference.audit import check_decrease
 from nlctl.analysis.lyapunov.model_reference.closing import matching, read_model_reference
 from nlctl.analysis.lyapunov.model_reference.decrease import decrease
+from nlctl.errors import DiagramError
 
 
 def linear(a, b):
@@ -124,25 +124,27 @@ REFUSED = {
         lambda: first_order(sigma(), f=linear(2.0, 0.0)), "of v alone in 'plant' is 0",
     ),
     "wing rock with the other sign": (
-        lambda: wing_rock(sigma(nodes=6), plant=nlctl.WingRock(L=-3.0)),
+        lambda: wing_rock(sigma(nodes=6), plant=nlctl.plants.WingRock(L=-3.0)),
         "of v alone in 'plant' is -3",
     ),
     "direct control of the other sign": (
-        lambda: first_order(sigma(), f=linear(2.0, -1.0), law=nlctl.DirectLaw()), "is -1",
+        lambda: first_order(sigma(), f=linear(2.0, -1.0), law=nlctl.controllers.DirectLaw()),
+        "is -1",
     ),
     "a constrained law": (
-        lambda: first_order(sigma(), law=nlctl.ConstrainedLaw(u_max=10.0)),
+        lambda: first_order(sigma(), law=nlctl.controllers.ConstrainedLaw(u_max=10.0)),
         "about a ModelReferenceLaw or DirectLaw as 'law', got ConstrainedLaw",
     ),
     "a law of another kind": (
         lambda: first_order(
-            sigma(), law=again(nlctl.ModelReferenceLaw, output=lambda t, x, u, p: (-u[2],))
+            sigma(),
+            law=again(nlctl.controllers.ModelReferenceLaw, output=lambda t, x, u, p: (-u[2],)),
         ),
         "got OwnModelReferenceLaw",
     ),
     "weights of another kind": (
         lambda: first_order(
-            again(nlctl.AdaptiveWeights, nodes=2, update=without_leakage)
+            again(nlctl.controllers.AdaptiveWeights, nodes=2, update=without_leakage)
         ),
         "got OwnAdaptiveWeights",
     ),
@@ -175,16 +177,19 @@ REFUSED = {
     ),
     "the error's output replaced in the record": (
         lambda: first_order(
-            sigma(), error=exchanged(nlctl.ModelError(K=(1.0,), Q=(1.0,)), output=half_of_it)
+            sigma(),
+            error=exchanged(nlctl.controllers.ModelError(K=(1.0,), Q=(1.0,)), output=half_of_it),
         ),
         "'error' has another output function than ModelError",
     ),
     "an error of another order": (
-        lambda: wing_rock(sigma(nodes=6), error=nlctl.ModelError(K=(1.5,), Q=(1.0,))),
+        lambda: wing_rock(sigma(nodes=6), error=nlctl.controllers.ModelError(K=(1.5,), Q=(1.0,))),
         "'error' is a controller for plants of order 1",
     ),
     "a model of another order": (
-        lambda: wing_rock(sigma(nodes=6), model=nlctl.ReferenceModel(a=(1.0, 3.0, 3.0), b=1.0)),
+        lambda: wing_rock(
+            sigma(nodes=6), model=nlctl.controllers.ReferenceModel(a=(1.0, 3.0, 3.0), b=1.0)
+        ),
         "one order, got plant 2, model 3, error 2",
     ),
     "a regressor of something else": (
@@ -197,7 +202,7 @@ REFUSED = {
     "a plant that is no chain": (
         lambda: wing_rock(
             sigma(nodes=6),
-            plant=again(nlctl.WingRock, update=lambda t, x, u, p: (x[1] + 0.1, x[0] + u[0])),
+            plant=again(nlctl.plants.WingRock, update=lambda t, x, u, p: (x[1] + 0.1, x[0] + u[0])),
         ),
         "makes x1' something else",
     ),
@@ -209,7 +214,7 @@ REFUSED = {
     ),
     "a reference that follows the plant": (
         lambda: first_order(
-            sigma(), reference=nlctl.BandLimitedNoise(inputs=("raw",), outputs=("yd",)),
+            sigma(), reference=nlctl.references.BandLimitedNoise(inputs=("raw",), outputs=("yd",)),
             wires={"reference.raw": {"x1": 1.0}},
         ),
         "BandLimitedNoise|'raw'",
@@ -235,7 +240,9 @@ def sampled_controller():
         "plant": nlctl.PureFeedback(order=1, f=linear(2.0, 1.0)),
         "actuator": nlctl.Gain(),
         "controller": nlctl.sampled(
-            nlctl.mrac(nlctl.ReferenceModel(a=(1.0,), b=0.0), weights=sigma()), 0.1, method="euler"
+            nlctl.mrac(nlctl.controllers.ReferenceModel(a=(1.0,), b=0.0), weights=sigma()),
+            0.1,
+            method="euler",
         ),
     }
     return nlctl.interconnect(pieces, outputs=["x1", "r"])
@@ -285,23 +292,23 @@ class TestNoneIsCertified:
 
     def test_a_regressor_without_a_bound(self):
         """Where psi has a pole in the box there is no bound of u, and no solution for all time."""
-        basis = again(nlctl.WingRockRegressor, output=pole)
+        basis = again(nlctl.controllers.WingRockRegressor, output=pole)
         found = certify(wing_rock(sigma(nodes=6), basis=basis), W=(0.8, 0, 0, 0, 0, 0))
         assert not found.holds
         assert found.u_max == np.inf
 
     def test_a_regressor_that_does_not_span_the_plant(self):
         """x1^3 of wing rock is not linear; the box that its growth asks for does not close."""
-        basis, weights = nlctl.AffineRegressor(order=2), sigma(0.1, nodes=3)
+        basis, weights = nlctl.controllers.AffineRegressor(order=2), sigma(0.1, nodes=3)
         found = certify(
-            wing_rock(weights, basis=basis, plant=nlctl.WingRock(w=(0, 0, 0, 0, 0, 2.0)))
+            wing_rock(weights, basis=basis, plant=nlctl.plants.WingRock(w=(0, 0, 0, 0, 0, 2.0)))
         )
         assert not found.holds
         assert "the box does not close" in found.reason
 
     def test_another_gain_is_another_number(self):
         """A law that takes 3 for 2 is another loop: its certificate is about that one."""
-        laws = (nlctl.ModelReferenceLaw(gain=gain) for gain in (3.0, 2.0))
+        laws = (nlctl.controllers.ModelReferenceLaw(gain=gain) for gain in (3.0, 2.0))
         one, other = (certify(wing_rock(sigma(nodes=6), reference=QUIET, law=law)) for law in laws)
         assert (float(one.matching.lam), float(other.matching.lam)) == (1.0, 1.5)
         assert one.W != other.W

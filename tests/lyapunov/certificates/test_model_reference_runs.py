@@ -65,7 +65,9 @@ def drawn_start(loop, found, rng, share):
     E, error = rng.standard_normal(len(P)), rng.standard_normal(len(found.W))
     scale = np.sqrt(share * found.V_max / (E @ P @ E + error @ error / float(match.Gamma)))
     W_hat = np.array(found.W) + scale * error
-    if isinstance(match.loop.spec("weights"), nlctl.ProjectedWeights):  # they start in the ball
+    if isinstance(
+        match.loop.spec("weights"), nlctl.controllers.ProjectedWeights
+    ):  # they start in the ball
         W_hat *= min(1.0, match.loop.spec("weights").W_max / np.linalg.norm(W_hat))
     start = nlctl.initial_state(loop)
     start[[names.index(f"plant.x{i + 1}") for i in range(len(E))]] = scale * E
@@ -147,10 +149,12 @@ def test_plants_of_order_one_to_three(order, seed):
         weights,
         plant=nlctl.PureFeedback(order=order, f=f, d=sine_of(size), initial={"x1": 0.5}),
         reference=SINE,
-        model=nlctl.ReferenceModel(a=tuple(map(float, model)), b=float(model[0])),
-        error=nlctl.ModelError(K=tuple(map(float, K)), Q=tuple(rng.uniform(0.5, 5, order))),
-        basis=nlctl.LinearRegressor(order=order),
-        law=nlctl.ModelReferenceLaw(gain=gain),
+        model=nlctl.controllers.ReferenceModel(a=tuple(map(float, model)), b=float(model[0])),
+        error=nlctl.controllers.ModelError(
+            K=tuple(map(float, K)), Q=tuple(rng.uniform(0.5, 5, order))
+        ),
+        basis=nlctl.controllers.LinearRegressor(order=order),
+        law=nlctl.controllers.ModelReferenceLaw(gain=gain),
     )
     found = certify(loop)
     run = nlctl.input_output_response(loop, np.linspace(0, 40, 2001), rtol=1e-7, atol=1e-9)
@@ -201,7 +205,11 @@ def test_whatever_is_certified_holds(seed):
         projection(float(rng.uniform(1, 8)), float(Gamma)),
     ][rng.integers(3)]
     told = float(gain * rng.choice([1.0, 0.5, 1.5]))
-    law = nlctl.DirectLaw() if rng.integers(3) == 0 else nlctl.ModelReferenceLaw(gain=told)
+    law = (
+        nlctl.controllers.DirectLaw()
+        if rng.integers(3) == 0
+        else nlctl.controllers.ModelReferenceLaw(gain=told)
+    )
     loop = first_order(weights, plant=plant, actuator=drawn_actuator(rng), law=law, k=float(k),
                        reference=SINE, b=float(rng.uniform(-2, 2)))  # fmt: skip
     found = certify(loop, tol=0.05)

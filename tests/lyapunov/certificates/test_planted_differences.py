@@ -23,10 +23,10 @@ from planted_loops import (
 )
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
 from nlctl.analysis.lyapunov.certificate.certify import certify
 from nlctl.equations import equation
+from nlctl.errors import DiagramError
 
 C_0 = 0.47654  # of the loop without a difference
 K = (0.9, 1.1)
@@ -102,7 +102,8 @@ WIRING = {
         lambda: wired(more=[system(nlctl.Gain(), "spare")]), "two blocks output 'v'",
     ),
     "a plant with a gain around it": (
-        lambda: wired(plant=doubled(system(nlctl.ForcedDuffing(), "plant"))), r"is 2 \* 'x2' of",
+        lambda: wired(plant=doubled(system(nlctl.plants.ForcedDuffing(), "plant"))),
+        r"is 2 \* 'x2' of",
     ),
 }  # fmt: skip
 
@@ -166,7 +167,7 @@ class Declared:
         )  # fmt: skip
 
 
-class SlowBurst(nlctl.KnownSignLaw):
+class SlowBurst(nlctl.controllers.KnownSignLaw):
     """Another law under a name of its own."""
 
 
@@ -218,17 +219,20 @@ EQUATIONS = {
     "a filter of another kind": (
         lambda: {
             "filtered_error": again(
-                nlctl.FilteredError, output=lambda t, x, u, p: (u[0] - u[2], u[0] - u[2], -u[4])
+                nlctl.controllers.FilteredError,
+                output=lambda t, x, u, p: (u[0] - u[2], u[0] - u[2], -u[4]),
             )
         },
         "about a FilteredError as 'filtered_error', got OwnFilteredError",
     ),
     "a law of another kind": (lambda: {"law": SlowBurst()}, "got SlowBurst"),
-    "a law with a constant gain": (lambda: {"law": nlctl.FixedGainLaw()}, "got FixedGainLaw"),
+    "a law with a constant gain": (
+        lambda: {"law": nlctl.controllers.FixedGainLaw()}, "got FixedGainLaw",
+    ),
     "a basis of another kind": (
         lambda: {
             "basis": again(
-                nlctl.GaussianBasis, centres=((0.0, 0.0),) * 3,
+                nlctl.controllers.GaussianBasis, centres=((0.0, 0.0),) * 3,
                 output=lambda t, x, u, p: 10 * np.ones(3),
             )
         },
@@ -252,7 +256,9 @@ EQUATIONS = {
         lambda: patched("actuator", outfcn=lambda t, x, u, p: (-u[0],)), "'actuator' has another",
     ),
     "the law's function replaced in the record": (
-        lambda: {"law": exchanged(nlctl.KnownSignLaw(), output=lambda t, x, u, p: (-u[0],))},
+        lambda: {
+            "law": exchanged(nlctl.controllers.KnownSignLaw(), output=lambda t, x, u, p: (-u[0],))
+        },
         "'law' has another output function than KnownSignLaw",
     ),
     "the dead zone's output replaced in the record": (
@@ -266,13 +272,14 @@ EQUATIONS = {
         r"continuous time, and 'planted' is sampled with dt = 0.1",
     ),
     "a law that is sampled": (
-        lambda: {"law": nlctl.sampled(nlctl.block(nlctl.KnownSignLaw(), "law"), 0.1)},
+        lambda: {"law": nlctl.sampled(nlctl.block(nlctl.controllers.KnownSignLaw(), "law"), 0.1)},
         "continuous time, and 'law' is sampled",
     ),
     "the weights' inherited output replaced in the record": (
         lambda: {
             "weights": exchanged(
-                nlctl.AdaptiveWeights(nodes=3), output=lambda t, x, u, p: (0 * x[0], x[0])
+                nlctl.controllers.AdaptiveWeights(nodes=3),
+                output=lambda t, x, u, p: (0 * x[0], x[0]),
             )
         },
         "'weights' has another output function than AdaptiveWeights",
@@ -288,12 +295,12 @@ EQUATIONS = {
 }  # fmt: skip
 
 PARAMETERS = {
-    "N_0 below 1 / (k_1 G_min)": ({"law": nlctl.KnownSignLaw(N_0=1.5)}, {}),
+    "N_0 below 1 / (k_1 G_min)": ({"law": nlctl.controllers.KnownSignLaw(N_0=1.5)}, {}),
     "N_0 in the diagram's own parameters": ({"params": {"law.N_0": 1.5}}, {}),
     "N_0 of the run": ({}, {"params": {"law.N_0": 1.5}}),
-    "a gain that nearly vanishes": ({"plant": nlctl.ForcedDuffing(gain_v=0.99)}, {}),
+    "a gain that nearly vanishes": ({"plant": nlctl.plants.ForcedDuffing(gain_v=0.99)}, {}),
     "sigma_2 = 0": ({}, {"params": {"robust.sigma_2": 0.0}}),
-    "gamma as published": ({"robust": nlctl.RobustTerm()}, {}),
+    "gamma as published": ({"robust": nlctl.controllers.RobustTerm()}, {}),
     "a range of u that is too small": ({}, {"k": (0.6, 1.3), "u_max": 20.0}),
 }
 
@@ -387,7 +394,7 @@ class TestOfTheLoopAtHand:
         assert found.C_0 > C_0
         w = 0.5 * np.sign(np.sin(5 * times))[None]
         assert largest_r(loop, times, w) <= found.C_0
-        with pytest.raises(nlctl.UnknownNameError, match="external input 'v'"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="external input 'v'"):
             certify(loop, inputs={"v": 1.0})
-        with pytest.raises(nlctl.ParameterError, match="finite bound"):
+        with pytest.raises(nlctl.errors.ParameterError, match="finite bound"):
             certify(loop, inputs={"w": np.nan})

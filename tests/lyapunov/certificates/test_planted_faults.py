@@ -5,9 +5,9 @@ import pytest
 from planted_loops import UPDATE, actuator, again, plant, wired
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov import Box, ledger
 from nlctl.analysis.lyapunov.bounds.decomposition import Decomposition, DecompositionError
+from nlctl.errors import DiagramError
 from nlctl.functions import nussbaum
 
 BOX = Box.of(x1=(-1.5, 1.5), x2=(-3, 3), v=(-40, 40))
@@ -15,8 +15,8 @@ OUTPUTS = {
     "r": "filtered_error.r", "e": "filtered_error.e", "u": "law.u", "v": "actuator.v",
     "zeta": "law.zeta", "x1": "plant.x1", "x2": "plant.x2",
 }  # fmt: skip
-FILTER, LAW = nlctl.FilteredError.output, nlctl.NussbaumLaw
-WEIGHTS, ROBUST = nlctl.AdaptiveWeights, nlctl.RobustTerm
+FILTER, LAW = nlctl.controllers.FilteredError.output, nlctl.controllers.NussbaumLaw
+WEIGHTS, ROBUST = nlctl.controllers.AdaptiveWeights, nlctl.controllers.RobustTerm
 HEALTHY_PARTS = {"weights": WEIGHTS(nodes=3), "robust": ROBUST(), "law": LAW()}
 
 
@@ -43,7 +43,7 @@ def sines(*factors):
 
 
 def filtered(output):
-    return {"filtered_error": again(nlctl.FilteredError, output=output)}
+    return {"filtered_error": again(nlctl.controllers.FilteredError, output=output)}
 
 
 def weights(**functions):
@@ -194,8 +194,8 @@ FAULTS = {
     ),
     "zeta' = eta^2": (lambda: law(update=lambda t, x, u, p: (base(u, p) ** 2,)), "(26)"),
     "zeta' = 2 r eta": (lambda: law(update=lambda t, x, u, p: (2 * u[0] * base(u, p),)), "(26)"),
-    "zeta' with leakage": (lambda: {"law": nlctl.LeakyNussbaumLaw(c=0.5)}, "(26)"),
-    "zeta' with a dead zone": (lambda: {"law": nlctl.DeadZoneNussbaumLaw()}, "(26)"),
+    "zeta' with leakage": (lambda: {"law": nlctl.controllers.LeakyNussbaumLaw(c=0.5)}, "(26)"),
+    "zeta' with a dead zone": (lambda: {"law": nlctl.controllers.DeadZoneNussbaumLaw()}, "(26)"),
     "u without Y_d": (
         lambda: law(output=lambda t, x, u, p: (nussbaum(x[0]) * (base(u, p) - u[3]), x[0])),
         "(26)",
@@ -320,7 +320,7 @@ HEALTHY = {
     "an actuator that varies with time, and says so": lambda: actuated(
         lambda t, u: u * (1 + 0.1 * np.sin(3 * t)), 0.9, 1.1, 0.01
     ),
-    "a monotone law": lambda: {"law": nlctl.MonotoneNussbaumLaw()},
+    "a monotone law": lambda: {"law": nlctl.controllers.MonotoneNussbaumLaw()},
     "N = zeta^2 cos zeta, from the right lobe": lambda: {
         "law": LAW(N=lambda z: (z + 1) ** 2 * np.cos(z + 1))
     },
@@ -337,7 +337,7 @@ HEALTHY = {
         )
     },
     "example 2's order": None,
-    "no network": lambda: {"weights": nlctl.Zero(outputs=("W_psi", "W_norm"))},
+    "no network": lambda: {"weights": nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))},
 }  # fmt: skip
 NO_NETWORK = {"weights.r": None, **{f"weights.psi[{i}]": None for i in range(3)}}
 

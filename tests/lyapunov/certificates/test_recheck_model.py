@@ -40,7 +40,7 @@ LOOPS = {
     "no modification": lambda: certify(first_order(sigma(0.0))),
     "an external input": lambda: certify(first_order(sigma(), inputs=["w"]), inputs={"w": 0.5}),
     "a direct law": lambda: certify(
-        first_order(sigma(0.3, 20.0), f=direct, k=3.0, b=3.0, law=nlctl.DirectLaw())
+        first_order(sigma(0.3, 20.0), f=direct, k=3.0, b=3.0, law=nlctl.controllers.DirectLaw())
     ),
     "a function that is not spanned": lambda: certify(first_order(sigma(), f=bent)),
     "a negative gain of both": lambda: certify(

@@ -3,9 +3,9 @@
 import pytest
 
 import nlctl
-from nlctl import DiagramError
 from nlctl.analysis.lyapunov import certify
 from nlctl.analysis.paper.rivals import rival_controllers
+from nlctl.errors import DiagramError
 
 LAWS = {
     "paper": "NussbaumLaw",
@@ -28,10 +28,10 @@ def test_a_rival_without_a_proof_is_refused(example, label):
 
 def test_l1_adaptive_control_is_refused():
     controller = nlctl.l1_adaptive(
-        nlctl.StatePredictor(a=(3.0,), gain=3.0),
-        basis=nlctl.AffineRegressor(order=1),
-        weights=nlctl.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0),
-        law=nlctl.FilteredLaw(omega=5.0, b=3.0, gain=3.0),
+        nlctl.controllers.StatePredictor(a=(3.0,), gain=3.0),
+        basis=nlctl.controllers.AffineRegressor(order=1),
+        weights=nlctl.controllers.ProjectedWeights(nodes=2, Gamma=1000.0, W_max=10.0),
+        law=nlctl.controllers.FilteredLaw(omega=5.0, b=3.0, gain=3.0),
     )
     blocks = {
         "reference": nlctl.SumOfSines(order=0),
@@ -47,22 +47,22 @@ def test_concurrent_learning_and_a_constrained_input_are_refused():
     """Their records have more signals, which the proof does not know."""
     common = {
         "reference": nlctl.SumOfSines(order=0),
-        "plant": nlctl.WingRock(),
+        "plant": nlctl.plants.WingRock(),
         "actuator": nlctl.Gain(),
-        "model": nlctl.ReferenceModel(a=(4.0, 2.0), b=4.0),
-        "basis": nlctl.WingRockRegressor(),
+        "model": nlctl.controllers.ReferenceModel(a=(4.0, 2.0), b=4.0),
+        "basis": nlctl.controllers.WingRockRegressor(),
     }
-    stack = nlctl.sampled(nlctl.HistoryStack(gain=3.0), 0.05)
+    stack = nlctl.sampled(nlctl.controllers.HistoryStack(gain=3.0), 0.05)
     concurrent = {
-        "error": nlctl.ModelError(K=(4.0, 2.0), Q=(1.0, 1.0)),
-        "weights": nlctl.ConcurrentWeights(nodes=6, Gamma=5.0),
+        "error": nlctl.controllers.ModelError(K=(4.0, 2.0), Q=(1.0, 1.0)),
+        "weights": nlctl.controllers.ConcurrentWeights(nodes=6, Gamma=5.0),
         "stack": stack,
-        "law": nlctl.ModelReferenceLaw(gain=3.0),
+        "law": nlctl.controllers.ModelReferenceLaw(gain=3.0),
     }
     constrained = {
-        "error": nlctl.ConstrainedError(K=(4.0, 2.0), Q=(1.0, 1.0)),
-        "weights": nlctl.AdaptiveWeights(nodes=6),
-        "law": nlctl.ConstrainedLaw(u_max=10.0),
+        "error": nlctl.controllers.ConstrainedError(K=(4.0, 2.0), Q=(1.0, 1.0)),
+        "weights": nlctl.controllers.AdaptiveWeights(nodes=6),
+        "law": nlctl.controllers.ConstrainedLaw(u_max=10.0),
     }
     for own, said in ((concurrent, "sampled|stack"), (constrained, "ConstrainedError")):
         with pytest.raises(DiagramError, match=said):

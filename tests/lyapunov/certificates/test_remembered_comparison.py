@@ -22,9 +22,9 @@ def drift(x, v):
 
 
 def known_sign(**fields):
-    law = nlctl.KnownSignLaw(**fields)
-    robust = nlctl.RobustTerm(sigma_2=1e-4, gamma=1e5)
-    weights = nlctl.AdaptiveWeights(Gamma=10.0)
+    law = nlctl.controllers.KnownSignLaw(**fields)
+    robust = nlctl.controllers.RobustTerm(sigma_2=1e-4, gamma=1e5)
+    weights = nlctl.controllers.AdaptiveWeights(Gamma=10.0)
     return nlctl.adaptive_neural(2, law=law, weights=weights, robust=robust)
 
 
@@ -114,8 +114,8 @@ def test_a_loop_that_was_changed_in_place_is_not_certified(plant):
 def test_a_global_number_that_changes_is_another_loop(monkeypatch, compared):
     def loop():
         plant = nlctl.PureFeedback(order=1, f=drift, d=lambda x, t: 0.5 * np.sin(t))
-        weights = nlctl.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
-        model = nlctl.ReferenceModel(a=(1.0,), b=0.0)
+        weights = nlctl.controllers.AdaptiveWeights(nodes=2, Gamma=5.0, sigma_1=0.2)
+        model = nlctl.controllers.ReferenceModel(a=(1.0,), b=0.0)
         controller = nlctl.mrac(model, weights=weights)
         blocks = {"reference": nlctl.SumOfSines(order=0), "actuator": nlctl.Gain()}
         return nlctl.interconnect({**blocks, "plant": plant, "controller": controller})

@@ -27,7 +27,7 @@ def of_plant(update=None, output=None, **more):
     return changed(plant=plant(update, output, **more))
 
 
-class Harder(nlctl.SlidingModeLaw):
+class Harder(nlctl.controllers.SlidingModeLaw):
     """Another law under a name of its own."""
 
 
@@ -72,18 +72,18 @@ DIFFERENCES = {
     "output x1 is 0.9 x1": of_plant(output=lambda t, x, u, p: (x[0], 0.9 * x[0], x[1])),
     "outputs exchanged": of_plant(output=lambda t, x, u, p: (x[0], x[1], x[0])),
     "a law of another kind": changed(law=Harder(K=25.0, phi=0.1)),
-    "a weaker law": changed(law=nlctl.SlidingModeLaw(K=2.0, phi=0.1)),
+    "a weaker law": changed(law=nlctl.controllers.SlidingModeLaw(K=2.0, phi=0.1)),
     "the law's function replaced in the block": changed(
         **of_block("law", outfcn=lambda t, x, u, p: (-u[0],))
     ),
     "the law's function replaced in the record": changed(
-        law=exchanged(nlctl.SlidingModeLaw(K=25.0), output=lambda t, x, u, p: (-u[0],))
+        law=exchanged(nlctl.controllers.SlidingModeLaw(K=25.0), output=lambda t, x, u, p: (-u[0],))
     ),
     "the filter's function replaced in the block": changed(
         **of_block("filtered_error", outfcn=lambda t, x, u, p: np.array([u[0], u[0], u[1]]))
     ),
     "a sampled law": changed(
-        law=nlctl.sampled(nlctl.block(nlctl.SlidingModeLaw(K=25.0), "law"), 0.1)
+        law=nlctl.sampled(nlctl.block(nlctl.controllers.SlidingModeLaw(K=25.0), "law"), 0.1)
     ),
     "other parameters of the diagram": changed(params={"law.K": 2.0}),
     "a dead actuator": changed(actuator=actuator(lambda t, u: 0.0 * u)),

@@ -16,8 +16,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.special import erfcx
 
 import nlctl
-from nlctl.errors import UsageError
-from nlctl.native import CompileError
+from nlctl.errors import CompileError, UsageError
 from nlctl.native.machine.calls import native_calls
 from nlctl.native.opaque.calls import Call
 

@@ -319,7 +319,7 @@ def response(made):
 
 
 @pytest.mark.parametrize("case", CHANGES, ids=lambda case: case.__name__.removeprefix("changed_"))
-@pytest.mark.filterwarnings("ignore::nlctl.EngineWarning")
+@pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
 def test_what_is_changed_in_place_is_refused_or_followed(case, monkeypatch):
     made, change = case(monkeypatch) if case.__code__.co_argcount else case()
     compiled = nlctl.compile(made)
@@ -332,8 +332,8 @@ def test_what_is_changed_in_place_is_refused_or_followed(case, monkeypatch):
     assert np.abs(after - before).max() > 1e-3  # python-control computes another loop
     try:
         np.testing.assert_allclose(np.reshape(response(compiled), -1), after, rtol=1e-6)
-    except nlctl.UsageError:
-        with pytest.raises(nlctl.UsageError, match="compile again"):
+    except nlctl.errors.UsageError:
+        with pytest.raises(nlctl.errors.UsageError, match="compile again"):
             response(compiled)
     fresh = response(nlctl.compile(made))
     np.testing.assert_allclose(np.reshape(fresh, -1), after, rtol=1e-6)
@@ -356,5 +356,7 @@ def test_the_message_names_what_was_changed():
     made, change = changed_defaults()
     compiled = nlctl.compile(made)
     change()
-    with pytest.raises(nlctl.UsageError, match=r"own\.__defaults__' was \(2\.0,\) when 's' was"):
+    with pytest.raises(
+        nlctl.errors.UsageError, match=r"own\.__defaults__' was \(2\.0,\) when 's' was"
+    ):
         response(compiled)

@@ -14,12 +14,10 @@ import pytest
 import source_text
 
 import nlctl
-from nlctl.errors import UsageError
-from nlctl.native import CompileError
+from nlctl.errors import CompileError, EngineWarning, UsageError
 from nlctl.native.purity.check import check_pure
 from nlctl.native.purity.source import Unreadable, definition
 from nlctl.native.purity.values import FRESH, VECTOR, Impure, captured
-from nlctl.response import EngineWarning
 
 GAIN, HISTORY, TABLE = 2.0, [], {"k": 1.0}
 MATRIX = np.eye(2)

@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline, PPoly
 
 import nlctl
-from nlctl.native import CompileError
+from nlctl.errors import CompileError
 
 SEEN = []
 COUNT = {"n": 0}
@@ -258,5 +258,5 @@ def test_a_method_that_is_replaced_afterwards_is_noticed(monkeypatch):
     """Its code was a constant of the program."""
     compiled = nlctl.compile(ct.nlsys(summed, None, inputs=1, outputs=1, states=1, name="b"))
     monkeypatch.setattr(Vector, "__add__", lambda self, other: other)
-    with pytest.raises(nlctl.UsageError, match="compile again"):
+    with pytest.raises(nlctl.errors.UsageError, match="compile again"):
         nlctl.input_output_response(compiled, [0.0, 1.0], 0.0, 0.0)

@@ -121,5 +121,5 @@ def test_where_a_function_from_a_pickle_cannot_be_compiled_is_said(tmp_path):
                     "        n += 1\n        return -n * x\n    return f\n")  # fmt: skip
     f = cloudpickle.loads(cloudpickle.dumps(runpy.run_path(str(file))["made"]()))
     system = ct.nlsys(f, None, states=1, inputs=0, name="counter")
-    with pytest.raises(nlctl.native.CompileError, match=r"counter\.py, line 5"):
+    with pytest.raises(nlctl.errors.CompileError, match=r"counter\.py, line 5"):
         nlctl.compile(system)

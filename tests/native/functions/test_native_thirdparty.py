@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from plain_plan import compare
 
-from nlctl.errors import ParameterError, UsageError
-from nlctl.native import CompileError
+from nlctl.errors import CompileError, ParameterError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.machine.fingerprint import program_key
 from nlctl.native.opaque.calls import Source

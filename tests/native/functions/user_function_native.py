@@ -68,7 +68,7 @@ def tell(name: str, **found: str) -> None:
     print(json.dumps({"name": name, **found}), file=sys.__stdout__, flush=True)
 
 
-def computed(compiled: nlctl.Compiled, at: Points) -> tuple[np.ndarray, np.ndarray]:
+def computed(compiled: nlctl.native.Compiled, at: Points) -> tuple[np.ndarray, np.ndarray]:
     """Return dx and y of the machine code for as many members as there are points."""
     system, lanes = compiled.system, at.t.size
     p = np.repeat(compiled.parameter_vector()[:, None], lanes, axis=1)
@@ -112,7 +112,7 @@ def single(name: str, n: int) -> tuple[str, str]:
             apart = compared((dx[:, 0], y[:, 0]), wanted, f"point {lane}")
             if apart:
                 return "different", apart
-    except nlctl.CompileError as error:
+    except nlctl.errors.CompileError as error:
         return "refused", str(error)
     return "equal", ""
 
@@ -215,7 +215,7 @@ def stepped(name: str, n: int) -> tuple[str, str]:
     try:
         compiled = nlctl.compile(user_functions.system(NAMED[name].make(n), name, 0.1))
         found = nlctl.input_output_response(compiled, times, u, x)
-    except nlctl.CompileError as error:
+    except nlctl.errors.CompileError as error:
         return "refused", str(error)
     for part in ("x", "y"):
         apart = np.abs(getattr(found, part) - getattr(wanted, part))

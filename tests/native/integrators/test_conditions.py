@@ -289,7 +289,7 @@ def test_steps_of_an_ensemble_are_bounded(method):
 
     assert (steps(max_step=1 / 64) >= 64).all()
     assert (steps() < 32).all()
-    with pytest.raises(nlctl.ParameterError, match=r"ensemble_response.*max_step"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"ensemble_response.*max_step"):
         steps(max_step=0.0)
 
 

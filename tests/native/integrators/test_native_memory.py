@@ -487,7 +487,7 @@ class TestExample2:
 
 def test_a_constant_input_is_constant_between_its_times():
     """To the bit: a rounding of it would carry the memory along."""
-    gap = nlctl.compile(nlctl.block(nlctl.Stop(r=1.0), "gap"))
+    gap = nlctl.compile(nlctl.block(nlctl.actuators.Stop(r=1.0), "gap"))
     rng = np.random.default_rng(8)
     for level in rng.uniform(1.5, 2.5, 40):
         times = np.cumsum(rng.uniform(0.1, 1.0, 8))

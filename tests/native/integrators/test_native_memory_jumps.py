@@ -18,10 +18,12 @@ import nlctl
 ACTUATORS = {
     "play": nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.1, c_l=-0.1),
     "unequal": nlctl.Backlash(m_r=1.2, m_l=0.8, c_r=0.3, c_l=-0.2),
-    "stop": nlctl.Stop(r=0.2),
-    "plays": nlctl.PrandtlIshlinskii(w=(0.3, 0.2), r=(0.1, 0.25)),
+    "stop": nlctl.actuators.Stop(r=0.2),
+    "plays": nlctl.actuators.PrandtlIshlinskii(w=(0.3, 0.2), r=(0.1, 0.25)),
     "relay": nlctl.Relay(on=0.4, off=0.1),
-    "relays": nlctl.Preisach(alpha=(0.3, 0.6, 0.7), beta=(0.1, 0.2, 0.5), w=(0.3, 0.2, 0.1)),
+    "relays": nlctl.actuators.Preisach(
+        alpha=(0.3, 0.6, 0.7), beta=(0.1, 0.2, 0.5), w=(0.3, 0.2, 0.1)
+    ),
 }
 TIMES = (0.5, 0.9, 1.3)
 

@@ -153,7 +153,9 @@ def remembering(commit, **more):
 def test_a_memory_that_may_jump_declares_where(commit):
     """Named at once, and python-control does not take over: there it would never switch."""
     for run in (nlctl.compile, lambda loop: nlctl.input_output_response(loop, [0, 1], 1.0)):
-        with pytest.raises(nlctl.BlockError, match=r"Remembers \(block 'm'\) needs .*switching"):
+        with pytest.raises(
+            nlctl.errors.BlockError, match=r"Remembers \(block 'm'\) needs .*switching"
+        ):
             run(nlctl.block(remembering(commit), "m"))
 
 

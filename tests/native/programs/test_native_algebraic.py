@@ -10,9 +10,9 @@ from scipy.linalg import block_diag
 from scipy.special import lambertw
 
 import nlctl
-from nlctl.errors import UsageError
+from nlctl.errors import AlgebraicLoopError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
-from nlctl.native.diagram.schedule import AlgebraicLoopError, schedule
+from nlctl.native.diagram.schedule import schedule
 from nlctl.native.diagram.tearing import first_loop, tear
 
 

@@ -17,7 +17,7 @@ from numba.core import config
 from plain_plan import by_blocks
 
 import nlctl
-from nlctl.native import CompileError
+from nlctl.errors import CompileError
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.lower import lower
 from nlctl.native.machine.routine import lowered_code, plain_functions
@@ -392,7 +392,7 @@ def test_assumed_integers_are_found_out():
 def test_truth_values_are_parameters_like_others():
     """Members may differ in a Boolean: each gets its own branch."""
     params = [{"plant.integrate_w": flag} for flag in (True, False)]
-    lowered = check(nlctl.block(nlctl.ForcedDuffing(), "plant"), 2, params=params)
+    lowered = check(nlctl.block(nlctl.plants.ForcedDuffing(), "plant"), 2, params=params)
     assert not lowered.opaque
 
 

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from scipy.special import erfcx
 
 import nlctl
+from nlctl.errors import CompileError
 from nlctl.expressions.elimination import SINGULAR, linear_solution
-from nlctl.native import CompileError
 from nlctl.native.codegen.newton import _MOST, STARTS, improved
 from nlctl.native.codegen.solver import DONE, GUESS
 

@@ -13,8 +13,9 @@ from plain_plan import compare, evaluated, interpreted
 import nlctl
 from nlctl.diagrams.places import leaves
 from nlctl.diagrams.reads import may_read
+from nlctl.errors import AlgebraicLoopError
 from nlctl.native.compiled import compile as compile_diagram
-from nlctl.native.diagram.schedule import AlgebraicLoopError, schedule
+from nlctl.native.diagram.schedule import schedule
 
 
 def lag(name, k):
@@ -250,7 +251,7 @@ def test_what_numba_cannot_compile_is_called_back():
 
 def test_a_single_block_and_linear_systems():
     """No diagram at all: an nlctl block, a state-space system, a transfer function."""
-    compare(nlctl.block(nlctl.Genesio(), "plant"))
+    compare(nlctl.block(nlctl.plants.Genesio(), "plant"))
     compare(ct.rss(4, 2, 3))
     compare(ct.interconnect([ct.tf([1, 2], [1, 3, 2], name="G", inputs="u", outputs="y")],
                             inputs="u", outputs="y"))  # fmt: skip

@@ -65,7 +65,7 @@ SYSTEMS = {
     "relay": lambda: memory(nlctl.Relay()),
     "sliding": lambda: memory(nlctl.IdealRelay()),
     "dead zone": lambda: memory(nlctl.DeadZone()),
-    "friction": lambda: memory(nlctl.LuGre()),
+    "friction": lambda: memory(nlctl.actuators.LuGre()),
     "clocks": sampled_loop,
     "delay": delayed_loop,
     "stiff": stiff,
@@ -251,11 +251,11 @@ def test_a_run_that_diverges_says_when():
     made.reset([1.0])
     for _ in range(3):
         made.step(0.0)
-    with pytest.raises(nlctl.DivergedError, match="'escapes' diverged") as raised:
+    with pytest.raises(nlctl.errors.DivergedError, match="'escapes' diverged") as raised:
         made.step(0.0)
     assert raised.value.time == pytest.approx(1.0, abs=1e-6)
     assert not made.success
-    with pytest.raises(nlctl.UsageError, match=r"diverged.*call reset\(\) or restore"):
+    with pytest.raises(nlctl.errors.UsageError, match=r"diverged.*call reset\(\) or restore"):
         made.step(0.0)
     made.reset()
     assert made.success
@@ -283,7 +283,7 @@ def test_nan_travels(make):
     assert np.isnan(made.step(np.nan)).all()
     assert not made.success
     loud = nlctl.stepper(make(), DT)
-    with pytest.raises(nlctl.DivergedError):
+    with pytest.raises(nlctl.errors.DivergedError):
         loud.step(np.nan)
 
 
@@ -295,23 +295,27 @@ def test_chattering_is_named():
     made = nlctl.stepper(system, 0.5)
     made.reset([0.4])  # which it leaves after 0.4 / 0.7 s
     made.step(0.3)
-    with pytest.raises(nlctl.ChatteringError, match="coulomb"):
+    with pytest.raises(nlctl.errors.ChatteringError, match="coulomb"):
         made.step(0.3)
 
 
 def test_wrong_calls_are_refused_by_name():
     made = nlctl.stepper(pendulum(), DT)
-    with pytest.raises(nlctl.ParameterError, match=r"step needs 1 number for the inputs \(v\)"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match=r"step needs 1 number for the inputs \(v\)"
+    ):
         made.step([1.0, 2.0])
-    with pytest.raises(nlctl.ParameterError, match=r"rollout needs inputs of shape \(1, m\)"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match=r"rollout needs inputs of shape \(1, m\)"
+    ):
         made.rollout(np.ones((2, 5)))
-    with pytest.raises(nlctl.ParameterError, match="snapshot"):
+    with pytest.raises(nlctl.errors.ParameterError, match="snapshot"):
         made.restore(nlctl.stepper(pendulum(), DT).snapshot())
-    with pytest.raises(nlctl.ParameterError, match="stepper needs a finite dt > 0"):
+    with pytest.raises(nlctl.errors.ParameterError, match="stepper needs a finite dt > 0"):
         nlctl.stepper(pendulum(), 0.0)
-    with pytest.raises(nlctl.ParameterError, match=r"stepper needs dt=0.1 for 'd'"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"stepper needs dt=0.1 for 'd'"):
         nlctl.stepper(ct.ss(0.5, 1, 1, 0, 0.1, name="d"), 0.2)
-    with pytest.raises(nlctl.UnknownNameError):
+    with pytest.raises(nlctl.errors.UnknownNameError):
         made.reset({"plant.x[7]": 1.0})
 
 
@@ -320,5 +324,5 @@ def test_the_first_step_is_audited():
     compiled = nlctl.compile(pendulum())
     made = nlctl.stepper(compiled, DT, audit="every run")
     made.step(0.1)
-    with pytest.raises(nlctl.ParameterError, match="audit"):
+    with pytest.raises(nlctl.errors.ParameterError, match="audit"):
         nlctl.stepper(compiled, DT, audit="never").step(0.1)

@@ -107,12 +107,12 @@ def test_choices_run_in_their_own_diagrams_and_rows_keep_their_order():
 )
 def test_an_experiment_that_contradicts_itself_is_refused(changes, message):
     """Before anything is built."""
-    with pytest.raises(nlctl.ParameterError, match=message):
+    with pytest.raises(nlctl.errors.ParameterError, match=message):
         experiment(**changes)
 
 
 def test_a_missing_signal_is_named_with_the_nearest():
     """Before the first row is run."""
     spec = Spec(requirements=(Requirement(key="r", formula=in_band("yy", upper=1), until=2),))
-    with pytest.raises(nlctl.UnknownNameError, match="yy"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="yy"):
         prepare(experiment(spec=spec))

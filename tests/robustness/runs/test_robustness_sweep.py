@@ -115,7 +115,7 @@ def test_choices_are_labels_of_the_table():
 def test_a_design_of_another_space_is_refused(made):
     """With the name that the experiment does not know."""
     other = Space(quantities=(Uncertain(name="lag.speed", bounds=(0, 1)),))
-    with pytest.raises(nlctl.UnknownNameError, match=r"lag\.speed"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=r"lag\.speed"):
         sweep(made, independent(other, 3, 1))
 
 
@@ -125,7 +125,7 @@ def test_a_refused_value_names_the_rows():
     space = Space(quantities=(Uncertain(name="lag.gain", law=law, nominal=1.0),))
     made = prepare(experiment(space=space))
     points = pd.DataFrame({"lag.gain": [1.0] * 9 + [-1.0]})
-    with pytest.raises(nlctl.ParameterError, match=r"gain.*-1.*in rows 8 to 9"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"gain.*-1.*in rows 8 to 9"):
         sweep(made, from_table(made.experiment.space, points), chunk=4)
 
 
@@ -190,7 +190,10 @@ def test_a_refused_row_costs_only_its_chunk(tmp_path):
     points = independent(made.experiment.space, 40, 1).table
     points.loc[25, "lag.gain"] = -1.0
     design = from_table(made.experiment.space, points)
-    with ThreadPoolExecutor(2) as pool, pytest.raises(nlctl.ParameterError, match="rows 20 to 29"):
+    with (
+        ThreadPoolExecutor(2) as pool,
+        pytest.raises(nlctl.errors.ParameterError, match="rows 20 to 29"),
+    ):
         sweep(made, design, tmp_path, executor=pool, chunk=10)
     kept = load(tmp_path).table
     assert {*range(20)} <= {*kept.index}
@@ -308,5 +311,5 @@ def test_a_column_that_is_not_there_is_an_error(made, design, tmp_path, kept):
     """In memory and in a folder; not one column less."""
     found = sweep(made, design, folder=tmp_path / "rows" if kept else None)
     assert list(found.columns("spec").columns) == ["spec"]
-    with pytest.raises(nlctl.UnknownNameError, match="unknown column 'spek' of the sweep"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match="unknown column 'spek' of the sweep"):
         found.columns("spec", "spek")

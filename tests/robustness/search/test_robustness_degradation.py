@@ -100,10 +100,10 @@ def test_nan_counts_as_a_violation():
 @each_row(
     ("changes", "error", "message"),
     [
-        ({"factors": ()}, nlctl.ParameterError, "at least one factor"),
+        ({"factors": ()}, nlctl.errors.ParameterError, "at least one factor"),
         ({"factors": (-1.0,)}, SpaceError, "scale >= 0, got -1"),
-        ({"runs": 0}, nlctl.ParameterError, "runs >= 1, got 0"),
-        ({"confidence": 1.0}, nlctl.ParameterError, "0 < confidence < 1"),
+        ({"runs": 0}, nlctl.errors.ParameterError, "runs >= 1, got 0"),
+        ({"confidence": 1.0}, nlctl.errors.ParameterError, "0 < confidence < 1"),
     ],
 )
 def test_bad_calls_are_refused(changes, error, message):

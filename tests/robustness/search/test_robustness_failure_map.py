@@ -128,11 +128,11 @@ def test_diverged_runs_draw_no_refinement_of_their_own():
 @each_row(
     ("changes", "error", "message"),
     [
-        ({"x": "aa"}, nlctl.UnknownNameError, "nearest: 'a'"),
-        ({"y": "arm"}, nlctl.UnknownNameError, "quantity 'arm' for an axis"),
-        ({"y": "a"}, nlctl.ParameterError, "got 'a' twice"),
-        ({"at": {"cc": 1}}, nlctl.UnknownNameError, "nearest: 'c'"),
-        ({"cells": 0}, nlctl.ParameterError, "cells >= 1"),
+        ({"x": "aa"}, nlctl.errors.UnknownNameError, "nearest: 'a'"),
+        ({"y": "arm"}, nlctl.errors.UnknownNameError, "quantity 'arm' for an axis"),
+        ({"y": "a"}, nlctl.errors.ParameterError, "got 'a' twice"),
+        ({"at": {"cc": 1}}, nlctl.errors.UnknownNameError, "nearest: 'c'"),
+        ({"cells": 0}, nlctl.errors.ParameterError, "cells >= 1"),
         (
             {"space": Space(quantities=(*SPACE.quantities, Uncertain(name="n", law=stats.norm())))},
             SpaceError,

@@ -141,7 +141,7 @@ def test_draws_that_contradict_the_search_lower_the_bound():
 def test_refused_draws_leave_the_search_as_it_is():
     def refusing(table):
         if len(table) == 33:
-            raise nlctl.ParameterError("DeadZone needs b_r >= 0, got -1")
+            raise nlctl.errors.ParameterError("DeadZone needs b_r >= 0, got -1")
         return function(lambda t: 1 - t["x0"])(table)
 
     made = robustness_radius(refusing, box(1.0), runs=20, draws=33, entropy=1)
@@ -153,9 +153,9 @@ def test_refused_draws_leave_the_search_as_it_is():
 @each_row(
     ("changes", "error", "message"),
     [
-        ({"largest": 0.0}, nlctl.ParameterError, "largest > 0, got 0"),
-        ({"tolerance": np.nan}, nlctl.ParameterError, "0 < tolerance < 1, got nan"),
-        ({"draws": -1}, nlctl.ParameterError, "draws >= 0"),
+        ({"largest": 0.0}, nlctl.errors.ParameterError, "largest > 0, got 0"),
+        ({"tolerance": np.nan}, nlctl.errors.ParameterError, "0 < tolerance < 1, got nan"),
+        ({"draws": -1}, nlctl.errors.ParameterError, "draws >= 0"),
         (
             {"space": Space(quantities=(Uncertain(name="x0", bounds=(0, 1)),))},
             SpaceError,
@@ -265,7 +265,7 @@ def test_the_search_ends_where_the_loop_refuses_values():
     assert found.witness is None
     assert found.searched == largest
     assert "Spring needs k > 0" in str(found)
-    with pytest.raises(nlctl.ParameterError, match="at_most > 0, got 0"):
+    with pytest.raises(nlctl.errors.ParameterError, match="at_most > 0, got 0"):
         largest_scale(made, 0)
     half = largest_scale(prepare_scaled(made, 2.0))[0]
     assert half == pytest.approx(5 / 3, rel=1e-9)
@@ -301,7 +301,7 @@ def test_rules_of_two_parameters_end_the_sizes_together():
     space = made.experiment.space
     rows = evaluate(made, corners(scaled(space, largest)).table)
     assert (rows["status"] == "OK").all()
-    with pytest.raises(nlctl.ParameterError, match="c_l < c_r"):
+    with pytest.raises(nlctl.errors.ParameterError, match="c_l < c_r"):
         evaluate(made, corners(scaled(space, largest * (1 + 1e-9))).table)
 
 
@@ -331,7 +331,7 @@ class Knots:
 
     def check(self):
         if not np.all(np.diff(self.at) > 0):
-            raise nlctl.ParameterError("Knots needs them in order")
+            raise nlctl.errors.ParameterError("Knots needs them in order")
 
     @staticmethod
     @nlctl.equation
@@ -352,7 +352,7 @@ def test_many_quantities_of_one_block_are_tried_in_pairs():
 def test_a_nominal_row_that_is_refused_has_no_size():
     """Each of the two is admissible with the other's default; together they are not."""
     made = alone(nlctl.Backlash(), {"c_l": (0.0, 0.4), "c_r": (-0.5, 0.6)}, c_l=0.3, c_r=-0.1)
-    with pytest.raises(nlctl.ParameterError, match=r"c_l < c_r, got 0\.3 and -0\.1"):
+    with pytest.raises(nlctl.errors.ParameterError, match=r"c_l < c_r, got 0\.3 and -0\.1"):
         largest_scale(made)
 
 

@@ -172,9 +172,9 @@ class TestWorstCase:
             worst_case(lambda table: function(lambda t: distance(t, 0))(table.iloc[:1]), box(2))
 
     def test_bad_calls_are_refused(self):
-        with pytest.raises(nlctl.ParameterError, match="runs >= 1, got 0"):
+        with pytest.raises(nlctl.errors.ParameterError, match="runs >= 1, got 0"):
             worst_case(function(lambda t: distance(t, 0)), box(2), 0)
-        with pytest.raises(nlctl.ParameterError, match=r"column 'spec', got \['margin'\]"):
+        with pytest.raises(nlctl.errors.ParameterError, match=r"column 'spec', got \['margin'\]"):
             worst_case(lambda t: pd.DataFrame({"margin": np.zeros(len(t))}), box(2))
 
 
@@ -233,7 +233,7 @@ class TestShrink:
         space = box(d)
         first = dict(zip(space.names, rng.uniform(-1, 2, d), strict=True))
         if margins(pd.DataFrame([first]))[0] > 0:
-            with pytest.raises(nlctl.ParameterError, match="only a violation can be shrunk"):
+            with pytest.raises(nlctl.errors.ParameterError, match="only a violation can be shrunk"):
                 shrink(function(margins), space, first)
             return
         made = shrink(function(margins), space, first)

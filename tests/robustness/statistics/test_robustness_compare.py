@@ -189,16 +189,16 @@ class TestRefused:
         design, margin, error = drawn(4)
         table = results(design, CHOICE, spec=margin, error=error)
         compare(design, CHOICE, table, {"error": "smaller"})
-        with pytest.raises(nlctl.ParameterError, match=message):
+        with pytest.raises(nlctl.errors.ParameterError, match=message):
             compare(design, CHOICE, change(table), {"error": "smaller"})
 
     def test_unknown_columns_no_metric_and_chosen_samples(self):
         """By name with the nearest; tests need independent draws."""
         design, margin, error = drawn(4)
         table = results(design, CHOICE, spec=margin, error=error)
-        with pytest.raises(nlctl.UnknownNameError, match="error"):
+        with pytest.raises(nlctl.errors.UnknownNameError, match="error"):
             compare(design, CHOICE, table, {"eror": "smaller"})
-        with pytest.raises(nlctl.ParameterError, match="at least one metric"):
+        with pytest.raises(nlctl.errors.ParameterError, match="at least one metric"):
             compare(design, CHOICE, table, {})
         chosen = sobol(SPACE, 4)
         table = results(chosen, CHOICE, spec=margin, error=error)

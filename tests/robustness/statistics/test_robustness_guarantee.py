@@ -309,5 +309,5 @@ def test_known_failure_probabilities_are_covered():
 )
 def test_numbers_that_are_no_probabilities_are_refused(call, message):
     """By name and value."""
-    with pytest.raises(nlctl.ParameterError, match=message):
+    with pytest.raises(nlctl.errors.ParameterError, match=message):
         call()

@@ -185,10 +185,10 @@ TWO = {"a": np.zeros(4), "b": np.ones(4)}
     [
         (lambda: differences(sobol(SPACE, 4), TWO), NoGuaranteeError, "kind 'Sobol''"),
         (lambda: mcnemar(sobol(SPACE, 4), TWO), NoGuaranteeError, "Run independent"),
-        (lambda: wins(drawn(4), {"a": [1.0] * 4}), nlctl.ParameterError, "two controllers"),
-        (lambda: wins(drawn(5), TWO), nlctl.ParameterError, "'a' for each of 5 rows, got 4"),
-        (lambda: wins(drawn(4), TWO, "more"), nlctl.ParameterError, "'smaller' or 'larger'"),
-        (lambda: differences(drawn(4), TWO, 2), nlctl.ParameterError, "0 < confidence < 1"),
+        (lambda: wins(drawn(4), {"a": [1.0] * 4}), nlctl.errors.ParameterError, "two controllers"),
+        (lambda: wins(drawn(5), TWO), nlctl.errors.ParameterError, "'a' for each of 5 rows, got 4"),
+        (lambda: wins(drawn(4), TWO, "more"), nlctl.errors.ParameterError, "'smaller' or 'larger'"),
+        (lambda: differences(drawn(4), TWO, 2), nlctl.errors.ParameterError, "0 < confidence < 1"),
     ],
 )
 def test_comparisons_that_mean_nothing_are_refused(call, error, message):

@@ -205,7 +205,9 @@ def test_a_failed_run_is_no_better_than_any_other_and_violates(margins):
     margins = np.array(margins)
     ended = margins > -1e6
     if not ended.any():
-        with pytest.raises(nlctl.ParameterError, match=f"of {margins.size} rows? none reached"):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match=f"of {margins.size} rows? none reached"
+        ):
             censored(margins)
         return
     values, failed, least = censored(margins)
@@ -279,5 +281,5 @@ DRAWN = independent(cube(2), 8, entropy=1)
 )
 def test_analyses_refuse_what_they_are_not_made_for(call, message):
     """The message says what to make instead."""
-    with pytest.raises(nlctl.ParameterError, match=message):
+    with pytest.raises(nlctl.errors.ParameterError, match=message):
         call()

@@ -124,5 +124,7 @@ def test_bounds_of_many_runs_are_numbers_in_order(digits, k, confidence):
 
 def test_more_runs_than_the_quantiles_bear_are_refused():
     """The upper bound was NaN."""
-    with pytest.raises(nlctl.ParameterError, match=r"runs <= 1e\+09.* got 10000000000000000000"):
+    with pytest.raises(
+        nlctl.errors.ParameterError, match=r"runs <= 1e\+09.* got 10000000000000000000"
+    ):
         clopper_pearson(10**18, 10**19)

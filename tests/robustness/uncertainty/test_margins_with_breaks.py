@@ -5,9 +5,9 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
 
-from nlctl import ParameterError
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, margin
 from nlctl.analysis.robustness.stl.violation_time import violation_time
+from nlctl.errors import ParameterError
 
 END = 10.0
 T = np.linspace(0, END, 401)

@@ -57,12 +57,32 @@ def test_names_units_and_nominal_values_come_from_the_diagram(loop):
 @each_row(
     ("quantity", "error", "message"),
     [
-        ({"name": "actuator.br", "bounds": (0, 1)}, nlctl.UnknownNameError, "nearest: 'actuator.b"),
-        ({"name": "plant.x9(0)", "bounds": (0, 1)}, nlctl.UnknownNameError, "nearest: 'plant.x"),
-        ({"name": "b_r", "bounds": (-0.1, 1)}, nlctl.ParameterError, "b_r >= 0, got -0.1.*act"),
+        (
+            {"name": "actuator.br", "bounds": (0, 1)},
+            nlctl.errors.UnknownNameError,
+            "nearest: 'actuator.b",
+        ),
+        (
+            {"name": "plant.x9(0)", "bounds": (0, 1)},
+            nlctl.errors.UnknownNameError,
+            "nearest: 'plant.x",
+        ),
+        (
+            {"name": "b_r", "bounds": (-0.1, 1)},
+            nlctl.errors.ParameterError,
+            "b_r >= 0, got -0.1.*act",
+        ),
         ({"name": "lambdas", "bounds": (1, 2)}, SpaceError, r"shape \(1,\): address.*lambdas\[0\]"),
-        ({"name": "centres", "bounds": (1, 2)}, nlctl.ParameterError, "centres to be a matrix"),
-        ({"name": "lambdas[7]", "bounds": (1, 2)}, nlctl.ParameterError, "not an element of it"),
+        (
+            {"name": "centres", "bounds": (1, 2)},
+            nlctl.errors.ParameterError,
+            "centres to be a matrix",
+        ),
+        (
+            {"name": "lambdas[7]", "bounds": (1, 2)},
+            nlctl.errors.ParameterError,
+            "not an element of it",
+        ),
         ({"name": "b_r", "bounds": (0.6, 0.9)}, SpaceError, r"\[0.6, 0.9\], got 0.5.*diagram's"),
     ],
 )
@@ -74,7 +94,7 @@ def test_what_does_not_fit_the_diagram_is_refused(loop, quantity, error, message
 
 def test_a_whole_number_needs_a_law_of_whole_numbers():
     """The seed of a noise: uniform is refused, randint gives integers that reach the block."""
-    noise = nlctl.block(nlctl.BandLimitedNoise(), "sensor")
+    noise = nlctl.block(nlctl.references.BandLimitedNoise(), "sensor")
     with pytest.raises(SpaceError, match=r"sensor.seed' is an integer.*got uniform on \[0, 9\]"):
         resolved(Space(quantities=(Uncertain(name="sensor.seed", bounds=(0, 9)),)), noise)
     space = Space(quantities=(Uncertain(name="sensor.seed", law=stats.randint(0, 10)),))
@@ -166,10 +186,12 @@ def test_every_combination_of_choices_is_built_and_checked():
     built = diagrams(space, nlctl.paper.example_1)
     assert [labels for labels, _ in built] == combinations(space)
     assert "actuator.memory" in nlctl.state_names(built[1][1])
-    with pytest.raises(nlctl.UnknownNameError, match=r"b_r'.*with actuator = backlash"):
+    with pytest.raises(nlctl.errors.UnknownNameError, match=r"b_r'.*with actuator = backlash"):
         diagrams(Space(quantities=(B_R,), choices=(ACTUATOR,)), nlctl.paper.example_1)
     wrong = Space(choices=(Choice(name="actor", options=ACTUATOR.options),))
-    with pytest.raises(nlctl.UnknownNameError, match="keyword 'actor' of example_1; nearest: 'act"):
+    with pytest.raises(
+        nlctl.errors.UnknownNameError, match="keyword 'actor' of example_1; nearest: 'act"
+    ):
         diagrams(wrong, nlctl.paper.example_1)
 
 

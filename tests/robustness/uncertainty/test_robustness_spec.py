@@ -276,29 +276,33 @@ def test_a_requirement_is_a_metric_of_an_ensemble():
 @each_row(
     ("make", "error", "message"),
     [
-        (lambda: in_band("e"), nlctl.ParameterError, "one of them finite"),
-        (lambda: in_band("e", lower=1, upper=0), nlctl.ParameterError, "lower <= upper"),
-        (lambda: in_band("e", upper=np.nan), nlctl.ParameterError, "band of 'e'"),
-        (lambda: in_band("e", upper=1, scale=0), nlctl.ParameterError, "scale > 0"),
-        (lambda: always(SMALL, 2, 1), nlctl.ParameterError, "'always' needs 0 <= start <= end"),
-        (lambda: eventually(SMALL, -1), nlctl.ParameterError, "'eventually' needs"),
+        (lambda: in_band("e"), nlctl.errors.ParameterError, "one of them finite"),
+        (lambda: in_band("e", lower=1, upper=0), nlctl.errors.ParameterError, "lower <= upper"),
+        (lambda: in_band("e", upper=np.nan), nlctl.errors.ParameterError, "band of 'e'"),
+        (lambda: in_band("e", upper=1, scale=0), nlctl.errors.ParameterError, "scale > 0"),
+        (
+            lambda: always(SMALL, 2, 1),
+            nlctl.errors.ParameterError,
+            "'always' needs 0 <= start <= end",
+        ),
+        (lambda: eventually(SMALL, -1), nlctl.errors.ParameterError, "'eventually' needs"),
         (
             lambda: Requirement(key="r", formula=always(SMALL, 12), until=10),
-            nlctl.ParameterError,
+            nlctl.errors.ParameterError,
             "'r' needs a finite end .* at least 12 s",
         ),
         (
             lambda: Requirement(key="r", formula=SMALL, until=np.inf),
-            nlctl.ParameterError,
+            nlctl.errors.ParameterError,
             "finite until",
         ),
-        (lambda: Spec(requirements=()), nlctl.ParameterError, "at least one requirement"),
+        (lambda: Spec(requirements=()), nlctl.errors.ParameterError, "at least one requirement"),
         (
             lambda: value(SMALL, ee=T),
-            nlctl.UnknownNameError,
+            nlctl.errors.UnknownNameError,
             "in requirement 'r'; nearest: 'ee'",
         ),
-        (lambda: value(SMALL, t=T + 1, until=5, e=T), nlctl.ParameterError, "starts at 1 s"),
+        (lambda: value(SMALL, t=T + 1, until=5, e=T), nlctl.errors.ParameterError, "starts at 1 s"),
     ],
 )
 def test_requirements_that_make_no_sense_are_refused(make, error, message):

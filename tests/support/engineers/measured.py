@@ -61,7 +61,7 @@ def fate(entry: Entry) -> Fate:
         made = system(entry)
         try:
             compiled = nlctl.compile(made)
-        except nlctl.CompileError as error:
+        except nlctl.errors.CompileError as error:
             return Fate(kind="refused", why=str(error))
         if compiled.equations.calls:
             reason = next(iter(compiled.equations.calls.values())).reason
@@ -69,7 +69,7 @@ def fate(entry: Entry) -> Fate:
         return Fate(kind="traced", apart=_apart(compiled, made, points(entry)))
 
 
-def _apart(compiled: nlctl.Compiled, made: Any, at: Points) -> str:
+def _apart(compiled: nlctl.native.Compiled, made: Any, at: Points) -> str:
     dx, _ = Plain(compiled).run(at)
     for lane in range(at.t.size):
         want, _ = expected(made, at.at(lane))
