@@ -10,7 +10,7 @@ from extras import needed
 from fmi_models import MODELS, linear, simulated
 
 import nlctl
-from nlctl.errors import CompileError, ParameterError
+from nlctl.errors import CompileError, ParameterError, UnknownNameError, UsageError
 from nlctl.export import fmu
 
 KINDS = ("ModelExchange", "CoSimulation")
@@ -251,7 +251,7 @@ def test_what_an_fmu_cannot_say_is_refused_before_a_file_is_written(tmp_path, wh
     ],
 )
 def test_bad_arguments_are_refused_before_a_file_is_written(tmp_path, keywords, words):
-    with pytest.raises((ParameterError, nlctl.UnknownNameError)) as error:
+    with pytest.raises((ParameterError, UnknownNameError)) as error:
         fmu(linear()[0], tmp_path / "model.fmu", **keywords)
     assert words in str(error.value)
     assert not list(tmp_path.iterdir())
@@ -274,7 +274,7 @@ def test_jumps_without_end_are_an_error(written, capfd):
 @pytest.mark.parametrize("module", ["fmpy", "ziglang"])
 def test_without_the_extra_it_is_said_what_to_install(tmp_path, monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(nlctl.UsageError, match=r"nlctl\[export\]"):
+    with pytest.raises(UsageError, match=r"nlctl\[export\]"):
         fmu(linear()[0], tmp_path / "model.fmu")
     assert not list(tmp_path.iterdir())
 

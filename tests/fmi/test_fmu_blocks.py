@@ -13,7 +13,7 @@ from fmi_models import MODELS
 from places import ROOT
 
 import nlctl
-from nlctl.errors import ParameterError, UsageError
+from nlctl.errors import ParameterError, UnknownNameError, UsageError
 
 SOURCES = ROOT / "tests" / "fmi" / "reference_fmus"
 STEPS = {"Dahlquist": 0.1, "VanDerPol": 0.01, "BouncingBall": 0.01, "Stair": 0.2, "Resource": 1.0}
@@ -204,7 +204,7 @@ REFUSED = {
 def test_what_is_not_supported_is_refused_by_name(reference_fmu, tmp_path, what):
     change, keywords, words = REFUSED[what]
     path = edited(reference_fmu("BouncingBall", 3), tmp_path, change)
-    with pytest.raises((UsageError, ParameterError, nlctl.UnknownNameError)) as error:
+    with pytest.raises((UsageError, ParameterError, UnknownNameError)) as error:
         nlctl.FMU(path, **keywords)
     assert words in str(error.value)
 
