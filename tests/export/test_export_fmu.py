@@ -244,6 +244,7 @@ def test_what_an_fmu_cannot_say_is_refused_before_a_file_is_written(tmp_path, wh
     ("keywords", "words"),
     [
         ({"version": 1}, "version 2 or 3, got 1"),
+        ({"path": "nowhere/model.fmu"}, "in a folder that exists"),
         ({"name": "my-loop"}, "is not a name in C"),
         ({"stop_time": 0.0}, "stop_time > 0"),
         ({"platforms": ["amiga"]}, "unknown platform 'amiga'"),
@@ -252,7 +253,7 @@ def test_what_an_fmu_cannot_say_is_refused_before_a_file_is_written(tmp_path, wh
 )
 def test_bad_arguments_are_refused_before_a_file_is_written(tmp_path, keywords, words):
     with pytest.raises((ParameterError, UnknownNameError)) as error:
-        fmu(linear()[0], tmp_path / "model.fmu", **keywords)
+        fmu(linear()[0], **{"path": tmp_path / "model.fmu", **keywords})
     assert words in str(error.value)
     assert not list(tmp_path.iterdir())
 

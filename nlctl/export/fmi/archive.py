@@ -69,7 +69,8 @@ def fmu(
     tolerance : float, optional
         Of the integrator in Co-Simulation, unless an importer gives it another.
     platforms : sequence of str, optional
-        Of ``"linux"``, ``"windows"`` and ``"macos"``, which libraries are compiled for.
+        Of ``"linux"``, ``"windows"`` and ``"macos"``, which libraries are compiled for; without any the
+        FMU has its sources alone.
 
     Returns
     -------
@@ -82,7 +83,7 @@ def fmu(
         If an FMU cannot say it: functions that are called, a search for signals of an algebraic
         loop, transport delays, ideal relays, jitter of a clock, discrete time.
     ParameterError
-        If a number is out of its bounds, or a name is none in C.
+        If a number is out of its bounds, a name is none in C, or there is no such folder.
     UnknownNameError
         If a parameter, a state or a platform is unknown.
     UsageError
@@ -95,8 +96,12 @@ def fmu(
     >>> nlctl.export.fmu(loop, "loop.fmu", name="loop")  # doctest: +SKIP
     PosixPath('loop.fmu')
     """
-    if version not in _HEADERS:
+    path = Path(path)
+    if version not in _HEADERS or isinstance(version, bool):
         raise ParameterError(f"fmu needs version 2 or 3, got {version!r}")
+    if not path.parent.is_dir():
+        raise ParameterError(f"fmu needs a path in a folder that exists, got '{path}'")
+    version = int(version)
     chosen = list(dict.fromkeys([platforms] if isinstance(platforms, str) else platforms))
     for platform in chosen:
         if platform not in PLATFORMS:
@@ -115,7 +120,7 @@ def fmu(
     for file, library in libraries(text, model.name, version, chosen).items():
         content[f"binaries/{file}"] = library
     data = _zipped(content)
-    return replace_file(Path(path), lambda file: file.write(data))
+    return replace_file(path, lambda file: file.write(data))
 
 
 def _headers(version: int) -> dict[str, str]:
