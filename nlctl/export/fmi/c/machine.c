@@ -366,21 +366,24 @@ static int attempt(const Machine *s, Trial *r, double h)
   double before[N_MEMORY + 1];
   for (int i = 0; i < N_MEMORY; ++i) before[i] = s->x[model_memory[i]];
   for (int j = 1; j < STAGES; ++j) {
-    for (int i = 0; i < N_STATES; ++i) {
-      double sum = 0.0;
-      for (int l = 0; l < j; ++l) sum += model_a[j - 1][l] * r->k[l][i];
-      r->x[i] = model_continuous[i] ? s->x[i] + h * sum : s->x[i];
+    memcpy(r->x, s->x, N_STATES * sizeof(double));
+    for (int l = 0; l < j; ++l) {
+      double part = h * model_a[j - 1][l];
+      for (int i = 0; i < N_STATES; ++i) r->x[i] += part * r->k[l][i];
     }
+    for (int i = 0; N_STILL && i < N_STATES; ++i)
+      if (!model_continuous[i]) r->x[i] = s->x[i];
     model_rates(seen(s, s->t + model_nodes[j] * h), r->x, s->u, (double *)s->c, r->k[j], r->g, r->m);
     over |= beyond(s, r->g);
     if (j != STAGES - 2 && turns(s, before, r->m)) over |= TURNED;
   }
   r->error = 0.0;
+  double difference[N_STATES + 1] = {0.0};
+  for (int l = 0; l < STAGES; ++l)
+    for (int i = 0; i < N_STATES; ++i) difference[i] += model_error[l] * r->k[l][i];
   for (int i = 0; i < N_STATES; ++i) {
-    double sum = 0.0;
     if (!model_continuous[i]) continue;
-    for (int l = 0; l < STAGES; ++l) sum += model_error[l] * r->k[l][i];
-    sum = fabs(h * sum) / (s->tolerance * (1.0 + fmax(fabs(s->x[i]), fabs(r->x[i]))));
+    double sum = fabs(h * difference[i]) / (s->tolerance * (1.0 + fmax(fabs(s->x[i]), fabs(r->x[i]))));
     if (r->error < INFINITY && !(sum <= r->error)) r->error = isfinite(sum) ? sum : INFINITY;
   }
   return over;
