@@ -14,28 +14,34 @@ study, a ledger or a certificate whose record is of other equations, parameters 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import control as ct
 
 from nlctl.annotations import as_annotated
 from nlctl.diagrams import leaves
-from nlctl.errors import DiagramError
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.export.web import WebProgram
+from nlctl.responses.time_response import as_response
 from nlctl.wording import counted
 
 from .loop_record import difference_text, fact_differences, loop_facts
 from .lyapunov.ledger import Ledger
 from .lyapunov.proofs.result import Certificate
 from .pages.diagram import diagram_sections
+from .pages.live import live_item, live_numbers, live_program
 from .pages.proof import certificate_section, ledger_section, ledger_text
 from .pages.run import outputs_of_run, run_section
 from .pages.study.claims import claims as study_claims
+from .pages.study.histories import Histories
 from .pages.study.methods import limits as study_limits
 from .pages.study.methods import methods
 from .pages.study.redrawn import loop_again, rows_again
 from .pages.study.report import numbers, study_sections
-from .report.document import Claim, Paragraph, Report, Section, versions
+from .report.document import Claim, Figure, Live, Paragraph, Report, Section, versions
 from .response_of_loop import check_response, own_parameters
+from .robustness.stl.spec import Requirement
 from .studies.origin import diagram_differences
 from .studies.page.text import without_assumptions
 from .studies.result import Result
@@ -65,11 +71,19 @@ def loop_report(
     date: str = "",
     references: Sequence[str] = (),
     command: str = "",
+    live: bool | Sequence[str] = False,
+    requirements: Sequence[Requirement] = (),
+    repeat: Sequence[str] = (),
 ) -> Report:
     """Compose a report about a loop, from what was computed of it.
 
     Only spans of the response are simulated, to see that it is the loop's, and rows of a study
-    that are drawn.
+    that are drawn.  With `live` the page runs the loop itself, in the browser, see
+    `docs/how-to/live.md`: True for sliders of a sensible few, or the names of parameters
+    (``"plant.a"``, with a range ``"plant.a=0:3"``), initial states (``"plant.x1(0)"``), inputs and
+    faults (``"fault_actuator_v"``).  It shows which of the `requirements`, and of those of the
+    study, hold, and writes the run that is seen as words after `repeat`, such as ``["nlctl",
+    "simulate", "arm.py:make"]``.
 
     Examples
     --------
@@ -87,23 +101,26 @@ def loop_report(
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
     found = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = diagram_sections(loop, ("loop", "loop-equations"))
+    given = {}
     if response is not None:
         given = own_parameters(loop, response) if params is None else dict(params)
         check_response(loop, response, given)
         parts.append(run_section(loop, response, signals, given))
+    moved = _moved(loop, response, given, live)
     parts += sections
-    if ledger is not None:
-        _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
-        found.append(ledger_text(ledger))
-        parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
-    if certificate is not None:
-        _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
-        found.append(f"Certificate: {certificate.verdict}.")
-        parts.append(certificate_section(certificate))
+    _proved(loop, ledger, certificate, found, parts)
+    again = _Again(asked=requirements)
     if study is not None:
         _check_study(loop, study)
         found.append(without_assumptions(study.verdict))
-        parts += _studied(study)
+        again = _again(study, requirements)
+        parts += _studied(study, again)
+    if moved is not None:
+        item = live_item(
+            moved, response, () if isinstance(live, bool) else live, signals=signals,
+            requirements=again.asked, histories=again.kept, command=repeat, base=given,
+        )  # fmt: skip
+        parts = [_with_live(part, item) for part in parts]
     described, sources = ([], []) if study is None else methods(study)
     return Report(
         title=title,
@@ -113,7 +130,7 @@ def loop_report(
         sections=parts,
         command=command,
         provenance=versions(),
-        numbers=_numbers(response, study),
+        numbers=_numbers(response, study, moved),
         methods=described,
         limits=[ONE_RUN] if study is None else study_limits(study),
         references=list(dict.fromkeys([*references, *sources])),
@@ -123,22 +140,76 @@ def loop_report(
     )
 
 
-def _studied(result: Result) -> list[Section]:
-    """Return a study as the part behind everything else."""
+def _proved(
+    loop: ct.InputOutputSystem,
+    ledger: Ledger | None,
+    certificate: Certificate | None,
+    found: list[str],
+    parts: list[Section],
+) -> None:
+    """Add what was proved to what was found, and to the parts of the page."""
+    if ledger is not None:
+        _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
+        found.append(ledger_text(ledger))
+        parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
+    if certificate is not None:
+        _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
+        found.append(f"Certificate: {certificate.verdict}.")
+        parts.append(certificate_section(certificate))
+
+
+def _moved(
+    loop: ct.InputOutputSystem, response: Any, params: Mapping[str, Any], live: object
+) -> WebProgram | None:
+    """Return what runs on the page, if it is to run."""
+    if not live:
+        return None
+    if response is None:
+        raise ParameterError("a page that runs begins with a run: give response=")
+    return live_program(loop, as_response(response, loop), params)
+
+
+def _with_live(section: Section, item: Live) -> Section:
+    """Put what runs behind the figure of the run."""
+    if section.key != "run":
+        return section
+    items = [*section.items]
+    place = next(i for i, each in enumerate(items) if isinstance(each, Figure))
+    return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
+
+
+class _Again(NamedTuple):
+    """What is asked of a loop, some runs of its study, and what was lost of that."""
+
+    asked: Sequence[Requirement]
+    kept: Histories | None = None
+    lost: Sequence[str] = ()
+
+
+def _again(result: Result, requirements: Sequence[Requirement]) -> _Again:
+    """Return what a study asks, and some of its runs again."""
     lost: list[str] = []
-    kept = rows_again(result, loop_again(result, tell=lost.append))
-    intro = [result.study.study.question or result.study.study.title, *lost]
+    prepared = loop_again(result, tell=lost.append)
+    own = () if prepared is None else prepared.experiment.spec.requirements
+    return _Again((*requirements, *own), rows_again(result, prepared), lost)
+
+
+def _studied(result: Result, again: _Again) -> list[Section]:
+    """Return a study as the part behind everything else."""
+    intro = [result.study.study.question or result.study.study.title, *again.lost]
     heading = Section(
         key="study",
         title=f"The study: {result.study.study.title}",
         items=[Paragraph(text=words) for words in intro],
     )
-    return [heading, *study_sections(result, kept, prefix="study-", level=3, limits=False)]
+    return [heading, *study_sections(result, again.kept, prefix="study-", level=3, limits=False)]
 
 
-def _numbers(response: Any, study: Result | None) -> dict[str, Any]:
+def _numbers(response: Any, study: Result | None, moved: WebProgram | None) -> dict[str, Any]:
     """Return all numbers for ``report.json``."""
     told: dict[str, Any] = {} if study is None else {"study": numbers(study)}
+    if moved is not None:
+        told["live"] = live_numbers(moved)
     if response is not None:
         told["run"] = {
             name: {"least": y.min(), "largest": y.max(), "last": y[-1]}

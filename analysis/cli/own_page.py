@@ -12,8 +12,9 @@ from .simulation import simulated
 
 if TYPE_CHECKING:
     from ..report.document import Report
+    from ..robustness.stl.spec import Requirement
 
-__all__ = ["compose_page", "is_loop_name", "is_paper_name", "page_folder"]
+__all__ = ["compose_page", "is_loop_name", "is_paper_name", "live_words", "page_folder"]
 
 HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
@@ -37,9 +38,15 @@ def page_folder(name: str) -> Path:
 
 
 def compose_page(
-    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
-) -> Report:
+    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float,
+    live: bool | Sequence[str] = False, required: Sequence[str] = (),
+) -> Report:  # fmt: skip
     """Run a loop, check what can be checked of any, and compose its page."""
+    requirements = _requirements(required, until)
+    if live:
+        from nlctl.export.web import check_linker
+
+        check_linker()
     made = simulated(name, settings, inputs, until, step)
     from ..loop_checks import (
         LoopCheck,
@@ -67,16 +74,38 @@ def compose_page(
         params=made.params,
         ledger=proof if applies else None,
         sections=[checks_section(every)],
-        command=_command(name, settings, inputs, until, step),
+        command=_command("report", name, settings, inputs, until, step)
+        + live_words(live, required),
+        live=live,
+        requirements=requirements,
+        repeat=shlex.split(_command("simulate", name, settings, inputs, until, step)),
     )
     return replace(page, verdict=f"{page.verdict} {told(every)}", headline=headline(every))
 
 
+def _requirements(texts: Sequence[str], until: float) -> list[Requirement]:
+    """Return requirements from texts as study files have them."""
+    from ..robustness.stl.spec import Requirement
+    from ..robustness.stl.text import parse_formula
+
+    return [
+        Requirement(key=f"R{k}", formula=parse_formula(text), until=until)
+        for k, text in enumerate(texts, start=1)
+    ]
+
+
+def live_words(live: bool | Sequence[str], required: Sequence[str] = ()) -> str:
+    """Return the options of a page that runs."""
+    words = [] if isinstance(live, bool) else [w for name in live for w in ("--move", name)]
+    words = ["--live"] * (live is True) + words + [w for r in required for w in ("--require", r)]
+    return "".join(f" {shlex.quote(word)}" for word in words)
+
+
 def _command(
-    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
+    verb: str, name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
 ) -> str:
     """Return what makes the page again."""
-    words = ["nlctl", "report", name]
+    words = ["nlctl", verb, name]
     words += [part for text in settings for part in ("--set", text)]
     words += [part for text in inputs for part in ("--input", text)]
     words += ["--until", f"{until:g}"] * (until != HORIZON_OF_PAGE) + ["--step", f"{step:g}"] * (

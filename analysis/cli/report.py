@@ -102,6 +102,26 @@ def report(
     interactive: Annotated[
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
+    live: Annotated[
+        bool, typer.Option("--live", help="Let the page of a loop or study run it, with sliders.")
+    ] = False,
+    move: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--move",
+            metavar="NAME[=LOW:HIGH]",
+            help='What the sliders move: "plant.a", "plant.x1(0)", an input, the block of a '
+            "fault; a sensible few by default.",
+        ),
+    ] = None,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--require",
+            metavar="TEXT",
+            help='What the page watches: "always from 5 s on |e| <= 0.1", as in a study.',
+        ),
+    ] = None,
     revision: Annotated[
         str, typer.Option(help="Of what is reported; it stands on the page and in galleries.")
     ] = "",
@@ -119,18 +139,21 @@ def report(
     }  # fmt: skip
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
-        _check_loop_options(is_loop, set_, input_, until, step)
+        _check_loop_options(is_loop, set_, input_, until, step, require)
         check_junit(junit)
+        if (live or move) and (what is None or is_paper_name(str(what))):
+            raise _no_live()
         if what is None:
             made = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
         elif is_paper_name(str(what)):
             key = paper_key(str(what), "file, folder or paper")
             made = _paper(key, out or Path("reports", key), jobs, far=far, **options)
         elif is_loop:
-            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
+            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE,
+                   move or live, require or [])  # fmt: skip
             made = _loop(str(what), run, out, **options)
         else:
-            made = _study(what, out, jobs, trust=trust, **options)
+            made = _study(what, out, jobs, trust=trust, live=move or live, **options)
         from ..report.typography import plain_text
 
         say(plain_text(made.told))
@@ -151,14 +174,23 @@ class Made:
     code: int
 
 
+def _no_live() -> UsageError:
+    from nlctl.errors import UsageError
+
+    return UsageError(
+        "--live and --move are of a loop or a study; the paper's loops are 'nlctl report "
+        "nlctl.paper:example_1 --live' and example_2"
+    )
+
+
 def _check_loop_options(is_loop: bool, *options: object) -> None:
     """Refuse what is set of a loop where there is none."""
     from nlctl.errors import UsageError
 
     if not is_loop and any(option is not None for option in options):
         raise UsageError(
-            "--set, --input, --until and --step are of a loop, path/to/file.py:function; a study "
-            "has them in its file"
+            "--set, --input, --until, --step and --require are of a loop, "
+            "path/to/file.py:function; a study has them in its file"
         )
 
 
@@ -244,6 +276,7 @@ def _study(
     force: bool,
     trust: bool,
     stamp: Stamp,
+    live: bool | Sequence[str],
 ) -> Made:
     """Report a study."""
     from ..pages.study.claims import claims
@@ -266,6 +299,7 @@ def _study(
         force=force,
         trust=trust,
         stamp=stamp,
+        live=live,
     )
     code = EXIT_CODES.get(result.answer, 0)
     if not result.complete:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from .own_page import live_words
 from .printing import error_line
 from .studies import run_folder
 
@@ -43,6 +44,7 @@ def report_study(
     force: bool = False,
     trust: bool = False,
     stamp: Stamp = NO_STAMP,
+    live: bool | Sequence[str] = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study."""
     from ..pages.study.loop import loop_of
@@ -53,6 +55,10 @@ def report_study(
     from ..studies import load_result
     from ..studies.whole.page import recorded_page
 
+    if live:
+        from nlctl.export.web import check_linker
+
+        check_linker()
     result = (
         _run(path, threads, watch, force, trust)
         if path.suffix == ".toml"
@@ -62,7 +68,12 @@ def report_study(
     prepared = loop_again(result, trust=trust, tell=tell)
     loop = None if prepared is None else loop_of(prepared)
     published = PUBLISHED.get(result.study.loop)
-    made = study_report(result, rows_again(result, prepared, threads), command, loop, published)
+    kept = rows_again(result, prepared, threads)
+    made = study_report(result, kept, command + live_words(live), loop, published)
+    if live and prepared is not None:
+        from ..pages.study.live import with_study_live
+
+        made = with_study_live(made, result, prepared, kept, [] if live is True else live)
     made = stamped(made, stamp)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))

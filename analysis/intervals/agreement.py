@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from flint import arb
@@ -21,13 +21,42 @@ from nlctl.wording import counted
 from .arithmetic import Ball, as_ball, quiet
 from .normal_form import Sum
 from .numpy_functions import NumPyFunctions
-from .paths import Undecided, decided_so_far
+from .paths import Undecided, decided_so_far, every_way
 from .quotient import Slope
-from .time_dependence import UNREAD
 from .type_questions import type_question
 from .written import Written
 
-__all__ = ["agreeing", "on_balls", "one_number", "several_numbers"]
+
+class TimeRead(Exception):  # noqa: N818 (it ends an evaluation; nobody else sees it)
+    """The time was read."""
+
+
+def _refused(*_: Any, **__: Any) -> NoReturn:
+    raise TimeRead
+
+
+class _Unread:
+    """A time that nothing can be done with: arithmetic, comparison and conversion raise."""
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = _refused
+    __rtruediv__ = __pow__ = __rpow__ = __mod__ = __rmod__ = __floordiv__ = _refused
+    __rfloordiv__ = __neg__ = __pos__ = __abs__ = __float__ = __int__ = __bool__ = _refused
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __hash__ = _refused  # type: ignore[assignment]
+    __array_ufunc__ = __array__ = __iter__ = __len__ = __getitem__ = __index__ = _refused
+    __round__ = __trunc__ = __floor__ = __ceil__ = __divmod__ = __matmul__ = _refused
+
+
+UNREAD: Any = _Unread()
+
+
+def reads_time(function: Callable[[Any, Any], Any]) -> bool:
+    """Whether ``function(u, t)`` reads t for any u; what cannot be followed does."""
+    everywhere = Ball(arb(0, "inf"), (arb(1),))
+    try:
+        return any(result is UNREAD for result in every_way(lambda: function(everywhere, UNREAD)))
+    except Exception:  # TimeRead, or whatever a function raises that is not followed
+        return True
+
 
 _ALL, _EVERY = 400, 16  # calls that are all compared, and then every so many
 _AT_POINTS = 40  # calls that are compared with balls without width, too: wide ones hold a lot
@@ -65,10 +94,8 @@ def agreeing(function: Callable[..., Any], refusal: _Refusal) -> Callable[..., A
 def on_balls(
     function: Callable[..., Any], refusal: Callable[[str], UsageError]
 ) -> Callable[..., Any]:
-    """Return a function of a user's for balls: where it fails on them, `refusal` says so.
-
-    Wherever it does not fail it is also called with floats, see `agreeing`.
-    """
+    """Return a function of a user's for balls: where it fails on them, `refusal` says so."""
+    # Wherever it does not fail it is also called with floats, see `agreeing`.
     compared = agreeing(function, refusal)
 
     def called(*arguments: Any) -> Any:

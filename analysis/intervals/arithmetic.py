@@ -16,7 +16,7 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO, real_power
 from .paths import Undecided, decided
 
@@ -130,51 +130,29 @@ class Ball(NumPyFunctions):
     def __neg__(self) -> Ball:
         return Ball(-self.value, tuple(-g for g in self.gradient))
 
-    def __pos__(self) -> Ball:
-        return self
-
+    @of_lifted
     def __add__(self, other: Any) -> Any:
-        other = as_ball(other)
-        if other is NotImplemented:
-            return other
         result = self._joined(self.value + other.value, 1, other, 1)
         return result.known_not_negative(self.not_negative and other.not_negative)
 
-    __radd__ = __add__
-
+    @of_lifted
     def __sub__(self, other: Any) -> Any:
         if other is self and self.value.is_finite():
             return Ball(arb(0))  # one quantity, not two in the same range
-        other = as_ball(other)
-        if other is NotImplemented:
-            return other
         return self._joined(self.value - other.value, 1, other, -1)
 
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
-
+    @of_lifted
     def __mul__(self, other: Any) -> Any:
         if other is self:
             return self**2
-        other = as_ball(other)
-        if other is NotImplemented:
-            return other
         result = self._joined(self.value * other.value, other.value, other, self.value)
         return result.known_not_negative(self.not_negative and other.not_negative)
 
-    __rmul__ = __mul__
-
+    @of_lifted
     def __truediv__(self, other: Any) -> Any:
-        other = as_ball(other)
-        if other is NotImplemented:
-            return other
         value = self.value / other.value
         result = self._joined(value, 1 / other.value, other, -value / other.value)
         return result.known_not_negative(self.not_negative and other.not_negative)
-
-    def __rtruediv__(self, other: object) -> Any:
-        other = as_ball(other)
-        return other if other is NotImplemented else other / self
 
     def __pow__(self, n: Any) -> Any:
         if isinstance(n, Ball):
@@ -375,15 +353,17 @@ class Ball(NumPyFunctions):
     def __ne__(self, other: object) -> bool:
         return self._compare(other, frozenset({-1, 1}), "ne")
 
-    def __bool__(self) -> bool:
-        return self != 0
-
 
 def common(a: arb, b: arb) -> arb:
     """Return what two enclosures of one set have in common; what is not finite encloses all."""
     if a.is_finite() and b.is_finite():
         return a.intersection(b)
     return a if a.is_finite() else b
+
+
+def of_unknown_slope(value: arb, like: Ball) -> Ball:
+    """Return a factor whose own derivatives are not known, of as many as another ball has."""
+    return Ball(value, () if value.is_exact() else (_ANY,) * len(like.gradient))
 
 
 def power(x: arb, n: int) -> arb:

@@ -14,8 +14,6 @@ from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.wording import counted
 
-__all__ = ["Box", "Cell", "visited_box"]
-
 Cell = tuple[tuple[float, float], ...]
 
 

@@ -403,10 +403,8 @@ def _interval(a: float, b: float) -> arb:
 
 
 def _bounds(function: _Function, cell: Cell) -> tuple[arb, arb, tuple[arb, ...] | None]:
-    """Return the range on a cell, the value at its centre, and the gradient's range.
-
-    The gradient is None where the function, having branches there, need not be continuous.
-    """
+    """Return the range on a cell, the value at its centre, and the gradient's range."""
+    # The gradient is None where the function, having branches there, need not be continuous.
     wide = [_interval(a, b) for a, b in cell]
     middle, signs = _centre(cell), [a >= 0 for a, _ in cell]
     points = [arb(m) if np.isfinite(m) else w for m, w in zip(middle, wide, strict=True)]

@@ -27,8 +27,6 @@ from .machine import Readable
 from .paths import Undecided
 from .rates import Rate, as_rate
 
-__all__ = ["prove_decrease"]
-
 STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9
 _SAME = 1e-9  # relative: between a gradient that is given and the derivatives of V
 _FACE = 20_000  # boxes on a face of the box

@@ -23,21 +23,12 @@ from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
 from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
-from nlctl.native.enclosures.unrounded import UnroundedGraph
+from nlctl.native.enclosures.scalars import UnroundedGraph
 from nlctl.upstream.numba_internals import is_jit_disabled
 
 from .arithmetic import Ball, as_ball
 from .box import Box
 from .paths import Undecided
-
-__all__ = [
-    "CodedClaim",
-    "Readable",
-    "code_for",
-    "decided_by_code",
-    "only_balls",
-    "supremum_by_code",
-]  # fmt: skip
 
 TOO_FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls

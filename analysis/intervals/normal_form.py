@@ -18,10 +18,8 @@ from flint import arb, fmpq
 from nlctl.expressions.functions import FUNCTIONS
 
 from .arithmetic import Ball, as_ball
-from .numpy_functions import NumPyFunctions
+from .numpy_functions import NumPyFunctions, of_lifted
 from .paths import Undecided
-
-__all__ = ["Atom", "Sum", "exact", "indeterminate"]
 
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
 EVERYWHERE = ("sin", "cos", "tanh", "exp", "arctan", "arcsinh", "absolute", "minimum", "maximum",
@@ -81,14 +79,6 @@ def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
 class Sum(NumPyFunctions):
     """A sum of products of atoms, as equations compute with it.
 
-    Attributes
-    ----------
-    terms : dict
-        Rational coefficient of every product, a set of pairs (atom, power); none is 0.
-    partial : frozenset of Atom
-        Atoms without a value somewhere, or with a jump, which took part even if they have
-        cancelled: the sum is what the equation is only where they have a value.
-
     Examples
     --------
     A difference that is 0 whatever x is:
@@ -107,7 +97,10 @@ class Sum(NumPyFunctions):
     def __init__(
         self, terms: Mapping[Product, Fraction], partial: frozenset[Atom] = frozenset()
     ) -> None:
+        # rational coefficient of every product, a set of pairs (atom, power); none is 0
         self.terms = {product: c for product, c in terms.items() if c}
+        # atoms without a value somewhere, or with a jump, which took part even if they have
+        # cancelled: the sum is what the equation is only where they have a value
         self.partial = partial
 
     def __repr__(self) -> str:
@@ -144,51 +137,31 @@ class Sum(NumPyFunctions):
     def __neg__(self) -> Sum:
         return Sum({product: -c for product, c in self.terms.items()}, self.partial)
 
-    def __pos__(self) -> Sum:
-        return self
-
+    @of_lifted
     def __add__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         terms = dict(self.terms)
         for product, c in other.terms.items():
             terms[product] = terms.get(product, Fraction(0)) + c
         return Sum(terms, self.partial | other.partial)
 
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Any:
-        other = as_sum(other)
-        return other if other is NotImplemented else self + -other
-
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
-
+    @of_lifted
     def __mul__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         terms: dict[Product, Fraction] = {}
         for one, c in self.terms.items():
             for two, d in other.terms.items():
-                product = _times(one, two)
+                powers = dict(one)
+                for atom, n in two:
+                    powers[atom] = powers.get(atom, 0) + n
+                product = frozenset(powers.items())
                 terms[product] = terms.get(product, Fraction(0)) + c * d
         return Sum(terms, self.partial | other.partial)
 
-    __rmul__ = __mul__
-
+    @of_lifted
     def __truediv__(self, other: Any) -> Any:
-        other = as_sum(other)
-        if other is NotImplemented:
-            return other
         constant = other.coefficient(_ONE)
         if other.key() == {(_ONE, constant)} and not other.partial:
             return self * (1 / constant)
         return self * other._function("inverse")
-
-    def __rtruediv__(self, other: object) -> Any:
-        return as_sum(other) / self
 
     def __pow__(self, n: Any) -> Sum:
         if isinstance(n, NumPyFunctions) or n != int(n):
@@ -236,13 +209,6 @@ class Sum(NumPyFunctions):
         undefined = frozenset([] if name in EVERYWHERE else [atom])
         partial = undefined.union(self.partial, *(argument.partial for argument in others))
         return Sum({frozenset([(atom, 1)]): Fraction(1)}, partial)
-
-
-def _times(one: Product, two: Product) -> Product:
-    powers = dict(one)
-    for atom, n in two:
-        powers[atom] = powers.get(atom, 0) + n
-    return frozenset(powers.items())
 
 
 def exact(number: Any) -> Fraction:

@@ -21,8 +21,6 @@ from nlctl.expressions.functions import FUNCTIONS
 
 from .pairs import FUNCTIONS_OF_TWO
 
-__all__ = ["NumPyFunctions", "checked_table"]
-
 _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row.count == 1}
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 
@@ -43,11 +41,49 @@ def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
     return method
 
 
+def of_lifted(operator: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """Return an operator that sees its second operand as one of the kind of the first."""
+
+    @functools.wraps(operator)
+    def method(self: Any, other: object) -> Any:
+        lifted = self.lifted(other)
+        return lifted if lifted is NotImplemented else operator(self, lifted)
+
+    return method
+
+
 class NumPyFunctions:
-    """What balls, difference quotients and sums share: what NumPy looks for."""
+    """What balls, difference quotients and sums share: operators, and what NumPy looks for."""
 
     __slots__ = ()
     __hash__ = None  # type: ignore[assignment]  # equality may be undecided
+
+    def lifted(self, number: Any) -> Any:
+        """Return a number as one of this kind; NotImplemented for what is not a number."""
+        raise NotImplementedError
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __radd__(self, other: Any) -> Any:
+        return self + other
+
+    @of_lifted
+    def __sub__(self, other: Any) -> Any:
+        return self + -other
+
+    def __rsub__(self, other: Any) -> Any:
+        return -self + other
+
+    def __rmul__(self, other: Any) -> Any:
+        return self * other
+
+    @of_lifted
+    def __rtruediv__(self, other: Any) -> Any:
+        return other / self
+
+    def __bool__(self) -> bool:
+        return self != 0
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         return getattr(_of_objects(ufunc), method)(*map(_objects, inputs), **kwargs)
@@ -84,10 +120,10 @@ class NumPyFunctions:
     def __rmod__(self, other: object) -> Any:
         if isinstance(other, str):
             return NotImplemented
-        return _lifted(self, other).pair("remainder", self)
+        return self.lifted(other).pair("remainder", self)
 
     def __rpow__(self, other: object) -> Any:
-        return _lifted(self, other) ** self
+        return self.lifted(other) ** self
 
     def __round__(self, digits: int | None = None) -> Any:
         if digits:
@@ -110,11 +146,6 @@ for _name in FUNCTIONS_OF_TWO:
     setattr(NumPyFunctions, _name, _function_of_two(_name))
 
 
-def _lifted(self: Any, number: Any) -> Any:
-    """Return a number as one of the kind of self."""
-    return self.lifted(number)
-
-
 def _pairwise(name: str, a: Any, b: Any) -> Any:
     """Ask the operand that knows both: a ball knows numbers, a difference quotient balls, too."""
     kinds = [getattr(type(x), "rank", -1) for x in (a, b)]
@@ -123,7 +154,7 @@ def _pairwise(name: str, a: Any, b: Any) -> Any:
     if name in ("minimum", "maximum"):
         first, second = (a, b) if kinds[0] >= kinds[1] else (b, a)
         return getattr(first, name)(second)
-    return (a if kinds[0] == max(kinds) else _lifted(b, a)).pair(name, b)
+    return (a if kinds[0] == max(kinds) else b.lifted(a)).pair(name, b)
 
 
 def _single(name: str, function: Any, x: Any) -> Any:

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterable
 
 from flint import arb
 
-__all__ = ["FUNCTIONS_OF_TWO", "hull", "real_power"]
-
 Enclosed = tuple[arb, arb, arb]
 _ANY, _ZERO, _ONE = arb(0, "inf"), arb(0), arb(1)
 _UNIT = arb(0, 1)
@@ -57,36 +55,23 @@ def _arctan2(y: arb, x: arb) -> Enclosed:
 
 
 def _remainder(x: arb, y: arb) -> Enclosed:
-    quotient = x / y
-    if quotient.is_finite():
-        whole = _only(quotient, arb.floor)
-        if whole is not None:
-            return x - y * whole, _ONE, -whole
-    if not y.is_finite() or y.contains(0):
-        return arb.nan(), _ANY, _ANY
-    return arb(0).union(y), _ANY, _ANY
+    return _rest(x, y, arb.floor, [_ZERO, y])
 
 
 def _fmod(x: arb, y: arb) -> Enclosed:
+    return _rest(x, y, lambda q: q.floor() if q >= 0 else q.ceil(), [-abs(y), abs(y)])
+
+
+def _rest(x: arb, y: arb, rounded: Callable[[arb], arb], ends: list[arb]) -> Enclosed:
+    """Return what division by y leaves of x; between `ends` where several quotients are met."""
     quotient = x / y
     if quotient.is_finite():
-        whole = _only(quotient, _truncated)
-        if whole is not None:
-            return x - y * whole, _ONE, -whole
+        low, high = rounded(quotient.lower()), rounded(quotient.upper())
+        if low.is_exact() and high.is_exact() and low == high:
+            return x - y * low, _ONE, -low
     if not y.is_finite() or y.contains(0):
         return arb.nan(), _ANY, _ANY
-    size = abs(y)
-    return hull([-size, size]), _ANY, _ANY
-
-
-def _only(x: arb, rounded: Callable[[arb], arb]) -> arb | None:
-    """Return the integer that all of an interval is rounded to; None if there are several."""
-    low, high = rounded(x.lower()), rounded(x.upper())
-    return low if low.is_exact() and high.is_exact() and low == high else None
-
-
-def _truncated(x: arb) -> arb:
-    return x.floor() if x >= 0 else x.ceil()
+    return hull(ends), _ANY, _ANY
 
 
 def _copysign(x: arb, y: arb) -> Enclosed:

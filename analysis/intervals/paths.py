@@ -10,8 +10,6 @@ from typing import Any
 
 from flint import arb
 
-__all__ = ["Decisions", "Undecided", "decided", "decided_so_far", "every_way", "take", "undecided"]
-
 BRANCHES = 64  # paths through an equation on one box, beyond which the box is split first
 
 

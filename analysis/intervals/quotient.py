@@ -13,12 +13,10 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .arithmetic import Ball, as_ball, common
-from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .arithmetic import Ball, as_ball, common, of_unknown_slope
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO
 from .paths import Undecided
-
-__all__ = ["Slope", "slope_in"]
 
 
 class Slope(NumPyFunctions):
@@ -40,27 +38,12 @@ class Slope(NumPyFunctions):
     def __neg__(self) -> Slope:
         return Slope(-self.here, -self.base, -self.quotient)
 
-    def __pos__(self) -> Slope:
-        return self
-
+    @of_lifted
     def __add__(self, other: Any) -> Any:
-        other = _as_slope(other)
-        if other is NotImplemented:
-            return other
         return Slope(self.here + other.here, self.base + other.base, self.quotient + other.quotient)
 
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Any:
-        return self + -other
-
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
-
+    @of_lifted
     def __mul__(self, other: Any) -> Any:
-        other = _as_slope(other)
-        if other is NotImplemented:
-            return other
         if other.is_constant:  # not 0 times v, which is nothing where v is unbounded
             quotient = other.base * self.quotient
         elif self.is_constant:
@@ -72,26 +55,18 @@ class Slope(NumPyFunctions):
             )
         return Slope(self.here * other.here, self.base * other.base, quotient)
 
-    __rmul__ = __mul__
-
+    @of_lifted
     def __truediv__(self, other: Any) -> Any:
-        other = _as_slope(other)
-        if other is NotImplemented:
-            return other
         base = self.base / other.base
         quotient = (self.quotient - base * other.quotient) / other.here
         return Slope(self.here / other.here, base, quotient)
-
-    def __rtruediv__(self, other: object) -> Any:
-        other = _as_slope(other)
-        return other if other is NotImplemented else other / self
 
     def __pow__(self, n: Any) -> Any:
         if isinstance(n, NumPyFunctions) or n != int(n):
             return self.pair("power", n)
         if n < 0:
             return 1 / self**-n
-        result = _as_slope(1)
+        result = self.lifted(1)
         for _ in range(int(n)):
             result = result * self
         return result
@@ -108,11 +83,9 @@ class Slope(NumPyFunctions):
         return self if self >= other else other
 
     def pair(self, name: str, other: Any) -> Any:
-        """Return phi of this and another quantity for the NumPy function of that name.
-
-        By the mean value theorem: the derivatives are those between v and 0.
-        """
-        other = _as_slope(other)
+        """Return phi of this and another quantity for the NumPy function of that name."""
+        # By the mean value theorem: the derivatives are those between v and 0.
+        other = self.lifted(other)
         if other is NotImplemented:
             return other
         here, base = self.here.pair(name, other.here), self.base.pair(name, other.base)
@@ -121,19 +94,22 @@ class Slope(NumPyFunctions):
         quotient = Ball(arb(0))
         for one, slope in ((self, by_self), (other, by_other)):
             if not one.is_constant:
-                quotient = quotient + one.quotient * _unknown_slope(slope, one.quotient)
+                quotient = quotient + one.quotient * of_unknown_slope(slope, one.quotient)
         return Slope(here, base, quotient)
 
     def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Slope:
         """Return the linear interpolation of a table."""
         here, base = self.here.table(xp, fp), self.base.table(xp, fp)
         _, slope = enclosed_table(self.here.value.union(self.base.value), xp, fp)
-        return Slope(here, base, self.quotient * _unknown_slope(slope, self.quotient))
+        return Slope(here, base, self.quotient * of_unknown_slope(slope, self.quotient))
 
     @staticmethod
     def lifted(number: Any) -> Any:
         """Return a number as a quantity that does not depend on v."""
-        return _as_slope(number)
+        if isinstance(number, Slope):
+            return number
+        ball = as_ball(number)
+        return ball if ball is NotImplemented else Slope(ball, ball, Ball(arb(0)))
 
     def apply(self, name: str) -> Slope:
         """Return phi of the quantity for the NumPy function of that name."""
@@ -150,12 +126,12 @@ class Slope(NumPyFunctions):
             raise Undecided("v and 0 lie on different branches of the equation")
         return at_v
 
+    @of_lifted
     def __lt__(self, other: Any) -> bool:
-        other = _as_slope(other)
         return self._agree(self.here < other.here, self.base < other.base)
 
+    @of_lifted
     def __le__(self, other: Any) -> bool:
-        other = _as_slope(other)
         return self._agree(self.here <= other.here, self.base <= other.base)
 
     def __gt__(self, other: object) -> bool:
@@ -170,24 +146,12 @@ class Slope(NumPyFunctions):
     def __ne__(self, other: object) -> bool:
         return not self == other
 
-    def __bool__(self) -> bool:
-        return self != 0
-
-
-def _as_slope(x: Any) -> Any:
-    if isinstance(x, Slope):
-        return x
-    ball = as_ball(x)
-    return ball if ball is NotImplemented else Slope(ball, ball, Ball(arb(0)))
-
 
 def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:
-    """Return (phi(a) - phi(b)) / (a - b), with the limit phi'(a) where a = b.
-
-    It is the mean of phi' between a and b, so it lies in phi'(hull) and its derivatives with
-    respect to a and b lie in phi''(hull) / 2.  Where a - b has no zero the quotient itself is
-    an enclosure as well.
-    """
+    """Return (phi(a) - phi(b)) / (a - b), with the limit phi'(a) where a = b."""
+    # It is the mean of phi' between a and b, so it lies in phi'(hull) and its derivatives with
+    # respect to a and b lie in phi''(hull) / 2. Where a - b has no zero the quotient itself is an
+    # enclosure as well.
     if name in JUMPS or name == "sinc":
         return _secant_of_jump(name, a, b, at_a, at_b)
     mean = as_ball(FUNCTIONS[name].derivative[0](Ball(a.value.union(b.value), (arb(1),))))
@@ -213,14 +177,7 @@ def _secant_of_jump(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball
     mean, distance = over.gradient[0], a - b
     if not distance.value.contains(0):
         mean = common(mean, ((at_a - at_b) / distance).value)
-    return _unknown_slope(mean, distance)
-
-
-def _unknown_slope(value: arb, like: Ball) -> Ball:
-    """Return a factor whose own derivatives are not known."""
-    if value.is_exact():
-        return Ball(value)
-    return Ball(value, (arb(0, "inf"),) * len(like.gradient))
+    return of_unknown_slope(mean, distance)
 
 
 def slope_in(function: Any, v: Any) -> Ball:

@@ -13,21 +13,14 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .arithmetic import Ball, as_ball
-from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table
+from .arithmetic import Ball, as_ball, of_unknown_slope
+from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO
 from .paths import undecided
 
-__all__ = ["Rate"]
-
 
 class Rate(NumPyFunctions):
-    """A quantity and its rate.
-
-    Attributes
-    ----------
-    here, rate : Ball
-    """
+    """A quantity and its rate."""
 
     __slots__ = ("here", "rate")
     rank = 1
@@ -39,42 +32,20 @@ class Rate(NumPyFunctions):
     def __neg__(self) -> Rate:
         return Rate(-self.here, -self.rate)
 
-    def __pos__(self) -> Rate:
-        return self
-
+    @of_lifted
     def __add__(self, other: Any) -> Any:
-        other = as_rate(other)
-        if other is NotImplemented:
-            return other
         return Rate(self.here + other.here, self.rate + other.rate)
 
-    __radd__ = __add__
-
-    def __sub__(self, other: object) -> Any:
-        return self + -as_rate(other)
-
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
-
+    @of_lifted
     def __mul__(self, other: Any) -> Any:
         if other is self:
             return self**2
-        other = as_rate(other)
-        if other is NotImplemented:
-            return other
         return Rate(self.here * other.here, self.here * other.rate + other.here * self.rate)
 
-    __rmul__ = __mul__
-
+    @of_lifted
     def __truediv__(self, other: Any) -> Any:
-        other = as_rate(other)
-        if other is NotImplemented:
-            return other
         value = self.here / other.here
         return Rate(value, (self.rate - value * other.rate) / other.here)
-
-    def __rtruediv__(self, other: object) -> Any:
-        return as_rate(other) / self
 
     def __pow__(self, n: Any) -> Any:
         if isinstance(n, NumPyFunctions) or n != int(n):
@@ -112,7 +83,7 @@ class Rate(NumPyFunctions):
         here = self.here.apply(name)
         if name in JUMPS or name == "sinc":
             slope = Ball(self.here.value, (arb(1),)).apply(name).gradient[0]
-            return Rate(here, _unknown(slope, self.here) * self.rate)
+            return Rate(here, of_unknown_slope(slope, self.here) * self.rate)
         return Rate(here, as_ball(FUNCTIONS[name].derivative[0](self.here)) * self.rate)
 
     def pair(self, name: str, other: Any) -> Any:
@@ -124,13 +95,13 @@ class Rate(NumPyFunctions):
         rate = Ball(arb(0))
         for one, slope in ((self, by_self), (other, by_other)):
             if not one.rate.value.is_zero():
-                rate = rate + _unknown(slope, one.here) * one.rate
+                rate = rate + of_unknown_slope(slope, one.here) * one.rate
         return Rate(self.here.pair(name, other.here), rate)
 
     def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Rate:
         """Return the linear interpolation of a table."""
         _, slope = enclosed_table(self.here.value, xp, fp)
-        return Rate(self.here.table(xp, fp), _unknown(slope, self.here) * self.rate)
+        return Rate(self.here.table(xp, fp), of_unknown_slope(slope, self.here) * self.rate)
 
     @staticmethod
     def lifted(number: Any) -> Any:
@@ -162,16 +133,6 @@ class Rate(NumPyFunctions):
 
     def __ne__(self, other: object) -> bool:
         return self._decided("__ne__", other)
-
-    def __bool__(self) -> bool:
-        return self != 0
-
-
-def _unknown(value: arb, like: Ball) -> Ball:
-    """Return a factor whose own derivatives are not known."""
-    if value.is_exact():
-        return Ball(value)
-    return Ball(value, (arb(0, "inf"),) * len(like.gradient))
 
 
 def as_rate(x: Any) -> Any:

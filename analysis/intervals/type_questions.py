@@ -23,8 +23,6 @@ import scipy
 
 from nlctl import wording
 
-__all__ = ["is_of_library", "type_question"]
-
 _BUILTINS = ("isinstance", "issubclass", "type", "hasattr", "getattr", "setattr", "delattr",
              "vars", "dir", "callable", "repr", "str", "format", "ascii", "bytes", "memoryview",
              "hash", "id", "print", "eval", "exec", "compile", "globals", "locals", "open",

@@ -16,8 +16,6 @@ from .normal_form import exact
 from .numpy_functions import NumPyFunctions
 from .paths import Undecided
 
-__all__ = ["OPERATIONS", "Written", "operations"]
-
 OPERATIONS = (
     "exp",
     "sin",
@@ -41,20 +39,13 @@ _MOST = 64  # power
 
 
 class Written(NumPyFunctions):
-    """A quantity of an equation, as its place in a list of operations.
-
-    Attributes
-    ----------
-    nodes : list
-        Operations, each a name with numbers, symbols, or places before it.
-    place : int
-    """
+    """A quantity of an equation, as its place in a list of operations."""
 
     __slots__ = ("nodes", "place")
     rank = 2
 
     def __init__(self, nodes: list[list[Any]], place: int) -> None:
-        self.nodes = nodes
+        self.nodes = nodes  # operations, each a name with numbers, symbols, or places before it
         self.place = place
 
     def _node(self, *node: Any) -> Written:
@@ -64,7 +55,7 @@ class Written(NumPyFunctions):
             self.nodes.append(list(node))
         return Written(self.nodes, place)
 
-    def lifted(self, number: Any) -> Any:  # type: ignore[override]
+    def lifted(self, number: Any) -> Any:
         """Return a number as an entry of the same list; NotImplemented for what is none."""
         if isinstance(number, Written):
             return number
@@ -82,32 +73,14 @@ class Written(NumPyFunctions):
     def __neg__(self) -> Written:
         return self * -1.0
 
-    def __pos__(self) -> Written:
-        return self
-
     def __add__(self, other: object) -> Any:
         return self._with("+", other)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: Any) -> Any:
-        other = self.lifted(other)
-        return other if other is NotImplemented else self + -other
-
-    def __rsub__(self, other: object) -> Any:
-        return -self + other
 
     def __mul__(self, other: object) -> Any:
         return self._with("*", other)
 
-    __rmul__ = __mul__
-
     def __truediv__(self, other: object) -> Any:
         return self._with("/", other)
-
-    def __rtruediv__(self, other: object) -> Any:
-        other = self.lifted(other)
-        return other if other is NotImplemented else other / self
 
     def __pow__(self, n: Any) -> Any:
         if isinstance(n, NumPyFunctions) or n != int(n) or abs(n) > _MOST:

@@ -37,8 +37,6 @@ from .loop.roles import Parts
 from .loop.simulation import MemberRun
 from .premises import Premises, premises
 
-__all__ = ["FARTHEST", "Closure", "StateReach", "closed_set", "closure", "least_bound"]
-
 FARTHEST = 1_000.0  # of |x_i|: boxes that are larger are not tried
 STATEMENT = "|r| <= C_0 keeps x in a box that C_0 holds on"
 NOT_CLOSED = (
@@ -69,23 +67,14 @@ class StateReach:
 
 @dataclass(frozen=True, kw_only=True)
 class Closure:
-    """What is known of boxes that close.
-
-    Attributes
-    ----------
-    status : {"closes", "none closes", "undecided"}
-    box : tuple of float
-        Bounds of \\|x1\\|, ..., \\|xn\\|: of the box that closes; otherwise of the largest
-        box found that is a part of every one that does.
-    C_0 : float
-        The bound on that box; where none closes, less than it.
-    room : float
-        Least distance between the box and what its C_0 lets x reach; negative if none closes.
-    """
+    """What is known of boxes that close."""
 
     status: Literal["closes", "none closes", "undecided"]
+    # bounds of \\|x1\\|, ..., \\|xn\\|: of the box that closes; otherwise of the largest box found
+    # that is a part of every one that does
     box: tuple[float, ...]
-    C_0: float
+    C_0: float  # the bound on that box; where none closes, less than it
+    # least distance between the box and what its C_0 lets x reach; negative if none closes
     room: float
 
 

@@ -18,8 +18,6 @@ from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
 from .premises import Premises, premises
 
-__all__ = ["conclusions", "slow_drift_of"]
-
 SAFE = "zeta cannot cross its lobe before T"
 _WINDOW = 4 * np.pi  # s; period of the paper's reference
 _LEMMA = (

@@ -25,25 +25,15 @@ from .premises import Premises, premises
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Conservatism", "DirectBound", "Share", "comparison", "conservatism"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Share:
-    """One term of C_0^2 / 2.
-
-    Attributes
-    ----------
-    term, formula : str
-    value : float
-    share : float
-        Of C_0^2 / 2.
-    """
+    """One term of C_0^2 / 2."""
 
     term: str
     formula: str
     value: float
-    share: float
+    share: float  # of C_0^2 / 2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,24 +18,14 @@ from nlctl.plants import coordinate_names
 from nlctl.wording import counted
 
 from ..intervals.arithmetic import as_ball
-from ..intervals.box import Box, visited_box
+from ..intervals.box import Box
 from ..intervals.branch_and_bound import Proof, Range, enclose, prove, upper
 from .bounds.decomposition import Decomposition, decompose
 from .bounds.final_bound import KAPPA, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import Sector, plant_terms, sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
 from .loop.roles import Parts, read_parts
-from .proofs.result import Constant, Provenance, per_second
-
-__all__ = [
-    "Constants",
-    "bound",
-    "constants",
-    "constants_of",
-    "disturbance",
-    "kappa",
-    "visited_box",
-]
+from .proofs.result import Constant, Provenance, Row, constants_of_rows, per_second, rows_of_split
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -275,12 +265,10 @@ def constants_of(
     eps = approximation_error(parts.plant, parts.basis, W, states, tol=tol)
     G_max = as_ball(bounds.G_max)
     delta = upper(total_error(G_max, split.eps_star, d.magnitude, eps.magnitude))
-    entries = (
-        *_sector_entries(bounds, over_v, parts.order),
-        *_split_entries(split),
-        *_error_entries(d, eps, states, times, parts.order),
-        *_final_entries(parts, W, origin, delta),
-    )
+    entries = constants_of_rows([
+        *_sector_rows(bounds, over_v, parts.order), *rows_of_split(split),
+        *_error_rows(d, eps, states, times, parts.order), *_final_rows(parts, W, origin, delta),
+    ])  # fmt: skip
     return Constants(entries=entries, parts=parts, box=over_v, sector=bounds, split=split, W=W)
 
 
@@ -306,62 +294,29 @@ def _outcome(bound: float) -> Provenance:
     return "proved" if np.isfinite(bound) else "undecided"
 
 
-def _sector_entries(bounds: Sector, box: Box, n: int) -> list[Constant]:
+def _sector_rows(bounds: Sector, box: Box, n: int) -> Iterator[Row]:
     how = f"F/v, {counted(bounds.boxes, 'box', 'boxes')}"
     notes = {"m1": "v >= 0", "m2": "v >= 0", "m3": "v < 0, upper", "m4": "v < 0, lower"}
-    return [
-        Constant(
-            symbol=symbol,
-            value=getattr(bounds, symbol),
-            unit=per_second(n),
-            provenance=_outcome(getattr(bounds, symbol)),
-            how=f"{notes[symbol]}: {how}" if symbol in notes else how,
-            over=str(box),
-        )
-        for symbol in ("m1", "m2", "m3", "m4", "G_min", "G_max")
-        if not np.isnan(getattr(bounds, symbol))  # a box without v < 0 has no m3, m4
-    ]
+    for symbol in ("m1", "m2", "m3", "m4", "G_min", "G_max"):
+        value = getattr(bounds, symbol)
+        if not np.isnan(value):  # a box without v < 0 has no m3, m4
+            note = f"{notes[symbol]}: {how}" if symbol in notes else how
+            yield symbol, value, per_second(n), _outcome(value), note, str(box)
 
 
-def _split_entries(split: Decomposition) -> list[Constant]:
-    values = {"k_1": split.k_1, "k_2": split.k_2, "eps_u*": split.eps_star}
-    return [
-        Constant(
-            symbol=symbol,
-            value=value,
-            unit="1",
-            provenance=split.provenance,
-            how=split.how,
-            over=split.over,
-        )
-        for symbol, value in values.items()
-    ]
-
-
-def _error_entries(
+def _error_rows(
     d: Range, eps: Range, box: Box, times: tuple[float, float], n: int
-) -> list[Constant]:
+) -> Iterator[Row]:
     at = f"{box}, t in [{times[0]:g}, {times[1]:g}] s"
-    rows = (
-        ("d*", d, "sup |d(x, t)|", at),
-        ("eps*", eps, "sup |g - W^T psi|", str(box)),
-    )
-    return [
-        Constant(
-            symbol=symbol,
-            value=supremum.magnitude,
-            unit=per_second(n),
-            provenance=_outcome(supremum.magnitude),
-            how=f"{how}, {counted(supremum.boxes, 'box', 'boxes')}",
-            over=over,
-        )
-        for symbol, supremum, how, over in rows
-    ]
+    rows = (("d*", d, "sup |d(x, t)|", at), ("eps*", eps, "sup |g - W^T psi|", str(box)))
+    for symbol, supremum, what, over in rows:
+        value, how = supremum.magnitude, f"{what}, {counted(supremum.boxes, 'box', 'boxes')}"
+        yield symbol, value, per_second(n), _outcome(value), how, over
 
 
-def _final_entries(
+def _final_rows(
     parts: Parts, W: np.ndarray, origin: tuple[Provenance, str], delta: float
-) -> list[Constant]:
+) -> list[Row]:
     """(20), (29), (31), (21), (36), rounded up."""
     gains, n = parts.gains, parts.order
     error = W - np.array(gains.W_hat_0)
@@ -369,7 +324,7 @@ def _final_entries(
     a_0 = upper(alpha_0(gains, as_ball(delta), squares[0]))
     V_0, a_1 = upper(initial_V(gains, as_ball(delta), squares[1])), alpha_1(gains)
     rates = "min{2 beta, sigma_1 Gamma, sigma_2 gamma}" if gains.W_hat_0 else "no network"
-    rows: list[tuple[str, float, str, Provenance, str, str]] = [
+    return [
         ("|W|", float(np.linalg.norm(W)), per_second(n), *origin, "a fixed W"),
         ("kappa", KAPPA, "1", "proved", "(29), branch and bound and a tail estimate", "all s"),
         ("delta*", delta, per_second(n), "computed", "G_max eps_u* + d* + eps*", "the box"),
@@ -377,8 +332,4 @@ def _final_entries(
         ("alpha_0", a_0, per_second(2 * n - 1), "computed", "(31)", "the box"),
         ("V(0)", V_0, per_second(2 * n - 2), "computed", "(21)", "this initial state"),
         ("C_0", bound(a_0, a_1, V_0, 0.0), per_second(n - 1), "computed", "(36), Q = 0", "the box"),
-    ]
-    return [
-        Constant(symbol=symbol, value=value, unit=unit, provenance=origin, how=how, over=over)
-        for symbol, value, unit, origin, how, over in rows
     ]

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-
-__all__ = ["ConeLimit", "at_least", "at_most", "minimizer", "symmetric_basis", "upper_triangle"]
 
 _SOLVED = ("Solved", "AlmostSolved")
 
@@ -27,27 +24,20 @@ class ConeLimit:
 
 
 def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
-    """Return A x <= b, row by row.
-
-    Shapes: `A` (k, n), `b` (k,).
-    """
-    return ConeLimit(A, b, partial(_nonnegative, len(b)))
+    """Return A x <= b, row by row; shapes: `A` (k, n), `b` (k,)."""
+    return ConeLimit(A, b, lambda clarabel: clarabel.NonnegativeConeT(len(b)))
 
 
 def at_least(parts: Sequence[np.ndarray], low: np.ndarray) -> ConeLimit:
-    """Return sum x_i M_i >= low, of symmetric matrices.
-
-    Shapes: `parts` n of (m, m), `low` (m, m).
-    """
+    """Return sum x_i M_i >= low, of symmetric matrices."""
+    # Shapes: `parts` n of (m, m), `low` (m, m).
     A = np.column_stack([-upper_triangle(part) for part in parts])
-    return ConeLimit(A, -upper_triangle(low), partial(_semidefinite, len(low)))
+    return ConeLimit(A, -upper_triangle(low), lambda clarabel: clarabel.PSDTriangleConeT(len(low)))
 
 
 def upper_triangle(M: np.ndarray) -> np.ndarray:
-    """Return a symmetric matrix as a vector with its norm: columns, and sqrt(2) off the diagonal.
-
-    Shapes: `M` (m, m), result (m (m + 1)/2,).
-    """
+    """Return a symmetric matrix as a vector with its norm: columns, sqrt(2) off the diagonal."""
+    # Shapes: `M` (m, m), result (m (m + 1)/2,).
     column, row = np.tril_indices(len(M))
     return np.where(row == column, 1.0, np.sqrt(2.0)) * M[row, column]
 
@@ -65,10 +55,8 @@ def symmetric_basis(m: int) -> list[np.ndarray]:
 def minimizer(
     P: np.ndarray, q: np.ndarray, limits: Sequence[ConeLimit]
 ) -> tuple[np.ndarray | None, str]:
-    """Return the x of the smallest x^T P x / 2 + q^T x, None where none is found, and the status.
-
-    Shapes: `P` (n, n), not negative, `q` and x (n,).
-    """
+    """Return the x of the smallest x^T P x / 2 + q^T x, None without one, and the status."""
+    # Shapes: `P` (n, n), not negative, `q` and x (n,).
     import clarabel as untyped
     from scipy import sparse
 
@@ -82,11 +70,3 @@ def minimizer(
     solution = clarabel.DefaultSolver(upper, q, A, b, cones, settings).solve()
     status = str(solution.status)
     return (np.array(solution.x) if status in _SOLVED else None), status
-
-
-def _nonnegative(size: int, clarabel: Any) -> Any:
-    return clarabel.NonnegativeConeT(size)
-
-
-def _semidefinite(size: int, clarabel: Any) -> Any:
-    return clarabel.PSDTriangleConeT(size)

@@ -28,8 +28,6 @@ from .loop.simulation import (
     observed_loop,
 )
 
-__all__ = ["U_MAX", "Examination", "_Runs", "compile_examination_ahead", "examine"]
-
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
 

@@ -20,57 +20,37 @@ from .bounds.final_bound import KAPPA
 from .loop.signals import INTEGRATED, Margin, Signals, equality, inequality
 from .premises import Premises
 
-__all__ = ["Terms", "inequalities", "terms"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Terms:
-    """The terms that the inequalities are made of, each of shape (m,).
+    """The terms that the inequalities are made of, each of shape (m,)."""
 
-    Attributes
-    ----------
-    r, r_rate : ndarray
-        r, and its derivative along the diagram.
-    V, V_rate : ndarray
-        (21), and its derivative along the diagram.
-    g, W_psi, Y_d : ndarray
-        g(x), W^T psi for the chosen W, and Y_d.
-    kGu, rest : ndarray
-        k G u, and G eps_u + d.
-    kGN : ndarray
-        k G N(zeta).
-    zeta_rate : ndarray
-    smooth : ndarray
-        r tanh(r / tau).
-    adaptation_W, adaptation_delta : ndarray
-        W~^T Gamma^-1 W_hat' and delta~ delta_hat' / gamma.
-    W_W_hat, delta_delta_hat : ndarray
-        W~^T W_hat and delta~ delta_hat.
-    W_error, delta_error : ndarray
-        |W~|^2 and delta~.
-    W_network : ndarray
-        W~^T psi.
-    """
-
+    # r, and its derivative along the diagram
     r: np.ndarray
     r_rate: np.ndarray
+    # (21), and its derivative along the diagram
     V: np.ndarray
     V_rate: np.ndarray
+    # g(x), W^T psi for the chosen W, and Y_d
     g: np.ndarray
     W_psi: np.ndarray
     Y_d: np.ndarray
+    # k G u, and G eps_u + d
     kGu: np.ndarray
     rest: np.ndarray
-    kGN: np.ndarray
+    kGN: np.ndarray  # k G N(zeta)
     zeta_rate: np.ndarray
-    smooth: np.ndarray
+    smooth: np.ndarray  # r tanh(r / tau)
+    # W~^T Gamma^-1 W_hat' and delta~ delta_hat' / gamma
     adaptation_W: np.ndarray
     adaptation_delta: np.ndarray
+    # W~^T W_hat and delta~ delta_hat
     W_W_hat: np.ndarray
     delta_delta_hat: np.ndarray
+    # |W~|^2 and delta~
     W_error: np.ndarray
     delta_error: np.ndarray
-    W_network: np.ndarray
+    W_network: np.ndarray  # W~^T psi
 
     @property
     def size(self) -> float:

@@ -32,10 +32,8 @@ from .premises import premises
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Ledger", "Line", "ledger"]
-
+# what `examine` takes by name
 _SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
-"""What `examine` takes by name."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,8 +21,6 @@ from .bounds.final_bound import Gains, alpha_0, alpha_1, total_error
 from .constants import Constants, bound
 from .loop.integral import sharpest
 
-__all__ = ["Premises", "forcing_bound", "literal", "premises"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Premises:
@@ -186,10 +184,8 @@ def literal(given: Premises, constants: Constants, plant: Any = None) -> Premise
 
 
 def forcing_bound(plant: ForcedDuffing) -> float:
-    """Return a proved bound of |q cos(w t)| for all time.
-
-    No network of x alone comes closer to a g with q cos(w t) in it: at one x such a g takes values
-    that are that far from their middle.
-    """
+    """Return a proved bound of |q cos(w t)| for all time."""
+    # No network of x alone comes closer to a g with q cos(w t) in it: at one x such a g takes
+    # values that are that far from their middle.
     p = equation_arguments(plant)
     return enclose(lambda z: duffing_forcing(z[0], p), Box.of(t=(0.0, np.inf))).magnitude

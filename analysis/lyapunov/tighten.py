@@ -36,8 +36,6 @@ from .loop.simulation import SAMPLING_INTERVAL
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Tightened", "TrialBound", "tighten"]
-
 _BOUNDS = ("C_0", "ultimate")
 _TOLERANCE = 1e-2  # of the branch and bounds in the search
 OVER = 10.0  # weight of log(|u| / limit) in the cost
@@ -45,22 +43,13 @@ OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 @dataclass(frozen=True, kw_only=True)
 class TrialBound:
-    """One set of gains that the search tried.
+    """One set of gains that the search tried."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name.
-    C_0, ultimate : float
-        Bounds of the proof with the tightest W on the set that the run visits, eps* on a grid.
-    u : float
-        max |u| along the run; infinite if it diverged.
-    """
-
-    gains: dict[str, float]
+    gains: dict[str, float]  # values by qualified name
+    # bounds of the proof with the tightest W on the set that the run visits, eps* on a grid
     C_0: float
     ultimate: float
-    u: float
+    u: float  # max |u| along the run; infinite if it diverged
 
 
 @dataclass(frozen=True, kw_only=True)

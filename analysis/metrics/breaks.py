@@ -10,8 +10,6 @@ import numpy as np
 
 from nlctl.upstream.systems import SystemResponse
 
-__all__ = ["breaks_of", "with_breaks"]
-
 
 def breaks_of(response: SystemResponse) -> np.ndarray | None:
     """Return the times of the events of a response, in order and each once.

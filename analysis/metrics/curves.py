@@ -27,8 +27,6 @@ from nlctl.equations import equation
 
 from .integrals import consecutive_differences
 
-__all__ = ["limits_at_breaks", "path", "turning_points"]
-
 _HALF = 4  # neighbours on each side that a curve goes through
 _GUARD = 4.0
 _CLEAR = 64.0
@@ -42,10 +40,8 @@ _ENDS = 17  # points from the last sample to a break
 
 @equation
 def _pieces(t, breaks):
-    """Return the pieces between breaks: first and last + 1 of their samples, start and end (s).
-
-    Samples at a break belong to no piece: they are values of their own, of one side or the other.
-    """
+    """Return the pieces between breaks: first and last + 1 of their samples, start and end (s)."""
+    # Samples at a break belong to no piece: they are values of their own, of one side or the other.
     span = t[-1] - t[0]
     near = max(1e-9 * span / t.size, 4 * _APART * span)
     inside = breaks[(breaks >= t[0] - near) & (breaks <= t[-1] + near)]
@@ -117,10 +113,8 @@ def _at(s, c, x):
 
 @equation
 def _turn(t, y, first, last, k, low, high):
-    """Return place and value of the extreme next to the sample `k`, in [low, high], and if it is.
-
-    The sample is the largest or the smallest of its neighbours in the piece [first, last).
-    """
+    """Return place and value of the extreme next to sample `k`, in [low, high], and if it is."""
+    # The sample is the largest or the smallest of its neighbours in the piece [first, last).
     a, b = _window(first, last, k)
     s, x = t[a:b] - t[k], 0.0
     c = _coefficients(s, y[a:b] - y[k])
@@ -151,10 +145,8 @@ def _limits(y):
 
 @equation
 def turning_points(t, y, breaks):
-    """Return extremes between samples: before which sample each is, when, and its value.
-
-    Shapes: `t, y` (n,), `breaks` (m,).
-    """
+    """Return extremes between samples: before which sample each is, when, and its value."""
+    # Shapes: `t, y` (n,), `breaks` (m,).
     place, value = np.empty(y.size), np.empty(y.size)
     before = np.zeros(y.size, np.int64)
     count = 0
@@ -180,11 +172,9 @@ def turning_points(t, y, breaks):
 
 @equation
 def _extrapolated(t, y, at):
-    """Return a limit at `at`, outside of all samples, by the order that they support.
-
-    Of Newton's form, from the nearest sample on, the sum up to its least term.  Beyond all samples
-    it counts less that term, times its ratio to the one before: what the next would be.
-    """
+    """Return a limit at `at`, outside of all samples, by the order that they support."""
+    # Of Newton's form, from the nearest sample on, the sum up to its least term. Beyond all samples
+    # it counts less that term, times its ratio to the one before: what the next would be.
     n = min(_NEAREST, t.size)
     if at < t[0]:
         s, values = t[:n] - at, y[:n].copy()
@@ -209,10 +199,8 @@ def _extrapolated(t, y, at):
 
 @equation
 def limits_at_breaks(t, y, breaks):
-    """Return the limits at breaks from both sides: when, and the values.
-
-    Arguments as in `turning_points`.
-    """
+    """Return the limits at breaks from both sides: when, and the values."""
+    # Arguments as in `turning_points`.
     firsts, lasts, starts, ends = _pieces(t, breaks)
     place, value = np.empty(2 * starts.size), np.empty(2 * starts.size)
     (bottom, top), count = _limits(y), 0
@@ -259,11 +247,9 @@ def _between(t, y, first, last, k, parts):
 
 @equation
 def path(t, y, breaks, apart=0.0):
-    """Return a signal as points that lines connect: curves between breaks, and jumps at them.
-
-    Where samples show that a piece is smooth, lines are within 2.5e-7 of the signal's range of its
-    curve, where 32 parts of an interval are enough for that.
-    """
+    """Return a signal as points that lines connect: curves between breaks, and jumps at them."""
+    # Where samples show that a piece is smooth, lines are within 2.5e-7 of the signal's range of
+    # its curve, where 32 parts of an interval are enough for that.
     apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
     tolerance = _LINE * (np.max(y) - np.min(y))
     firsts, lasts, starts, ends = _pieces(t, breaks)

@@ -11,15 +11,7 @@ import numpy as np
 from .curves import limits_at_breaks, turning_points
 from .samples import of_samples
 
-__all__ = [
-    "final",
-    "highest",
-    "lowest",
-    "peak",
-    "spread",
-    "ultimate_bound",
-    "vertex",
-]
+__all__ = ["final", "highest", "lowest", "peak", "spread", "ultimate_bound", "vertex"]
 
 
 @of_samples

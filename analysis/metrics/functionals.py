@@ -11,8 +11,6 @@ from nlctl.native.machine.machine_code import kept
 
 from . import extremes, integrals, travel
 
-__all__ = ["in_machine_code"]
-
 OWN = [getattr(home, name) for home in (extremes, integrals, travel) for name in home.__all__]
 
 

@@ -11,8 +11,6 @@ from numba.extending import overload
 from nlctl.annotations import reporting
 from nlctl.equations import equation
 
-__all__ = ["of_samples"]
-
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 

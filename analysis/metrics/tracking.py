@@ -14,8 +14,6 @@ from nlctl.errors import ParameterError
 
 from . import extremes, integrals, travel
 
-__all__ = ["Metric", "over", "tracking_metrics"]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True)

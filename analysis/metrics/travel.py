@@ -12,12 +12,7 @@ from .curves import path
 from .integrals import consecutive_differences
 from .samples import of_samples
 
-__all__ = [
-    "reversals",
-    "settling_time",
-    "time_within",
-    "total_variation",
-]
+__all__ = ["reversals", "settling_time", "time_within", "total_variation"]
 
 
 @of_samples

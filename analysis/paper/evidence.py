@@ -16,7 +16,6 @@ from nlctl import native, paper
 from nlctl.native import compile as compiled
 from nlctl.response import input_output_response
 
-from ..lyapunov.assumptions import assumptions
 from ..lyapunov.certificate.certify import certify
 from ..lyapunov.certificate.known_sign import KnownSignCertificate
 from ..lyapunov.conservatism import Conservatism, conservatism
@@ -24,6 +23,7 @@ from ..lyapunov.examination import compile_examination_ahead as examine_ahead
 from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
 from ..lyapunov.ledger import Ledger, ledger
+from ..lyapunov.lines import assumptions
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.energy import signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run

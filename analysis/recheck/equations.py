@@ -36,10 +36,8 @@ class WrittenEquation:
         self.nodes = nodes
 
     def slopes(self, box: _Box, start: _Box, names: Sequence[str]) -> _Slopes:
-        """Return f(x), f(x_0), and s with f(x) = f(x_0) + s (x - x_0), x in `box`, x_0 in `start`.
-
-        Coordinates without a name among `names` have the same value in x and x_0.
-        """
+        """Return f(x), f(x_0), s with f(x) = f(x_0) + s (x - x_0), x in `box`, x_0 in `start`."""
+        # Coordinates without a name among `names` have the same value in x and x_0.
         values: list[_Slopes] = []
         for operation, *given in self.nodes:
             if operation == "number":

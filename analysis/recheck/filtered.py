@@ -44,7 +44,8 @@ class Filtered:
                 continue
             slowest = Fraction(0)
             for _, w, _ in sines:
-                slowest = _common_divisor(slowest, w)
+                low = math.gcd(slowest.numerator * w.denominator, w.numerator * slowest.denominator)
+                slowest = Fraction(low, slowest.denominator * w.denominator)
             need(slowest > 0, f"|yd^({k})| <= {float(most):.6g}")
             period = (PI_ENCLOSED * TWO / Interval.of(slowest)).top
             box = {"t": Interval.of(0, period)}
@@ -54,11 +55,9 @@ class Filtered:
         return bounds
 
     def _errors(self) -> tuple[list[Fraction], Fraction]:
-        """Return bounds of |e_1|, ..., |e_n| while |r| < C, and of |r(0)|.
-
-        r is what a chain of filters makes of e_1:
-        z_0 = e_1, z_i = z_(i-1)' + p_i z_(i-1), and the last one is r.
-        """
+        """Return bounds of |e_1|, ..., |e_n| while |r| < C, and of |r(0)|."""
+        # r is what a chain of filters makes of e_1: z_0 = e_1, z_i = z_(i-1)' + p_i z_(i-1), and
+        # the last one is r.
         poles = self._poles()[::-1]
         starts = [self.e0]  # of z_i and its derivatives
         for p in poles:
@@ -137,11 +136,6 @@ def _horner(coefficients: Sequence[Fraction], s: Fraction) -> Fraction:
     for c in coefficients:
         total = total * s + c
     return total
-
-
-def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
-    low = math.gcd(a.numerator * b.denominator, b.numerator * a.denominator)
-    return Fraction(low, a.denominator * b.denominator)
 
 
 def _derivative(sines: Iterable[tuple[Fraction, Fraction, Fraction]], k: int) -> WrittenEquation:

@@ -29,6 +29,7 @@ __all__ = [
     "Headline",
     "History",
     "Item",
+    "Live",
     "Paragraph",
     "Report",
     "Section",
@@ -185,7 +186,31 @@ class History:
                 raise unknown("signal", name, self.signals)
 
 
-Item = Paragraph | Equation | Table | Figure | History
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Live:
+    """A loop that the page runs itself, in WebAssembly, with sliders.
+
+    Where no script runs it shows nothing: figures next to it show the run as reported.
+
+    Attributes
+    ----------
+    key, caption, description : str
+        As those of a `Figure`.
+    program : mapping
+        What ``live.js`` needs, see `nlctl.analysis.pages.live`.
+
+    Examples
+    --------
+    See `nlctl.analysis.loop_report`.
+    """
+
+    key: str
+    caption: str
+    description: str
+    program: Mapping[str, Any]
+
+
+Item = Paragraph | Equation | Table | Figure | History | Live
 
 
 @as_annotated

@@ -14,7 +14,7 @@ import numpy as np
 
 from nlctl.wording import counted, some_of
 
-from .document import Claim, Figure, Headline, History, Item, Report, Section, Table
+from .document import Claim, Figure, Headline, History, Item, Live, Report, Section, Table
 
 __all__ = [
     "Placed",
@@ -106,7 +106,9 @@ def place_anchors(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            wanted = item.key if isinstance(item, Figure | History) else f"{heading}-{kind(item)}"
+            wanted = (
+                item.key if isinstance(item, Figure | History | Live) else f"{heading}-{kind(item)}"
+            )
             anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)
@@ -126,7 +128,7 @@ def kind(item: Item) -> str:
 
 
 def _has_anchor(item: Item) -> bool:
-    return isinstance(item, Table | Figure | History)
+    return isinstance(item, Table | Figure | History | Live)
 
 
 def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:

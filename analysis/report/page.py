@@ -36,31 +36,37 @@ UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
 
-def fill(template: str, *, interactive: bool = False, **content: object) -> str:
+def fill(template: str, *, interactive: bool = False, live: bool = False, **content: object) -> str:
     """Return a template filled in, with the page's style and script, and the policy for them.
 
-    An interactive page has uPlot (MIT licence) in them, and what draws its charts.
+    An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one what
+    runs its loops, and may make code of WebAssembly.
     """
     style, script = font_face() + _own("templates/report.css"), _own("templates/report.js")
     if interactive:
         style += _own(f"{UPLOT}/uPlot.min.css") + "\n" + _own("templates/history.css")
         licence = f"\n/*\n{_own(f'{UPLOT}/LICENSE')}\n*/\n"
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
+    if live:
+        style += _own("templates/live.css")
+        parts = (_own(f"templates/{name}.js") for name in ("live_engine", "live"))
+        script += "\n{\n" + "\n".join(parts) + "}\n"  # with names of their own
     page = _environment().get_template(template)
     text = page.render(
         style=Markup(style),
         script=Markup(script),
-        policy=_policy(style, script),
+        policy=_policy(style, script, live=live),
         generator=generator(template),
         **content,
     )
     return text.translate(CONTROL)
 
 
-def _policy(style: str, script: str) -> str:
+def _policy(style: str, script: str, *, live: bool = False) -> str:
     """Return the content policy: this style, this script, pictures and fonts in the page."""
+    code = " 'wasm-unsafe-eval'" * live  # of WebAssembly alone: nothing else is made code of
     return (
-        f"default-src 'none'; style-src '{_digest(style)}'; script-src '{_digest(script)}'; "
+        f"default-src 'none'; style-src '{_digest(style)}'; script-src '{_digest(script)}'{code}; "
         "img-src data:; font-src data:; base-uri 'none'; form-action 'none'"
     )
 

@@ -22,7 +22,7 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
 from ..json_values import as_json
-from .document import Figure, History, Item, Report, Table
+from .document import Figure, History, Item, Live, Report, Table
 from .history import SIGNALS_FILE, chart, signals_json
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
@@ -32,7 +32,7 @@ from .typography import plain_text
 __all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
 
 RARE = ("ids", "links")
-DRAWN = ("figure", "time", "signals")  # curves are on the page only
+DRAWN = ("figure", "time", "signals", "program")  # curves are on the page only
 _TITLES = {
     "methods": "How it was found",
     "limits": "Limits of validity",
@@ -82,15 +82,13 @@ def render_html(
         anchor: svg(figure, file, anchor, shapes)
         for (anchor, figure), file in zip(figures.items(), files, strict=True)
     }
-    charts = {
-        anchor: chart(item)
-        for anchor, item in items.items()
-        if interactive and isinstance(item, History)
-    }
+    shown = items.items() if interactive else ()
+    charts = {anchor: chart(item) for anchor, item in shown if isinstance(item, History)}
     own = _own_files(report)
     return fill(
         "report.html",
         interactive=bool(charts),
+        live=any(isinstance(item, Live) for item in items.values()),
         charts=charts,
         report=report,
         byline=_byline(report),

@@ -13,9 +13,8 @@ from .friction import BoucWen, Coulomb, Dahl, LuGre, StickSlip, Stribeck
 from .generalised_plays import GeneralisedPrandtlIshlinskii
 from .inverses import BacklashInverse, DeadZoneInverse, PrandtlIshlinskiiInverse
 from .prandtl_ishlinskii import OneSidedDeadZones, PrandtlIshlinskii, Stop
-from .quantiser import Quantiser
 from .relay import Preisach, Relay, relay_grid
-from .static import AsymmetricSaturation, DeadZone, Gain, Saturation
+from .static import AsymmetricSaturation, DeadZone, Gain, Quantiser, Saturation
 
 __all__ = [
     "AsymmetricSaturation",

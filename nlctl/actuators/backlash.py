@@ -10,18 +10,14 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import as_numbers, param, record
-from .memories import RELAXATION
-
-__all__ = ["Backlash"]
+from .memories import relaxation
 
 
 @equation
 def play_band(u, p):
-    """Return the lower and upper output that the gap admits at input u.
-
-    The lines are m_r (u - c_r), taken when u rises, and m_l (u - c_l), taken when it falls.  With
-    unequal slopes they cross; sorting them keeps the operator defined and continuous there.
-    """
+    """Return the lower and upper output that the gap admits at input u."""
+    # The lines are m_r (u - c_r), taken when u rises, and m_l (u - c_l), taken when it falls. With
+    # unequal slopes they cross; sorting them keeps the operator defined and continuous there.
     rising, falling = p.m_r * (u - p.c_r), p.m_l * (u - p.c_l)
     return np.minimum(rising, falling), np.maximum(rising, falling)
 
@@ -106,14 +102,6 @@ class Backlash:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the play."""
-        (memory,) = x
-        (u1,) = u
-        return (RELAXATION * (play(u1, memory, p) - memory),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The memory clipped into the gap."""
         (memory,) = x
@@ -121,6 +109,8 @@ class Backlash:
         return (play(u1, memory, p),)
 
     commit = output  # the memory v(t-) becomes the output
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

@@ -11,8 +11,6 @@ from ..annotations import as_annotated
 from ..diagrams import as_system, interconnect
 from ..errors import DiagramError
 
-__all__ = ["cascade"]
-
 
 @as_annotated
 def cascade(stages: Mapping[str, Any], *, name: str = "actuator") -> ct.InterconnectedSystem:

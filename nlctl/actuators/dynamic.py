@@ -6,14 +6,36 @@ from ..arguments import number
 from ..equations import equation
 from ..functions import clip
 from ..params import param, record
-
-__all__ = ["Lag", "RateLimiter", "SecondOrderLag"]
+from .memories import output_of_state
 
 LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, t) u + eps_u of u"
 
 
 @record
-class RateLimiter:
+class _Follower:
+    """What actuators share whose output is their first state."""
+
+    v0: float = 0.0
+
+    inputs = ("u",)
+    outputs = ("v",)
+    states = ("v",)
+    feedthrough = False
+    no_split = LAGS_BEHIND
+    output = staticmethod(output_of_state)
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The output starts from v0, and at rest."""
+        return {"v": float(self.v0)}
+
+    def check(self) -> None:
+        """The output starts somewhere."""
+        number(type(self).__name__, "v0", self.v0)
+
+
+@record
+class RateLimiter(_Follower):
     """Rate limiter: an output that follows u no faster than it may.
 
         v' = min(max(K (u - v), fall), rise)
@@ -44,22 +66,6 @@ class RateLimiter:
     rise: float = param(1.0, unit="1/s", meaning="greatest v'", above=0)
     fall: float = param(-1.0, unit="1/s", meaning="least v'", below=0)
     K: float = param(100.0, unit="1/s", meaning="gain that follows u within the limits", above=0)
-    v0: float = 0.0
-
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ("v",)
-    feedthrough = False
-    no_split = LAGS_BEHIND
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The output starts from v0."""
-        return {"v": float(self.v0)}
-
-    def check(self) -> None:
-        """The output starts somewhere."""
-        number("RateLimiter", "v0", self.v0)
 
     @staticmethod
     @equation
@@ -70,13 +76,6 @@ class RateLimiter:
 
     @staticmethod
     @equation
-    def output(t, x, u, p):
-        """The state."""
-        (v,) = x
-        return (v,)
-
-    @staticmethod
-    @equation
     def switching(t, x, u, p):
         """Where the limits begin and end to count."""
         (v,) = x
@@ -84,7 +83,7 @@ class RateLimiter:
 
 
 @record
-class Lag:
+class Lag(_Follower):
     """First-order lag.
 
         v' = (k u - v) / T
@@ -109,22 +108,6 @@ class Lag:
 
     k: float = param(1.0, unit="1", meaning="gain")
     T: float = param(0.05, unit="s", meaning="time constant", above=0)
-    v0: float = 0.0
-
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ("v",)
-    feedthrough = False
-    no_split = LAGS_BEHIND
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The output starts from v0."""
-        return {"v": float(self.v0)}
-
-    def check(self) -> None:
-        """The output starts somewhere."""
-        number("Lag", "v0", self.v0)
 
     @staticmethod
     @equation
@@ -133,16 +116,9 @@ class Lag:
         (v,) = x
         return ((p.k * u[0] - v) / p.T,)
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The state."""
-        (v,) = x
-        return (v,)
-
 
 @record
-class SecondOrderLag:
+class SecondOrderLag(_Follower):
     """Second-order lag.
 
         v'' = omega^2 (k u - v) - 2 zeta omega v'
@@ -170,22 +146,8 @@ class SecondOrderLag:
     k: float = param(1.0, unit="1", meaning="gain")
     omega: float = param(20.0, unit="rad/s", meaning="natural frequency", above=0)
     zeta: float = param(0.7, unit="1", meaning="damping ratio", at_least=0)
-    v0: float = 0.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("v", "v1")
-    feedthrough = False
-    no_split = LAGS_BEHIND
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The output starts from v0, at rest."""
-        return {"v": float(self.v0)}
-
-    def check(self) -> None:
-        """The output starts somewhere."""
-        number("SecondOrderLag", "v0", self.v0)
 
     @staticmethod
     @equation
@@ -193,10 +155,3 @@ class SecondOrderLag:
         """The output's rate, and the oscillator."""
         v, v1 = x
         return v1, p.omega * (p.omega * (p.k * u[0] - v) - 2 * p.zeta * v1)
-
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The first state."""
-        v, _ = x
-        return (v,)

@@ -8,9 +8,7 @@ from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import RELAXATION
-
-__all__ = ["BoucWen", "Coulomb", "Dahl", "LuGre", "StickSlip", "Stribeck"]
+from .memories import output_of_state, relaxation
 
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
@@ -35,8 +33,22 @@ def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
         )
 
 
+class _ForceLaw:
+    """What force laws of a velocity share."""
+
+    inputs = ("velocity",)
+    outputs = ("force",)
+    no_split = FORCE_LAW
+
+    @staticmethod
+    @equation
+    def switching(t, x, u, p):
+        """Where the velocity changes its sign."""
+        return (u[0],)
+
+
 @record
-class Coulomb:
+class Coulomb(_ForceLaw):
     """Coulomb and viscous friction.
 
         force = F_c sign(velocity) + sigma_2 velocity
@@ -55,11 +67,8 @@ class Coulomb:
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    inputs = ("velocity",)
-    outputs = ("force",)
     states = ()
     feedthrough = True
-    no_split = FORCE_LAW
 
     @staticmethod
     @equation
@@ -68,15 +77,9 @@ class Coulomb:
         (velocity,) = u
         return (p.F_c * np.sign(velocity) + p.sigma_2 * velocity,)
 
-    @staticmethod
-    @equation
-    def switching(t, x, u, p):
-        """Where the velocity changes its sign."""
-        return (u[0],)
-
 
 @record
-class Stribeck:
+class Stribeck(_ForceLaw):
     """Friction that falls from rest to motion (Stribeck effect).
 
         force = g(velocity) sign(velocity) + sigma_2 velocity
@@ -99,11 +102,8 @@ class Stribeck:
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    inputs = ("velocity",)
-    outputs = ("force",)
     states = ()
     feedthrough = True
-    no_split = FORCE_LAW
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
@@ -115,12 +115,6 @@ class Stribeck:
         """The force law."""
         (velocity,) = u
         return (stribeck_level(velocity, p) * np.sign(velocity) + p.sigma_2 * velocity,)
-
-    @staticmethod
-    @equation
-    def switching(t, x, u, p):
-        """Where the velocity changes its sign."""
-        return (u[0],)
 
 
 @equation
@@ -189,13 +183,6 @@ class StickSlip:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the mode."""
-        (mode,) = x
-        return (RELAXATION * (stick_mode(u[0], u[1], mode, p) - mode),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The force that holds, or slips."""
         (mode,) = x
@@ -211,6 +198,8 @@ class StickSlip:
         (mode,) = x
         return (stick_mode(u[0], u[1], mode, p),)
 
+    update = relaxation(commit)
+
     @staticmethod
     @equation
     def switching(t, x, u, p):
@@ -221,7 +210,7 @@ class StickSlip:
 
 
 @record
-class Dahl:
+class Dahl(_ForceLaw):
     """Dahl's model of friction before sliding.
 
         force' = sigma_0 (velocity - |velocity| force / F_c)
@@ -244,11 +233,9 @@ class Dahl:
     sigma_0: float = param(1e5, unit="N/m", meaning="stiffness before sliding", above=0)
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
 
-    inputs = ("velocity",)
-    outputs = ("force",)
     states = ("force",)
     feedthrough = False
-    no_split = FORCE_LAW
+    output = staticmethod(output_of_state)
 
     @staticmethod
     @equation
@@ -258,22 +245,9 @@ class Dahl:
         (velocity,) = u
         return (p.sigma_0 * (velocity - np.abs(velocity) * force / p.F_c),)
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The state."""
-        (force,) = x
-        return (force,)
-
-    @staticmethod
-    @equation
-    def switching(t, x, u, p):
-        """Where the velocity changes its sign."""
-        return (u[0],)
-
 
 @record
-class LuGre:
+class LuGre(_ForceLaw):
     """LuGre model of friction: bristles that bend, and slip.
 
         z'    = velocity - sigma_0 |velocity| z / g(velocity)
@@ -305,11 +279,8 @@ class LuGre:
     F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
 
-    inputs = ("velocity",)
-    outputs = ("force",)
     states = ("z",)
     feedthrough = True
-    no_split = FORCE_LAW
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
@@ -332,15 +303,9 @@ class LuGre:
         damping = p.sigma_1 * bristle_rate(z, velocity, p)
         return (p.sigma_0 * z + damping + p.sigma_2 * velocity,)
 
-    @staticmethod
-    @equation
-    def switching(t, x, u, p):
-        """Where the velocity changes its sign."""
-        return (u[0],)
-
 
 @record
-class BoucWen:
+class BoucWen(_ForceLaw):
     """Bouc-Wen model of a hysteretic restoring force.
 
         z' = alpha velocity - beta (gamma |velocity| |z|^(nu - 1) z + delta velocity |z|^nu)
@@ -372,11 +337,9 @@ class BoucWen:
     delta: float = param(-1.1, unit="N^(1-nu)", meaning="part that opposes the velocity")
     nu: float = param(1.0, unit="1", meaning="sharpness of the transition", at_least=1)
 
-    inputs = ("velocity",)
-    outputs = ("force",)
     states = ("z",)
     feedthrough = False
-    no_split = FORCE_LAW
+    output = staticmethod(output_of_state)
 
     @property
     def z_max(self) -> float:
@@ -395,13 +358,6 @@ class BoucWen:
         size = np.abs(z) ** p.nu
         opposing = p.gamma * np.abs(velocity) * np.sign(z) * size + p.delta * velocity * size
         return (p.alpha * velocity - p.beta * opposing,)
-
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The state."""
-        (z,) = x
-        return (z,)
 
     @staticmethod
     @equation

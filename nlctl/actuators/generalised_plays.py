@@ -8,11 +8,9 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .prandtl_ishlinskii import check_pairs, check_thresholds
 from .static import BOUNDED_OUTPUT
-
-__all__ = ["GeneralisedPrandtlIshlinskii"]
 
 
 @equation
@@ -23,11 +21,9 @@ def envelope(u, a):
 
 @equation
 def envelope_bands(u, p):
-    """Return the lower and upper end of each play at input u.
-
-    Where the envelopes cross by more than 2 r they are sorted, as the lines of `Backlash` are:
-    the operator stays defined and continuous there.
-    """
+    """Return the lower and upper end of each play at input u."""
+    # Where the envelopes cross by more than 2 r they are sorted, as the lines of `Backlash` are:
+    # the operator stays defined and continuous there.
     rising, falling = envelope(u, p.rising) - p.r, envelope(u, p.falling) + p.r
     return np.minimum(rising, falling), np.maximum(rising, falling)
 
@@ -122,12 +118,6 @@ class GeneralisedPrandtlIshlinskii:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the plays."""
-        return RELAXATION * (generalised_plays(u[0], x, p) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (np.sum(p.w * generalised_plays(u[0], x, p)),)
@@ -137,6 +127,8 @@ class GeneralisedPrandtlIshlinskii:
     def commit(t, x, u, p):
         """The plays."""
         return generalised_plays(u[0], x, p)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

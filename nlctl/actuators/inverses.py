@@ -13,7 +13,7 @@ import numpy as np
 from ..equations import equation
 from ..params import param, record
 from .backlash import check_gap
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .prandtl_ishlinskii import (
     check_thresholds,
     check_weights,
@@ -23,8 +23,6 @@ from .prandtl_ishlinskii import (
     weighted_plays,
 )
 from .relay import check_sides, moving_side
-
-__all__ = ["BacklashInverse", "DeadZoneInverse", "PrandtlIshlinskiiInverse"]
 
 
 @record
@@ -151,13 +149,6 @@ class BacklashInverse:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the side."""
-        (side,) = x
-        return (RELAXATION * (moving_side(u[1], side) - side),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """What the backlash needs."""
         (side,) = x
@@ -173,6 +164,8 @@ class BacklashInverse:
         """The side."""
         (side,) = x
         return (moving_side(u[1], side),)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation
@@ -262,12 +255,6 @@ class PrandtlIshlinskiiInverse:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the plays."""
-        return RELAXATION * (unit_play(u[0], x, p.R) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
@@ -277,6 +264,8 @@ class PrandtlIshlinskiiInverse:
     def commit(t, x, u, p):
         """The plays."""
         return unit_play(u[0], x, p.R)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

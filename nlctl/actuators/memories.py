@@ -1,22 +1,39 @@
-"""Several memories in one block: their names, and where they start."""
+"""States of actuators: memories, their names and where they start; states that are the output."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..arguments import vector
+from ..equations import equation
 from ..errors import ParameterError
 
-__all__ = ["RELAXATION", "checked_start", "memory_names", "started"]
-
+# rate (1/s) at which memories relax onto what they become, in plain `control` alone.
+# `control.input_output_response` has no hook for accepted steps. Both engines of
+# `nlctl.input_output_response` update memories between steps instead, and integrate no such rate
 RELAXATION = 1e3
-"""Rate (1/s) at which memories relax onto what they become, in plain `control` alone.
 
-`control.input_output_response` has no hook for accepted steps.  Both engines of
-`nlctl.input_output_response` update memories between steps instead, and integrate no such rate.
-"""
+
+def relaxation(commit: Any) -> Any:
+    """Return the `update` of memories that relax onto what `commit` says that they become."""
+    become: Callable[..., Any] = getattr(commit, "__func__", commit)
+
+    @equation
+    def update(t, x, u, p):
+        """Relaxation of the memories."""
+        after = become(t, x, u, p)
+        return tuple([RELAXATION * (after[i] - x[i]) for i in range(len(x))])
+
+    return staticmethod(update)
+
+
+@equation
+def output_of_state(t, x, u, p):
+    """The output of a block whose first state it is."""
+    return (x[0],)
 
 
 def memory_names(name: str, count: int) -> tuple[str, ...]:

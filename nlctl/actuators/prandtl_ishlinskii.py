@@ -12,10 +12,8 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 from ..wording import counted
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .static import BOUNDED_OUTPUT
-
-__all__ = ["OneSidedDeadZones", "PrandtlIshlinskii", "Stop"]
 
 
 @equation
@@ -92,13 +90,6 @@ class Stop:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the play."""
-        (memory,) = x
-        return (RELAXATION * (unit_play(u[0], memory, p.r) - memory),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """What the play leaves of u."""
         (memory,) = x
@@ -110,6 +101,8 @@ class Stop:
         """The play."""
         (memory,) = x
         return (unit_play(u[0], memory, p.r),)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation
@@ -213,12 +206,6 @@ class PrandtlIshlinskii:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the plays."""
-        return RELAXATION * (unit_play(u[0], x, p.r) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
@@ -228,6 +215,8 @@ class PrandtlIshlinskii:
     def commit(t, x, u, p):
         """The plays."""
         return unit_play(u[0], x, p.r)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

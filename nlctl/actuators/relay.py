@@ -12,10 +12,8 @@ from ..arguments import number, vector
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import RELAXATION, checked_start, memory_names, started
+from .memories import checked_start, memory_names, relaxation, started
 from .static import BOUNDED_OUTPUT
-
-__all__ = ["Preisach", "Relay", "relay_grid"]
 
 
 @equation
@@ -26,11 +24,9 @@ def kept_side(side):
 
 @equation
 def held_side(side):
-    """Side that a relay outputs: its memory's, never that of its input.
-
-    Behind a threshold a loop may lead back before the memory has switched, and would never leave
-    it.  Beyond 1 a memory is its own side: it jumps, and nothing pushes it.
-    """
+    """Side that a relay outputs: its memory's, never that of its input."""
+    # Behind a threshold a loop may lead back before the memory has switched, and would never leave
+    # it. Beyond 1 a memory is its own side: it jumps, and nothing pushes it.
     return kept_side(side) * np.maximum(1.0, np.abs(side))
 
 
@@ -110,13 +106,6 @@ class Relay:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memory onto the side."""
-        (side,) = x
-        return (RELAXATION * (relay_side(u[0], side, p.on, p.off) - side),)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The side, with its height."""
         (side,) = x
@@ -128,6 +117,8 @@ class Relay:
         """The side."""
         (side,) = x
         return (relay_side(u[0], side, p.on, p.off),)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation
@@ -242,12 +233,6 @@ class Preisach:
 
     @staticmethod
     @equation
-    def update(t, x, u, p):
-        """Relaxation of the memories onto the sides."""
-        return RELAXATION * (relay_side(u[0], x, p.alpha, p.beta) - x)
-
-    @staticmethod
-    @equation
     def output(t, x, u, p):
         """The weighted sum of the sides."""
         return (np.sum(p.w * held_side(x)),)
@@ -257,6 +242,8 @@ class Preisach:
     def commit(t, x, u, p):
         """The sides."""
         return relay_side(u[0], x, p.alpha, p.beta)
+
+    update = relaxation(commit)
 
     @staticmethod
     @equation

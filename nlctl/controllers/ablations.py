@@ -13,12 +13,10 @@ from ..params import param, record
 from .adaptive import Zero, adaptive_neural
 from .nussbaum import control_base
 
-__all__ = ["FixedGainLaw", "ablations", "replaced"]
-
 
 @record
 class FixedGainLaw:
-    """Control law (23) with a constant in the place of the Nussbaum function.
+    """Control law (23) with a constant instead of the Nussbaum function.
 
         u = -kappa eta,   eta = beta r + W_hat^T psi + delta_hat tanh(r/tau) + Y_d
 
@@ -33,7 +31,7 @@ class FixedGainLaw:
     """
 
     beta: float = param(2.5, unit="1", meaning="gain of the filtered error", above=0)
-    kappa: float = param(10.0, unit="1", meaning="fixed gain, in the place of -N(zeta)", above=0)
+    kappa: float = param(10.0, unit="1", meaning="fixed gain, instead of -N(zeta)", above=0)
 
     inputs = ("r", "W_psi", "robust", "Y_d")
     outputs = ("u",)
@@ -43,7 +41,7 @@ class FixedGainLaw:
     @staticmethod
     @equation
     def output(t, x, u, p):
-        """Equation (23) with -kappa in the place of N(zeta)."""
+        """Equation (23) with -kappa instead of N(zeta)."""
         return (-p.kappa * control_base(u, p),)
 
 
@@ -77,9 +75,9 @@ def replaced(controller: ct.InterconnectedSystem, **pieces: Any) -> ct.Interconn
     5.0
     """
     of_type("replaced", "controller", controller, ct.InterconnectedSystem, "adaptive_neural(2)")
-    own = {s.name: getattr(s, "spec", None) or s.copy(name=s.name) for s in controller.syslist}
+    specs = {s.name: getattr(s, "spec", None) or s.copy(name=s.name) for s in controller.syslist}
     order = sum(label.startswith("x") for label in controller.input_labels)
-    return adaptive_neural(order, **(own | pieces), name=controller.name)
+    return adaptive_neural(order, **(specs | pieces), name=controller.name)
 
 
 @as_annotated

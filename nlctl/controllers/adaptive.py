@@ -19,12 +19,10 @@ from .nussbaum import NussbaumLaw
 from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
 from .robust import RobustTerm
 
-__all__ = ["Zero", "adaptive_neural"]
-
 
 @record
 class Zero:
-    """A block whose output is 0: put it in the place of a piece that is to be left out.
+    """A block whose output is 0: put it instead of a piece that is to be left out.
 
     Parameters
     ----------
@@ -91,7 +89,7 @@ def adaptive_neural(
     Returns
     -------
     control.InterconnectedSystem
-        The controller, in the place of one block.
+        The controller, as one block.
 
     Raises
     ------

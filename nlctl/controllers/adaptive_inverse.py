@@ -7,18 +7,16 @@ import numpy as np
 from ..equations import equation
 from ..params import param, record
 
-__all__ = ["AdaptiveDeadZoneInverse"]
-
 
 @equation
-def inverse_input(wanted, x, p):
+def inverse_input(desired, x, p):
     """The input that the dead zone needs by the estimates, as `DeadZoneInverse`."""
     m_r, mb_r, m_l, mb_l = x
-    if wanted > 0:
-        return (wanted + mb_r) / np.maximum(m_r, p.m_min)
-    if wanted < 0:
-        return (wanted + mb_l) / np.maximum(m_l, p.m_min)
-    return wanted  # 0, or NaN
+    if desired > 0:
+        return (desired + mb_r) / np.maximum(m_r, p.m_min)
+    if desired < 0:
+        return (desired + mb_l) / np.maximum(m_l, p.m_min)
+    return desired  # 0, or NaN
 
 
 @equation
@@ -77,12 +75,12 @@ class AdaptiveDeadZoneInverse:
     def update(t, x, u, p):
         """Gradient on the side that acts, projected."""
         m_r, mb_r, m_l, mb_l = x
-        wanted, r = u
-        slope, width = p.gamma * r * inverse_input(wanted, x, p), -p.gamma * r
+        desired, r = u
+        slope, width = p.gamma * r * inverse_input(desired, x, p), -p.gamma * r
         still = 0.0 * slope  # 0, or NaN
-        if wanted > 0:
+        if desired > 0:
             return kept_above(slope, m_r, p.m_min), kept_above(width, mb_r, 0.0), still, still
-        if wanted < 0:
+        if desired < 0:
             return still, still, kept_above(slope, m_l, p.m_min), -kept_above(-width, -mb_l, 0.0)
         return still, still, still, still
 

@@ -13,8 +13,6 @@ from ..params import param, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 
-__all__ = ["FilteredError", "binomial_lambdas"]
-
 
 def binomial_lambdas(order: int) -> tuple[float, ...]:
     """Return lambda_1, ..., lambda_{n-1} of (s + 1)^(n-1); (2, 1) for order 3.
@@ -38,10 +36,8 @@ def binomial_lambdas(order: int) -> tuple[float, ...]:
 
 
 def is_hurwitz(coefficients: Sequence[float]) -> bool:
-    """Whether all roots of a polynomial lie in the open left half plane.
-
-    By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
-    """
+    """Whether all roots of a polynomial lie in the open left half plane."""
+    # By the Routh array in exact fractions: roots on the axis, which rounding moves, are found out.
     numbers = [Fraction(c) for c in coefficients]
     above, row = numbers[::2], numbers[1::2]
     while row:

@@ -6,16 +6,12 @@ from ..equations import equation
 from ..functions import smooth_sign
 from ..params import param, record
 
-__all__ = ["KnownSignLaw"]
-
 
 @equation
 def damped_base(u, p):
-    """A base whose product with r is never negative: eta = beta r + s tanh(r s / b).
-
-    s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d is what (23) adds to beta r.  By (29),
-    r s <= r s tanh(r s / b) + 0.2785 b, so that r (beta r + s) <= r eta + 0.2785 b.
-    """
+    """A base whose product with r is never negative: eta = beta r + s tanh(r s / b)."""
+    # s = W_hat^T psi + delta_hat tanh(r/tau) + Y_d is what (23) adds to beta r. By (29), r s <= r s
+    # tanh(r s / b) + 0.2785 b, so that r (beta r + s) <= r eta + 0.2785 b.
     r, W_psi, robust, Y_d = u
     s = W_psi + robust + Y_d
     return p.beta * r + s * smooth_sign(r * s, p.b)

@@ -9,8 +9,6 @@ from ..equations import equation
 from ..functions import nussbaum
 from ..params import param, record
 
-__all__ = ["NussbaumLaw"]
-
 
 @equation
 def control_base(u, p):

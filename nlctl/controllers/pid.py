@@ -14,8 +14,6 @@ from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
 
-__all__ = ["PID", "PID2", "standard_pid"]
-
 
 @equation
 def back_calculation(u, w, p):
@@ -157,7 +155,7 @@ class PID2:
     signals : tuple of str, optional
         Names of the reference and of the measured output; one name alone is an error.
     applied : str, optional
-        Name of one more input: what the plant gets in the place of u, behind an actuator with
+        Name of one more input: what the plant gets instead of u, behind an actuator with
         other limits, or by hand.  The integral then tracks that, so that the change from manual
         to automatic makes no jump.
     anti_windup : {"back-calculation", "clamping", "none"}, optional

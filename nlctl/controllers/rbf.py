@@ -20,14 +20,6 @@ from ..params import param, record
 from ..plants import coordinate_names
 from ..wording import counted
 
-__all__ = [
-    "AdaptiveWeights",
-    "GaussianBasis",
-    "diagonal_centres",
-    "grid_centres",
-    "latin_hypercube_centres",
-]
-
 Matrix = tuple[tuple[float, ...], ...]
 
 

@@ -16,8 +16,6 @@ from ..params import param, record
 from .known_sign import damped_base
 from .nussbaum import NussbaumLaw, control_base, gained
 
-__all__ = ["DeadZoneNussbaumLaw", "LeakyNussbaumLaw", "MonotoneNussbaumLaw"]
-
 
 @equation
 def beyond(r, r_0):
@@ -33,7 +31,7 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
         zeta' = d(r) eta,       d(r) = r - clip(r, -r_0, r_0),   zeta(0) = 1
 
     zeta stands still while |r| <= r_0 and grows until |r| stays there, so that r_0 is about what
-    |r| reaches.  d is the continuous dead zone, so that d(r)^2 / 2 in the place of r^2 / 2 in (21)
+    |r| reaches.  d is the continuous dead zone, so that d(r)^2 / 2 instead of r^2 / 2 in (21)
     has the derivative d(r) r' and N(zeta) zeta' = d(r) u holds exactly.
 
     Examples
@@ -50,7 +48,7 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
     @staticmethod
     @equation
     def update(t, x, u, p):
-        """Equation (24) with d(r) in the place of r."""
+        """Equation (24) with d(r) instead of r."""
         return (beyond(u[0], p.r_0) * control_base(u, p),)
 
     @staticmethod

@@ -6,8 +6,6 @@ from ..equations import equation
 from ..functions import smooth_sign
 from ..params import param, record
 
-__all__ = ["RobustTerm"]
-
 
 @record
 class RobustTerm:

@@ -121,10 +121,8 @@ class _Law:
         return {f"{s}#{i}" if twins else s: b for i, (s, b) in enumerate(blocks.values())}
 
     def _bare(self, name: str, base: str) -> str:
-        """Return what python-control calls a parameter that is named without its block.
-
-        Refuse one that nobody reads, or that means more than one block.
-        """
+        """Return what python-control calls a parameter that is named without its block."""
+        # Refuse one that nobody reads, or that means more than one block.
         declaring = [f"{p}.{base}" for p, _, b in self.theirs if isinstance(b, Named) and
                base in b.nlctl_own]  # fmt: skip
         if len(declaring) > 1:

@@ -21,31 +21,18 @@ from ..upstream.systems import System
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """Where a block or diagram stands: one system may stand in a diagram twice.
+    """Where a block or diagram stands: one system may stand in a diagram twice."""
 
-    Attributes
-    ----------
-    path : str
-        Names of the diagrams around it and its own, separated by dots; empty for the outermost
-        diagram.
-    parameter_path : str
-        The same without diagrams that do not put their name in front of their parameters'
-        (those made with plain ``ct.interconnect``).
-    system : control.InputOutputSystem
-    state_offset : int
-        Where its states begin in the outermost diagram's state vector.
-    parent : Place or None
-        The diagram around it, and ...
-    position : int
-        ... its position in that diagram's ``syslist``.
-    """
-
+    # names of the diagrams around it and its own, separated by dots; empty for the outermost
+    # diagram
     path: str
+    # the same without diagrams that do not put their name in front of their parameters' (those made
+    # with plain ``ct.interconnect``)
     parameter_path: str
     system: Any  # a diagram or a block; only diagrams have maps and offsets
-    state_offset: int
-    parent: Place | None
-    position: int
+    state_offset: int  # where its states begin in the outermost diagram's state vector
+    parent: Place | None  # the diagram around it, and ...
+    position: int  # ... its position in that diagram's ``syslist``
 
 
 def places(

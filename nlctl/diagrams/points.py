@@ -8,7 +8,7 @@ the diagram, so that nobody else who evaluates it is disturbed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import control as ct
@@ -19,16 +19,13 @@ from ..upstream.control_internals import rates_and_outputs_now
 from ..upstream.systems import System
 from .parameters import overridden
 
-SAME_FUNCTIONS = 1e-10
-"""Relative difference that rounding explains without a closer look."""
+SAME_FUNCTIONS = 1e-10  # relative difference that rounding explains without a closer look
+# what a response may differ by, relative to the largest sample: engines interpolate
 OF_RESPONSES = 1e-6
-"""What a response may differ by, relative to the largest sample: engines interpolate."""
+# what processors and versions of libraries may differ by, relative and absolute
 OTHER_VERSIONS = 1e-6, 1e-9
-"""What processors and versions of libraries may differ by, relative and absolute."""
-SHAKEN = 1e-13
-"""Relative change of states and inputs that shows what rounding does to a value."""
+SHAKEN = 1e-13  # relative change of states and inputs that shows what rounding does to a value
 _TIMES = 100  # as many times as far as states and inputs are shaken
-
 Point = tuple[float, np.ndarray, np.ndarray]  # time (s), states, inputs
 PointValues = tuple[np.ndarray, ...]  # rates, outputs, and more where there are more
 PointFunction = Callable[[float, np.ndarray, np.ndarray], PointValues]
@@ -52,21 +49,27 @@ def rates_and_outputs(system: System, params: Mapping[str, Any] | None = None) -
 def agree(
     a: npt.ArrayLike, b: npt.ArrayLike, absolute: Any = 0.0, relative: float = SAME_FUNCTIONS
 ) -> np.ndarray:
-    """Return where values are equal to rounding; NaN equals nothing.
-
-    Shapes: `a, b` (m,).
-    """
+    """Return where values are equal to rounding; NaN equals nothing; shapes: `a, b` (m,)."""
     a, b = np.asarray(a), np.asarray(b)
     with np.errstate(invalid="ignore"):
         allowed = relative * np.maximum(np.abs(a), np.abs(b)) + absolute
         return np.asarray((a == b) | (np.abs(a - b) <= allowed))
 
 
-def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
-    """Yield points as far as rounding may move one.
+def first_difference(
+    labels: Sequence[Sequence[str]], one: PointValues, other: PointValues, allowed: PointValues
+) -> tuple[str, float, float] | None:
+    """Return the first of some values that differ by more than is allowed: what it is, and both."""
+    for names, a, b, most in zip(labels, one, other, allowed, strict=True):
+        differ = np.flatnonzero(~agree(a, b, most))
+        if differ.size:
+            return names[differ[0]], a[differ[0]], b[differ[0]]
+    return None
 
-    Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
-    """
+
+def rounded_points(point: Point, later: float = 0.0) -> Iterator[Point]:
+    """Yield points as far as rounding may move one."""
+    # Sums may cancel: any two numbers are moved apart at one of the points, all alike at another.
     t, x, u = point
     places = np.arange(x.size + u.size)
     for bit in range(int(places.size).bit_length() + 1):

@@ -181,17 +181,11 @@ def _named_diagram(diagram: Any, parts: list[Any]) -> Any:
 
 @dataclass(kw_only=True, eq=False)
 class Apart:
-    """A copy of a diagram in which a run may write its parameters.
-
-    Attributes
-    ----------
-    system : control.InputOutputSystem
-    pairs : dict
-        Blocks and diagrams with their copies, by identity.  Linear systems are not copied: they
-        have no parameters.
-    """
+    """A copy of a diagram in which a run may write its parameters."""
 
     system: Any
+    # blocks and diagrams with their copies, by identity.  Linear systems are not copied: they have
+    # no parameters
     pairs: dict[int, tuple[Any, Any]]
 
     def of(self, thing: object) -> Any:

@@ -9,14 +9,7 @@ from math import ceil, floor, inf
 from statistics import fmean
 
 from .order import LayoutPlan, side
-from .records import (
-    EXTERNAL,
-    GRID,
-    LANE_WIDTH,
-    ROW_GAP,
-    Heights,
-    LayoutNode,
-)
+from .records import EXTERNAL, GRID, LANE_WIDTH, ROW_GAP, Heights, LayoutNode
 
 
 @dataclass(frozen=True)
@@ -37,11 +30,9 @@ def _up(value: float) -> float:
 
 
 def _outlets(plan: LayoutPlan, n: int) -> tuple[dict[int, float], float]:
-    """Heights of a block's outlets below its axis, and half the height that they need.
-
-    Wires to the next column leave on the axis, those to the channels outside of them; the
-    far-reaching stand nearer to the axis, where they do not cross the others.
-    """
+    """Heights of a block's outlets below its axis, and half the height that they need."""
+    # Wires to the next column leave on the axis, those to the channels outside of them; the far-
+    # reaching stand nearer to the axis, where they do not cross the others.
     rank: dict[int, tuple[float, float]] = {}
     for i, wire in enumerate(plan.wires):
         if wire.source == n:
@@ -137,10 +128,7 @@ def _half_for_inlets(plan: LayoutPlan, n: int) -> float:
 
 
 def _straightened(
-    plan: LayoutPlan,
-    centre: Sequence[float],
-    half: Sequence[float],
-    offset: Heights,
+    plan: LayoutPlan, centre: Sequence[float], half: Sequence[float], offset: Heights
 ) -> list[float]:
     """Centres moved a little where that turns a bent arrow into a straight one."""
     cell = [(place.band, place.column) for place in plan.places]

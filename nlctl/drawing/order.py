@@ -7,13 +7,7 @@ from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from statistics import fmean
 
-from .records import (
-    EXTERNAL,
-    GridCell,
-    LayoutNode,
-    Links,
-    Wire,
-)
+from .records import EXTERNAL, GridCell, LayoutNode, Links, Wire
 
 
 @dataclass(frozen=True)
@@ -36,11 +30,9 @@ class LayoutPlan:
 
 
 def forward_links(count: int, links: Links, entries: set[int]) -> Links:
-    """Links without those that close a loop.
-
-    These are found by depth-first search or are those against the order of the blocks, whichever
-    are fewer, or else close more loops where the signals enter them, or make a shorter diagram.
-    """
+    """Links without those that close a loop."""
+    # These are found by depth-first search or are those against the order of the blocks, whichever
+    # are fewer, or else close more loops where the signals enter them, or make a shorter diagram.
     reach = {n: {t for s, t in links if s == n} for n in range(count)}
     for middle in range(count):
         for n in range(count):
@@ -56,10 +48,8 @@ def forward_links(count: int, links: Links, entries: set[int]) -> Links:
 
 
 def _searched_links(count: int, links: Links, entries: set[int]) -> Links:
-    """Links that a search does not follow back into its own path.
-
-    It starts at blocks that no block feeds, then at those with external inputs.
-    """
+    """Links that a search does not follow back into its own path."""
+    # It starts at blocks that no block feeds, then at those with external inputs.
     fed = {target for source, target in links if source != target}
     followers = [sorted(t for s, t in links if s == node) for node in range(count)]
     seen: set[int] = set()
@@ -136,10 +126,8 @@ def make_plan(
 
 
 def _channels(wires: Sequence[Wire], places: Sequence[GridCell]) -> dict[tuple[int, int], int]:
-    """Channels: feedback runs below the boxes, feedforward above, unless the way is far.
-
-    Between bands, a wire changes height at the outer edge of the diagram where it can.
-    """
+    """Channels: feedback runs below the boxes, feedforward above, unless the way is far."""
+    # Between bands, a wire changes height at the outer edge of the diagram where it can.
     channel: dict[tuple[int, int], int] = {}
     for i, wire in enumerate(wires):
         home = places[wire.source]

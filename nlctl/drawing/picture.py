@@ -6,22 +6,24 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
 
 import control as ct
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from ..annotations import as_annotated
 from ..blocks import Block
 from ..upstream.systems import System
 from ..wording import counted
-from .figure import Drawing
 from .records import (
     FONT,
     BlockFrame,
@@ -317,3 +319,21 @@ def _write(
         baseline = y + (1.25 * k + 0.97) * size
         written = axes.text(x + text.w / 2, baseline, line, size=size, zorder=4, **style)
         written.set(parse_math=False, usetex=False)
+
+
+class Drawing(Figure):
+    """A matplotlib figure that a notebook shows as SVG, whatever backend is active.
+
+    The same drawing gives the same bytes, so that notebooks under version control stay quiet.
+    """
+
+    def _repr_svg_(self) -> str:
+        buffer = io.StringIO()
+        with mpl.rc_context({"svg.hashsalt": "nlctl", "svg.fonttype": "path"}):
+            self.savefig(buffer, format="svg", metadata={"Date": None})
+        text = buffer.getvalue()
+        return text[text.index("<svg") :]
+
+    def _repr_html_(self) -> str:
+        """The same within a box that scrolls, so that a wide diagram stays legible."""
+        return f'<div style="overflow-x:auto">{self._repr_svg_()}</div>'

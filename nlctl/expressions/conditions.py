@@ -11,8 +11,6 @@ from collections.abc import Collection, Iterable
 
 from .graph import Expr, Graph, needed
 
-__all__ = ["at_integers", "conditions", "switching_function"]
-
 _ORDERS = ("lt", "le", "gt", "ge")
 _OF_DIFFERENCES = (*_ORDERS, "minimum", "maximum")
 _OF_SIGNS = ("absolute", "sign", "heaviside")
@@ -65,11 +63,9 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
 
 
 def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
-    """Return a - b; of what is compared with 0 itself, so that no rounding comes in.
-
-    Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
-    a step could pass through a small circle unseen.
-    """
+    """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
+    # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
+    # a step could pass through a small circle unseen.
     if a.op == "const" and a.data == 0.0:
         return b
     for root, other, step in ((a, b, 1), (b, a, -1)):
@@ -87,11 +83,9 @@ def _square_of_root(graph: Graph, root: Expr) -> Expr:
 
 
 def _at_integers(graph: Graph, counted: Expr, shift: float) -> Expr:
-    """Return what has a simple root where `counted` + shift is an integer.
-
-    sin(pi z) = (-1)^n sin(pi (z - n)) with the nearest integer n: rounding of pi z does not move
-    the roots.
-    """
+    """Return what has a simple root where `counted` + shift is an integer."""
+    # sin(pi z) = (-1)^n sin(pi (z - n)) with the nearest integer n: rounding of pi z does not move
+    # the roots.
     z = graph.op("add", counted, graph.const(shift)) if shift else counted
     nearest = graph.op("rint", z)
     half = graph.op("mul", nearest, graph.const(0.5))

@@ -6,8 +6,6 @@ from collections.abc import Collection, Iterable
 
 from .graph import Expr, needed
 
-__all__ = ["is_an_extreme", "may_jump"]
-
 _JUMPING = frozenset(
     (
         "arctan2",

@@ -8,16 +8,12 @@ import numpy as np
 
 from .graph import Expr, needed
 
-__all__ = ["structure"]
-
 _WHOLE = ("sum", "call", "solve")  # each element of the result depends on all that goes in
 
 
 def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:
-    """Return which results are made of which entries of an array, whatever the values are.
-
-    returns (rows, count).
-    """
+    """Return which results are made of which entries of an array, whatever the values are."""
+    # returns (rows, count).
     depends: dict[Expr, np.ndarray] = {}
     for node in needed([expr for expr, _ in results]):
         depends[node] = _of_node(node, [depends[arg] for arg in node.args], array, count)

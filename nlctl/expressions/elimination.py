@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["SINGULAR", "eliminated", "largest_magnitude", "linear_solution", "substituted"]
-
 SINGULAR = 1e-7  # relative to the largest entry: a solution would have lost half of its digits
 
 
@@ -21,10 +19,8 @@ def largest_magnitude(values: Sequence[Any]) -> Any:
 
 
 def linear_solution(matrix: Sequence[Sequence[Any]], b: Sequence[Any]) -> tuple[list[Any], Any]:
-    """Return the solution of ``matrix @ x = b``, and whether the matrix is regular.
-
-    Gaussian elimination with partial pivoting: rows are exchanged by choosing their numbers.
-    """
+    """Return the solution of ``matrix @ x = b``, and whether the matrix is regular."""
+    # Gaussian elimination with partial pivoting: rows are exchanged by choosing their numbers.
     n = len(b)
     rows = [[*row, value] for row, value in zip(matrix, b, strict=True)]
     scale = largest_magnitude([1.0, *(entry for row in matrix for entry in row)])
@@ -52,12 +48,10 @@ def linear_solution(matrix: Sequence[Sequence[Any]], b: Sequence[Any]) -> tuple[
 def eliminated(
     np: Any, rows: list[list[Any]], exchanges: list[Any] | None = None
 ) -> tuple[list[list[Any]], list[Any]]:
-    """Return an augmented matrix in upper triangular form, and its pivots, as LAPACK has them.
-
-    Partial pivoting: of each column the first of the largest entries comes up, by choosing
-    numbers where the state decides.  Conditions under which rows were exchanged are added to
-    `exchanges`.
-    """
+    """Return an augmented matrix in upper triangular form, and its pivots, as LAPACK has them."""
+    # Partial pivoting: of each column the first of the largest entries comes up, by choosing
+    # numbers where the state decides. Conditions under which rows were exchanged are added to
+    # `exchanges`.
     n = len(rows)
     for i in range(n):
         _bring_up(np, rows, i, exchanges)

@@ -8,8 +8,6 @@ import numpy as np
 
 from .graph import Expr, Untraceable, needed, numpy_function
 
-__all__ = ["evaluate_expressions", "value_of"]
-
 
 def evaluate_expressions(
     results: Iterable[Expr],
@@ -31,10 +29,8 @@ def value_of(
     arrays: Mapping[str, np.ndarray],
     searches: Mapping[str, Callable[[np.ndarray], np.ndarray]] | None = None,
 ) -> np.ndarray:
-    """Return the value of one expression from those of its parts.
-
-    As `evaluate_expressions`; among `searches` there may be opaque functions as well.
-    """
+    """Return the value of one expression from those of its parts."""
+    # As `evaluate_expressions`; among `searches` there may be opaque functions as well.
     if node.op in ("call", "solve") and searches and node.data[0] in searches:
         return searches[node.data[0]](_joined(parts, node.data[1]))
     if node.op == "const":

@@ -11,46 +11,29 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FUNCTIONS", "MATH", "RealFunction"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class RealFunction:
-    """One function of real numbers.
+    """One function of real numbers."""
 
-    Attributes
-    ----------
-    name : str
-        NumPy's name, or that of `scipy.special`.
-    code : str
-        Its machine code: ``"own"`` for what `nlctl.native.codegen.ir.functions` writes out, in
-        its table ``INLINE`` or ``CALLED``, an intrinsic of LLVM
-        (``"llvm.fabs"``), or the name in the C library (``"log"``).
-    derivative : tuple of callable
-        Partial derivatives with respect to each argument, as functions of all of them.  Where a
-        function has a jump or a kink: that of one side, the one that its value belongs to.
-    enclosure : callable or None
-        The same function of python-flint's ``arb``, for functions of one argument.  Without it
-        balls know only what `nlctl.analysis.intervals` has operators for (absolute, minimum,
-        maximum, power), and refuse the rest.
-    latex : str
-        Format string with ``{0}`` and ``{1}`` for the arguments.
-    math : tuple of str
-        Names in Python's `math` module.
-    series : str or callable
-        How the Taylor coefficients of f(x(t)) follow from those of x(t).  ``"derivative"``: from
-        y' = f'(x) x', where f' is made of functions that have theirs.  ``"steady"``: f is a
-        constant between its jumps.  A callable writes the function as a choice, whose side is that
-        on which x(t) continues, or in others.  ``"unknown"``: the function is refused where they
-        are needed.
-    """
-
-    name: str
+    name: str  # NumPy's name, or that of `scipy.special`
+    # its machine code: ``"own"`` for what `nlctl.native.codegen.ir.functions` writes out, in its
+    # table ``INLINE`` or ``CALLED``, an intrinsic of LLVM (``"llvm.fabs"``), or the name in the C
+    # library (``"log"``)
     code: str
+    # partial derivatives with respect to each argument, as functions of all of them.  Where a
+    # function has a jump or a kink: that of one side, the one that its value belongs to
     derivative: tuple[Callable[..., Any], ...]
+    # the same function of python-flint's ``arb``, for functions of one argument.  Without it balls
+    # know only what `nlctl.analysis.intervals` has operators for (absolute, minimum, maximum,
+    # power), and refuse the rest
     enclosure: Callable[..., Any] | None
-    latex: str
-    math: tuple[str, ...] = ()
+    latex: str  # format string with ``{0}`` and ``{1}`` for the arguments
+    math: tuple[str, ...] = ()  # names in Python's `math` module
+    # how the Taylor coefficients of f(x(t)) follow from those of x(t).  ``"derivative"``: from y' =
+    # f'(x) x', where f' is made of functions that have theirs.  ``"steady"``: f is a constant
+    # between its jumps.  A callable writes the function as a choice, whose side is that on which
+    # x(t) continues, or in others.  ``"unknown"``: the function is refused where they are needed
     series: str | Callable[..., Any] = "derivative"
 
     @property
@@ -198,7 +181,7 @@ _ROWS = (
          series=lambda x, y: x - y * np.trunc(x / y)),
 )  # fmt: skip
 
+# every function that expressions know, by NumPy's name
 FUNCTIONS = {row.name: row for row in _ROWS}
-"""Every function that expressions know, by NumPy's name."""
+# NumPy's names of the functions of Python's `math`
 MATH = {name: row.name for row in _ROWS for name in row.math}
-"""NumPy's names of the functions of Python's `math`."""

@@ -24,11 +24,10 @@ _ARITHMETIC = {"add": "add", "sub": "subtract", "mul": "multiply", "div": "true_
 NUMPY = COMPARISONS | LOGIC | _ARITHMETIC
 BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
            "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
+# operations that make integers of integers
 INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remainder")
-"""Operations that make integers of integers."""
 
-SPECIAL = ("erf", "erfc")
-"""Functions of `scipy.special` that are in the table of functions."""
+SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
@@ -90,32 +89,19 @@ class OpenCondition(BaseException):  # (what is traced may catch exceptions)
 
 
 class Graph:
-    """All expressions of a diagram.
-
-    Attributes
-    ----------
-    nodes : list of Expr
-    limit : int
-        Largest number of expressions for now.
-    decisions : dict
-        What is taken to hold on the path through a function that is being traced.
-    implied : dict
-        What follows from that.
-    assumptions : dict
-        Integer parameters that steer what is computed: place in `p`, and value.
-    lengths : dict
-        Sizes of the arrays that are read, as far as known: nothing is read beyond.
-    guards : list of Expr
-        Conditions without which Python would have raised an error on this path.
-    """
+    """All expressions of a diagram."""
 
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
-        self.limit = UNLIMITED
+        self.limit = UNLIMITED  # largest number of expressions for now
+        # sizes of the arrays that are read, as far as known: nothing is read beyond
         self.lengths = dict(lengths or {})
+        # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
+        # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
-        self.implied: dict[Expr, bool] = {}
+        self.implied: dict[Expr, bool] = {}  # what follows from that
+        # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
 
@@ -162,6 +148,13 @@ class Graph:
             )  # fmt: skip
             self.nodes.append(self._known[key])
         return self._known[key]
+
+    def like(self, node: Expr, *args: Expr) -> Expr:
+        """Return the operation of an expression, of other arguments."""
+        return self.node(
+            node.op, *args, data=node.data, size=node.size, kind=node.kind,
+            varies=node.varies, value=node.value,
+        )  # fmt: skip
 
     def _check_lengths(self, op: str, args: tuple[Expr, ...], data: Any, size: int | None) -> None:
         """Check that nothing is read beyond the end of what it is read from."""
@@ -254,10 +247,8 @@ class Graph:
         return a if a.kind == "i" else self.node(a.op, *a.args, data=a.data, size=a.size, kind="i")
 
     def _of_truth_values(self, name: str, *args: Expr) -> Expr:
-        """Return what NumPy makes of truth values alone.
-
-        Of Python's own, such as ``t > 1``, a sum is 2 and not True.
-        """
+        """Return what NumPy makes of truth values alone."""
+        # Of Python's own, such as ``t > 1``, a sum is 2 and not True.
         meaning = BOOLEAN[name]
         if meaning is None:
             raise Ambiguous(

@@ -11,9 +11,8 @@ import numpy as np
 
 from .arrays import Tracer, as_array, concatenated, full, full_index, holds_arrays, mapped, traced
 from .graph import Graph, Untraceable
-from .integers import integer_range
 from .masked import Masked, MaskedPlaces
-from .operators import elementwise
+from .operators import elementwise, integer_range
 
 GATHERED = 64  # places among which an integer may choose
 
@@ -24,15 +23,10 @@ def _item(self: Tracer, key: Any) -> Any:
     if _is_mask(key):
         return Masked(self, key)
     if isinstance(key, Tracer) and key.shape:
-        return _items_at(self, key)
+        items = [_item(self, k) for k in key.short().reshape(-1)]
+        return traced(self.graph, items).reshape(key.shape + self.shape[1:])
     place = _open_place(key)
     return self.item_at(key) if place is None else _gathered(self, key, place)
-
-
-def _items_at(self: Tracer, places: Tracer) -> Tracer:
-    """Return elements at places that the state decides, one after the other."""
-    items = [_item(self, k) for k in places.short().reshape(-1)]
-    return traced(self.graph, items).reshape(places.shape + self.shape[1:])
 
 
 def _settled(key: object) -> Any:

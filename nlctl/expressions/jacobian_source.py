@@ -19,11 +19,9 @@ _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 
 
 def jacobian_function(function: Callable, n: int, *others: int) -> Callable:
-    """Make the Jacobian of ``function(x, ...)`` by x, of n numbers; others have these sizes.
-
-    It takes the same arguments and returns an array of shape (results, n).  What cannot be read,
-    or has no derivative, is `Untraceable`.
-    """
+    """Make the Jacobian of ``function(x, ...)`` by x, of n numbers; others have these sizes."""
+    # It takes the same arguments and returns an array of shape (results, n). What cannot be read,
+    # or has no derivative, is `Untraceable`.
     graph, names = Graph(), "abcdefgh"[: 1 + len(others)]
 
     def arguments() -> tuple[Any, ...]:

@@ -10,8 +10,6 @@ from dataclasses import dataclass, field
 from .functions import FUNCTIONS
 from .graph import Expr, Untraceable, needed
 
-__all__ = ["Index", "LatexWriter", "index_text", "number_text", "symbol", "with_index"]
-
 _GREEK = """alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma
 tau upsilon phi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"""
 GREEK_LETTERS = frozenset(_GREEK.split())

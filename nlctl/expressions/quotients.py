@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from .graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["difference_quotient"]
-
 
 @dataclass(frozen=True)
 class _Quantity:
@@ -20,10 +18,8 @@ class _Quantity:
 
 
 def difference_quotient(graph: Graph, result: Expr, variable: Expr) -> Expr:
-    """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative.
-
-    Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
-    """
+    """Return (q(v) - q(0)) / v of an expression q, whose limit at v = 0 is the derivative."""
+    # Terms without v have the quotient 0 exactly, and a factor v gives what it is multiplied by.
     quantities: dict[Expr, _Quantity] = {}
     for node in needed([result]):
         if node is variable:

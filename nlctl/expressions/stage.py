@@ -223,7 +223,9 @@ class Stage:
         def function(*arguments: Any, **options: Any) -> Any:
             every, named = settled(arguments), {k: settled(v) for k, v in options.items()}
             if holds_tracers([*every, *named.values()]):
-                written = _in_python(real)
+                function = inspect.unwrap(real) if callable(real) else real
+                unwrapped = isinstance(function, FunctionType) and is_of_a_library(function)
+                written = function if unwrapped else None
                 if written is None:
                     raise Untraceable(f"{_title(real)} is not known here")
                 return self._traced_library(real, written, arguments, options)
@@ -314,13 +316,6 @@ class Stage:
             copied.__set_name__(copied, value.attrname or value.func.__name__)
             return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
-
-
-def _in_python(real: Any) -> FunctionType | None:
-    """Return the source of a function of a library if that is plain Python: it is traced, too."""
-    function = inspect.unwrap(real) if callable(real) else real
-    unwrapped = isinstance(function, FunctionType) and is_of_a_library(function)
-    return function if unwrapped else None
 
 
 def _has_code(value: object) -> bool:

@@ -1,9 +1,17 @@
-"""Tracing: what a plain Python function computes, as expressions."""
+"""Tracing: what a plain Python function computes, as expressions.
+
+What is known of a comparison with a number from comparisons of the same thing before.
+
+``if t < 3`` and then ``if t < 7``: where the first holds the second does, and a function with many
+thresholds in a row has few paths through it.  NaN is on no side of any number, so that what did not
+hold before says nothing of where a thing is that may be NaN.
+"""
 
 from __future__ import annotations
 
 import dis
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +21,6 @@ from .arrays import Tracer, concatenated, scalar, traced
 from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
 from .library.python import Namespace
 from .operators import elementwise
-from .ordered import implied_by
 from .stage import Stage
 from .staged import LIBRARIES
 
@@ -21,12 +28,10 @@ PATHS = 128  # paths through one function that are followed
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
-    """Run a function on tracers and return its result in one dimension.
-
-    A condition that depends on tracers is followed both ways: the function runs again for every
-    way through it, and the results are combined by ``select``, which takes the branch that Python
-    takes, also for NaN.
-    """
+    """Run a function on tracers and return its result in one dimension."""
+    # A condition that depends on tracers is followed both ways: the function runs again for every
+    # way through it, and the results are combined by ``select``, which takes the branch that Python
+    # takes, also for NaN.
     graph.limit = len(graph.nodes) + BUDGET
     assumptions = dict(graph.assumptions)
     try:
@@ -126,3 +131,49 @@ def _flat(graph: Graph, value: object) -> Tracer:
     if isinstance(value, tuple | list):
         return concatenated(graph, [traced(graph, v).reshape(-1) for v in value])
     return traced(graph, value).reshape(-1)
+
+
+_TURNED = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le"}
+_OPPOSITE = {"lt": "ge", "le": "gt", "gt": "le", "ge": "lt"}
+
+
+def implied_by(condition: Expr, decisions: Mapping[Expr, bool]) -> bool | None:
+    """Return whether a condition holds where others do or do not; None if that is not known."""
+    comparison = _with_number(condition)
+    if comparison is None:
+        return None
+    thing, order, number = comparison
+    is_number = thing.op == "leaf" and thing.data[0] == "t"
+    facts = []
+    for other, holds in decisions.items():
+        decided = _with_number(other)
+        if decided is not None and decided[0] is thing:
+            facts.append((decided[1] if holds else _OPPOSITE[decided[1]], decided[2]))
+            is_number |= holds
+    if any(_implies(fact, (_OPPOSITE[order], number)) for fact in facts):
+        return False
+    if is_number and any(_implies(fact, (order, number)) for fact in facts):
+        return True
+    return None
+
+
+def _with_number(condition: Expr) -> tuple[Expr, str, float] | None:
+    """Return what is compared with which number, and how; None of other conditions."""
+    if condition.op not in _TURNED:
+        return None
+    left, right = condition.args
+    if right.op == "const" and left.op != "const" and not left.size:
+        return left, condition.op, float(right.data)
+    if left.op == "const" and right.op != "const" and not right.size:
+        return right, _TURNED[condition.op], float(left.data)
+    return None
+
+
+def _implies(fact: tuple[str, float], question: tuple[str, float]) -> bool:
+    """Whether one comparison of a thing that is not NaN implies another."""
+    (order, number), (relation, limit) = fact, question
+    if order[0] != relation[0] or math.isnan(number) or math.isnan(limit):
+        return False
+    if number == limit:
+        return order == relation or relation.endswith("e")
+    return number < limit if order[0] == "l" else number > limit

@@ -19,8 +19,6 @@ from ..names import find_name, unknown
 from ..upstream.systems import System
 from .fault import Fault
 
-__all__ = ["signal_names", "with_faults"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Spot:
@@ -105,10 +103,8 @@ def with_faults(diagram: System, *faults: Fault) -> ct.InterconnectedSystem:
 
 
 def signal_names(diagram: System) -> list[str]:
-    """Return the names of all signals that a fault can be on.
-
-    External inputs first, then outputs and inputs of all blocks and nested diagrams.
-    """
+    """Return the names of all signals that a fault can be on."""
+    # External inputs first, then outputs and inputs of all blocks and nested diagrams.
     return list(_spots(known_system("signal_names", diagram)))
 
 

@@ -16,19 +16,6 @@ from ..errors import ParameterError
 from ..functions import noise_spectrum, noise_value
 from ..params import param, record
 
-__all__ = [
-    "NEVER",
-    "Bias",
-    "DriftFault",
-    "Latch",
-    "Late",
-    "LockInPlace",
-    "LossOfEffectiveness",
-    "Noise",
-    "Outage",
-    "StuckAt",
-]
-
 NEVER = 1e12
 """A time in s that no run reaches: as an onset, a fault that does not begin."""
 
@@ -37,11 +24,9 @@ SHARPER = 20.0  # what is tracked is that much faster than what freezes it
 
 @equation
 def age(t, u, p):
-    """Time since the onset (s); negative before it.
-
-    With a condition `u` is (signal, on, since, ...), and the fault begins at the later one of
-    `since` and the onset; without, it is (signal, ...), one more signal at most.
-    """
+    """Time since the onset (s); negative before it."""
+    # With a condition `u` is (signal, on, since, ...), and the fault begins at the later one of
+    # `since` and the onset; without, it is (signal, ...), one more signal at most.
     if u.size < 3:
         return t - p.onset
     if u[1] > 0.5:

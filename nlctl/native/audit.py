@@ -19,7 +19,7 @@ import numpy as np
 from ..blocks import supplied_of
 from ..delays.transport import PAST
 from ..diagrams import Apart, apart, override, supplied_blocks
-from ..diagrams.points import SHAKEN, PointValues, agree, explained, values_now
+from ..diagrams.points import SHAKEN, PointValues, agree, explained, first_difference, values_now
 from ..errors import AuditError, ParameterError
 from ..sampling.system import Happening, happening
 from ..supplied import SuppliedOutput, supplying
@@ -50,34 +50,19 @@ Evaluated = Callable[[float, np.ndarray, np.ndarray], PointValues]
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """A run that is to be compared.
+    """A run that is to be compared."""
 
-    Attributes
-    ----------
-    time : ndarray of shape (m,)
-    states, inputs : ndarray of shape (nstates, m), (ninputs, m)
-    p : ndarray
-        The program's parameter vector.
-    params : mapping or None
-        The same parameters as python-control takes them.
-    width : int
-        Members that the machine code of the run takes.
-    meetings : tuple of frozenset
-        What may happen to sampled blocks in that machine code.
-    relays : mapping
-        What ideal relays output at a point, by the number of their blocks.
-    apart : Apart or None
-        The diagram that python-control evaluates, with the parameters of this run.
-    """
-
-    time: np.ndarray
+    time: np.ndarray  # shape (m,)
+    # shape (nstates, m)
     states: np.ndarray
     inputs: np.ndarray
-    p: np.ndarray
-    params: Mapping[str, Any] | None
-    width: int
-    meetings: tuple[Happening, ...] = ()
+    p: np.ndarray  # the program's parameter vector
+    params: Mapping[str, Any] | None  # the same parameters as python-control takes them
+    width: int  # members that the machine code of the run takes
+    meetings: tuple[Happening, ...] = ()  # what may happen to sampled blocks in that machine code
+    # what ideal relays output at a point, by the number of their blocks
     relays: Mapping[int, float] = field(default_factory=dict)
+    # the diagram that python-control evaluates, with the parameters of this run
     apart: Apart | None = None
 
     def of(self, thing: object) -> Any:
@@ -203,12 +188,11 @@ def _compare_beyond_rounding(
         system.state_labels, [*system.output_labels, *arrivals], *[after] * len(trial.meetings),
         *declared_labels(compiled.schedule),
     ]  # fmt: skip
-    for labels, a, b, most in zip(names, ours, theirs, allowed, strict=True):
-        wrong = np.flatnonzero(~agree(a, b, most))
-        if wrong.size:
-            if not compiled.program.sampled:
-                _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
-            raise _difference(labels[wrong[0]], system.name, (a[wrong[0]], b[wrong[0]]), point[0])
+    differ = first_difference(names, ours, theirs, allowed)
+    if differ is not None:
+        if not compiled.program.sampled:
+            _compare_blocks(compiled, trial, ours, point)  # it names the block, if it can
+        raise _difference(differ, system.name, point[0])
 
 
 def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointValues:
@@ -235,11 +219,9 @@ def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
 
 
 def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
-    """Compare the rates of sliding relays' inputs with those that they are to have.
-
-    Python-control's right-hand side is compared with the relays' outputs as machine code has them.
-    That these keep the inputs where they are is seen here, from python-control's own rates.
-    """
+    """Compare the rates of sliding relays' inputs with those that they are to have."""
+    # Python-control's right-hand side is compared with the relays' outputs as machine code has
+    # them. That these keep the inputs where they are is seen here, from python-control's own rates.
     for i, v in trial.relays.items():
         node = compiled.schedule.nodes[i]
         spec = trial.of(node.system).current_spec  # the run's parameters are resolved by now
@@ -261,10 +243,8 @@ def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
 
 
 def _rates_of_input(compiled: Compiled, trial: Trial, i: int, point: Any) -> np.ndarray:
-    """Return how fast a relay's input changes along python-control's own rates.
-
-    By differences before the point, around it and behind it.
-    """
+    """Return how fast a relay's input changes along python-control's own rates."""
+    # By differences before the point, around it and behind it.
     t, x, u = point
     rates = _by_python_control(compiled, point, trial)[0]
     rates[list(compiled.program.memory)] = 0.0  # they stand still within a step
@@ -305,11 +285,9 @@ def _line(values: np.ndarray) -> SuppliedOutput:
 
 
 def _later(point: Any, trial: Trial) -> float:
-    """Return how much later rounding may make it; near t = 0 a part of the run counts.
-
-    It must be seen next to phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
-    1.2e-16 at t = 0.
-    """
+    """Return how much later rounding may make it; near t = 0 a part of the run counts."""
+    # It must be seen next to phases: machine code knows that sin(w t + pi) is -sin(w t), NumPy's is
+    # 1.2e-16 at t = 0.
     step = float(np.max(np.diff(trial.time), initial=0.0))
     return SHAKEN * max(abs(point[0]), step, _PART_OF_RUN * float(np.ptp(trial.time)))
 
@@ -342,9 +320,9 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
                 lambda *near, f=function, s=block: (f(s, *near),), (t, x[own], inputs), (b,),
                 _later(point, trial),
             )  # fmt: skip
-            wrong = np.flatnonzero(~agree(a, b, moved + most))
-            if wrong.size:
-                raise _difference(labels[wrong[0]], node.path, (a[wrong[0]], b[wrong[0]]), t)
+            differ = first_difference([labels], (a,), (b,), (moved + most,))
+            if differ is not None:
+                raise _difference(differ, node.path, t)
 
 
 def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
@@ -414,8 +392,8 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarra
     return outputs
 
 
-def _difference(label: str, block: str, values: tuple[Any, Any], t: float) -> AuditError:
-    ours, theirs = values
+def _difference(differ: tuple[str, float, float], block: str, t: float) -> AuditError:
+    label, ours, theirs = differ
     return AuditError(
         f"machine code and python-control differ at '{label}' of block '{block}': {ours:.17g} and "
         f"{theirs:.17g} at t = {t:.6g} s; nothing was returned: run it with "

@@ -28,12 +28,9 @@ _DECLARED = {  # the functions of a block, and how many values of each are compa
 
 
 def declared_rows(schedule: Schedule, program: Program, located: int) -> np.ndarray:
-    """Return which rows of ``g`` and ``m`` blocks and event functions compute.
-
-    The others, of the `located` ones, are conditions of expressions.
-
-    What an ideal relay declares is of its input's rate too, and is compared as it slides.
-    """
+    """Return which rows of ``g`` and ``m`` blocks and event functions compute."""
+    # The others, of the `located` ones, are conditions of expressions.
+    # What an ideal relay declares is of its input's rate too, and is compared as it slides.
     signed = [_is_own(n) for n in schedule.nodes for _ in range(count_switching_functions(n))]
     kept = [_is_own(node) for node in schedule.nodes for _ in memory(node)]
     unknown = located - len(schedule.watched)

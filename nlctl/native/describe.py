@@ -58,10 +58,8 @@ def described(reading: Reading) -> str:
 
 
 def called(reading: Reading) -> Iterator[str]:
-    """Yield which functions are called as they stand, how, and why: a line each.
-
-    Which of the two ways it is, is known as soon as machine code has been made.
-    """
+    """Yield which functions are called as they stand, how, and why: a line each."""
+    # Which of the two ways it is, is known as soon as machine code has been made.
     made = reading.cache.of(Machine)
     back = {name for each in made for name in each.called_back}
     for name, call in reading.equations.calls.items():

@@ -47,8 +47,7 @@ class SpecLike(Protocol):
     def limits(self) -> Mapping[str, Sequence[Limit]]: ...  # value, from when to when (s)
 
 
-ROWS = 8
-"""Rows of its table that an ensemble prints."""
+ROWS = 8  # rows of its table that an ensemble prints
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

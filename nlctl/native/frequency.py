@@ -18,8 +18,6 @@ from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram, Derivatives
 from .jacobians import tell_of_differences
 
-__all__ = ["frequency_response"]
-
 _WHO = "frequency_response"
 _POINTS = 1000  # of frequencies that nobody has given
 _SLOWER, _FASTER = 1e-3, 10.0  # than the slowest and the fastest of a diagram

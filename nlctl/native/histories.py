@@ -92,10 +92,8 @@ def arriving_first(reading: Reading, task: Any) -> np.ndarray:
 
 
 def with_room(task: Any, work: Any) -> Any:
-    """Return the workspace with places for more steps, where there are none.
-
-    What no delay reaches back to is forgotten; if that is less than half, there is more room.
-    """
+    """Return the workspace with places for more steps, where there are none."""
+    # What no delay reaches back to is forgotten; if that is less than half, there is more room.
     room = work.past.t.shape[0]
     if not task.lines.delays.size or work.past.kept.max() < room:
         return work

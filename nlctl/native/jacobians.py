@@ -16,13 +16,7 @@ from ..arguments import number
 from ..blocks import Block
 from ..delays.transport import PAST
 from ..diagrams import supplied_blocks
-from ..errors import (
-    CompileError,
-    InexactWarning,
-    ParameterError,
-    UnknownKeywordError,
-    UsageError,
-)
+from ..errors import CompileError, InexactWarning, ParameterError, UnknownKeywordError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
@@ -48,26 +42,18 @@ _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
 @dataclass(frozen=True, kw_only=True)
 class Tangent:
-    """The derivatives of a diagram's equations along a direction.
+    """The derivatives of a diagram's equations along a direction."""
 
-    Attributes
-    ----------
-    rows : mapping
-        For ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
-        pairs of an expression, None where it is 0, and its length.
-    assumed : mapping
-        Integer parameters for whose values this holds: place in the parameter vector, and value.
-    """
-
+    # for ``"dx"`` and ``"y"``, and for ``"sample0"`` and so on of sampled blocks' next states,
+    # pairs of an expression, None where it is 0, and its length
     rows: Mapping[str, Sequence[tuple[Expr | None, int]]]
+    # integer parameters for whose values this holds: place in the parameter vector, and value
     assumed: Mapping[int, int]
 
 
 def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
-    """Return what derivatives of a diagram's results are taken by differences of, and why.
-
-    None if all are exact.
-    """
+    """Return what derivatives of a diagram's results are taken by differences of, and why."""
+    # None if all are exact.
     found = reading.equations
     parts = [expr for name in results for expr, _ in found.pieces(name)]
     names = dict.fromkeys(node.data[0] for node in needed(parts) if node.op == "call")
@@ -98,10 +84,8 @@ def _tangent(reading: Reading) -> Tangent:
 
 
 def open_tangent(reading: Reading) -> Tangent:
-    """Return the same where the transport delays are cut: what leaves them are further inputs.
-
-    Behind the outputs follows what arrives at them.
-    """
+    """Return the same where the transport delays are cut: what leaves them are further inputs."""
+    # Behind the outputs follows what arrives at them.
     return _differentiated(reading) if reading.schedule.lines else tangent(reading)
 
 
@@ -148,10 +132,8 @@ def along(
 def jacobian(
     reading: Reading, x0: Any, u0: Any, t: float, params: Any, directions: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return the derivatives of the right-hand side and of the outputs along directions.
-
-    Shapes: `directions` (nstates + inputs of the program + parameters, k).
-    """
+    """Return the derivatives of the right-hand side and of the outputs along directions."""
+    # Shapes: `directions` (nstates + inputs of the program + parameters, k).
     system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
     p = reading.parameter_vector(params)
     check_assumed(reading, made, p)
@@ -269,13 +251,10 @@ def tell_of_differences(reading: Reading) -> None:
 
 
 def over_a_period(reading: Reading, found: Mapping[str, np.ndarray]) -> tuple[Any, Any, float]:
-    """Return the map of a diagram with sampled blocks from period to period, exactly.
-
-    States are taken before what happens at the beginning of a period, outputs after it; inputs
-    are constant over it.  Between instants the map is a matrix exponential.
-
-    returns (nstates, nstates + ninputs).
-    """
+    """Return the map of a diagram with sampled blocks from period to period, exactly."""
+    # States are taken before what happens at the beginning of a period, outputs after it; inputs
+    # are constant over it. Between instants the map is a matrix exponential.
+    # returns (nstates, nstates + ninputs).
     n, width = found["dx"].shape
     meetings = reading.program.meetings
     clocks = clocks_of(node.sampled for node in reading.schedule.nodes)
@@ -337,10 +316,8 @@ def parameter_jacobian(
 
 
 def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
-    """Return the parameters that can be differentiated by: place in `p`, and whose they are.
-
-    Entries of arrays have their index in their names.
-    """
+    """Return the parameters that can be differentiated by: place in `p`, and whose they are."""
+    # Entries of arrays have their index in their names.
     found = {}
     for i, own in reading.program.layout.items():
         for slot in own.values():

@@ -11,8 +11,6 @@ from ..annotations import as_annotated
 from ..upstream.systems import System
 from .compiled import as_compiled
 
-__all__ = ["linearize"]
-
 
 @as_annotated
 def linearize(

@@ -37,43 +37,24 @@ ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "
 
 @dataclass(frozen=True, kw_only=True)
 class Lowered:
-    """A program over batched members ("lanes").
+    """A program over batched members ("lanes")."""
 
-    Attributes
-    ----------
-    functions : mapping
-        Plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``,
-        ``out(t, x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of
-        sampled blocks, or ``point(t, x, u, c)`` and then, as often as there are directions,
-        ``along(t, x, u, c, v, dx)``.  All arrays have a row per number and a
-        column per member, `t` is one row.  `prepare` fills `c` with all that depends on the
-        parameters `p` alone; the rest of `c` is room that the others write to, so members that
-        run at the same time need a `c` each.
-    exact : frozenset of Expr
-        Operations that are rounded one by one.
-    calls : mapping
-        Functions that are called as they stand, by name.
-    solvers : mapping
-        Searches for the signals of algebraic loops, by name.
-    rows : mapping
-        Rows of every array.
-    lanes : int
-        Number of members.
-    conditions : Conditions
-        What it switches at.
-    assumed : mapping
-        Integer parameters that steer what is computed: for places in `p` the values for which the
-        program holds.
-    """
-
+    # plans of ``prepare(p, c)`` and of what is evaluated: ``rhs(t, x, u, c, dx, g, m)``, ``out(t,
+    # x, u, c, y)`` and a ``sample(t, x, u, c, s)`` for each meeting of the clocks of sampled
+    # blocks, or ``point(t, x, u, c)`` and then, as often as there are directions, ``along(t, x, u,
+    # c, v, dx)``.  All arrays have a row per number and a column per member, `t` is one row.
+    # `prepare` fills `c` with all that depends on the parameters `p` alone; the rest of `c` is room
+    # that the others write to, so members that run at the same time need a `c` each
     functions: Mapping[str, Function]
-    exact: frozenset[Expr]
-    calls: Mapping[str, Call]
-    solvers: Mapping[str, Solver]
-    rows: Mapping[str, int]
-    lanes: int
+    exact: frozenset[Expr]  # operations that are rounded one by one
+    calls: Mapping[str, Call]  # functions that are called as they stand, by name
+    solvers: Mapping[str, Solver]  # searches for the signals of algebraic loops, by name
+    rows: Mapping[str, int]  # rows of every array
+    lanes: int  # number of members
+    # integer parameters that steer what is computed: for places in `p` the values for which the
+    # program holds
     assumed: Mapping[int, int]
-    conditions: Conditions = field(default_factory=Conditions)
+    conditions: Conditions = field(default_factory=Conditions)  # what it switches at
 
     @property
     def size(self) -> int:
@@ -103,10 +84,8 @@ class Lowered:
 
     @property
     def portable(self) -> frozenset[str]:
-        """Functions that round alike on every processor: a computer's program is what runs there.
-
-        What samples compute, and what they read of parameters.
-        """
+        """Functions that round alike everywhere: a computer's program is what runs there."""
+        # What samples compute, and what they read of parameters.
         samples = {name for name in self.functions if name.startswith("sample")}
         return frozenset(samples | {"prepare"} if samples else ())
 
@@ -181,11 +160,9 @@ def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
 def planned(
     stores: Mapping[str, list[Store]], arguments: Mapping[str, tuple[str, ...]], parameters: int
 ) -> tuple[dict[str, Function], int]:
-    """Return the plans of all functions, and how many rows of `c` they need.
-
-    What depends on parameters alone is computed by `prepare`, and what else depends on no
-    direction by `point`.
-    """
+    """Return the plans of all functions, and how many rows of `c` they need."""
+    # What depends on parameters alone is computed by `prepare`, and what else depends on no
+    # direction by `point`.
     results = [s.expr for part in stores.values() for s in part]
     varying = {node for node in needed(results) if node.varies}
     known = _computed_before(results, varying, parameters)
@@ -240,10 +217,8 @@ def _computed_before(
     rows: int,
     known: Mapping[Expr, tuple[str, int]] | None = None,
 ) -> dict[Expr, tuple[str, int]]:
-    """Return what is used and is not inside, with its place in `c`, beyond what is known already.
-
-    A parameter has the place there that it has in `p`; what is computed lies from `rows` on.
-    """
+    """Return what is used and is not inside, with its place in `c`, beyond what is known."""
+    # A parameter has the place there that it has in `p`; what is computed lies from `rows` on.
     known, inside = known or {}, set(inside)
     nodes = needed(results, known)
     used = set(results) - inside

@@ -25,27 +25,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Members:
-    """What differs between the runs of an ensemble.
-
-    Attributes
-    ----------
-    compiled : Compiled
-    params, states : mapping
-        Values by name, each one number or an array with an entry per member.
-    size : int
-        Number of members.
-    """
+    """What differs between the runs of an ensemble."""
 
     compiled: Compiled
+    # values by name, each one number or an array with an entry per member
     params: Mapping[str, np.ndarray]
     states: Mapping[str, np.ndarray]
-    size: int
+    size: int  # number of members
 
     def batch(self, numbers: range, width: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return initial states (states, width) and parameter vectors (parameters, width).
-
-        Where there are fewer members, the last one is repeated.
-        """
+        """Return initial states (states, width) and parameter vectors (parameters, width)."""
+        # Where there are fewer members, the last one is repeated.
         chosen = np.minimum(np.arange(numbers.start, numbers.start + width), numbers.stop - 1)
         x0 = np.repeat(self._first_state[:, None], width, axis=1)
         for name, values in self.states.items():
@@ -69,11 +59,9 @@ class Members:
 
     @cached_property
     def varied(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places in the parameter vector that vary, and their values (places, members).
-
-        nlctl's blocks check and derive their own parameters, and only those that vary do;
-        third-party parameters go through python-control, member by member.
-        """
+        """Places in the parameter vector that vary, and their values (places, members)."""
+        # nlctl's blocks check and derive their own parameters, and only those that vary do; third-
+        # party parameters go through python-control, member by member.
         owners = self._owners
         if owners is None:
             places = np.arange(self._first_vector.size)
@@ -167,10 +155,8 @@ def members(compiled: Compiled, params: Mapping[str, Any], states: Any) -> Membe
 
 
 def _by_name(system: Any, states: Any) -> dict[str, np.ndarray]:
-    """Return states by name that are given as one state, or as a row for each member.
-
-    States that no member changes are left out.
-    """
+    """Return states by name that are given as one state, or as a row for each member."""
+    # States that no member changes are left out.
     given = as_numbers(states)
     if given is not None and given.ndim == 2:
         rows = np.array([_member_state(system, k, row) for k, row in enumerate(given)])

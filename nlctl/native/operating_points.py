@@ -23,8 +23,6 @@ from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram
 from .happened import row_labels
 
-__all__ = ["OperatingPoint", "find_operating_point", "find_operating_points"]
-
 _WHO = "find_operating_point"
 _FOUND = 1e-8  # residual, relative to what it is made of
 _AT_KINK = 1e-9

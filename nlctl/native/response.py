@@ -101,11 +101,9 @@ def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
 
 
 def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the times of a run with inputs at `times` that is `wanted` at other times.
-
-    A sampled system starts with the first of these; in between inputs are linear, and have their
-    break points where they were given.
-    """
+    """Return the times of a run with inputs at `times` that is `wanted` at other times."""
+    # A sampled system starts with the first of these; in between inputs are linear, and have their
+    # break points where they were given.
     if system.isdtime(strict=True):
         return wanted
     return np.union1d(times if system.ninputs else times[[0, -1]], wanted)

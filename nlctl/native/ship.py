@@ -36,10 +36,8 @@ def ship(path: Path = SHIPPED) -> None:
 
 
 def source_files(*modules: str) -> list[str]:
-    """Return the files of the engine that modules are made of: themselves and what they import.
-
-    By default those of the integrators.
-    """
+    """Return the files of the engine that modules are made of: themselves and what they import."""
+    # By default those of the integrators.
     found = [*(modules or ("integrate/advance.py", "integrate/start.py", "integrate/workspace.py"))]
     for name in found:  # which grows meanwhile
         found += [other for other in dict.fromkeys(_imported(HERE / name)) if other not in found]

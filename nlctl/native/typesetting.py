@@ -26,10 +26,10 @@ from ..expressions.latex import Index, LatexWriter, index_text, number_text, sym
 from ..params import declared_params
 from ..sliding.relay import SLIDING
 from ..upstream.systems import System
-from .diagram.feedthrough import feedthrough
 from .diagram.nodes import Node
 from .diagram.parameters import Slot, slots_of
 from .diagram.schedule import Schedule, Signal, schedule
+from .diagram.trace import feedthrough
 from .equations.reader import Reader
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
@@ -260,10 +260,8 @@ def _entry(name: str, slot: Slot, index: Index) -> str:
 
 
 def _beside_a_profiler(function: Callable[[], Any]) -> Any:
-    """Return what a function returns that sets a profiler of its own, as `_local_names` does.
-
-    Where one is at work, such as cProfile's, which Python cannot set again, in another thread.
-    """
+    """Return what a function returns that sets a profiler of its own, as `_local_names` does."""
+    # Where one is at work, such as cProfile's, which Python cannot set again, in another thread.
     if sys.getprofile() is None:
         return function()
     with ThreadPoolExecutor(1) as thread:

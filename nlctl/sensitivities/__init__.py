@@ -1,11 +1,11 @@
 """Derivatives of runs by parameters and initial states.
 
 `names` looks up of what and by what, `schedule` makes room for them in a diagram's, `source` has
-its equations in parts, `branches`, `kinks` and `sides` are about jumps, `saltation` about
+its equations in parts, `branches` and `sides` are about jumps, `saltation` about
 derivatives there, `program` puts all of that together, `run` integrates it, and `missing` says
 where there is no derivative.  `gradients` are those of metrics and margins, `fitting`
-finds parameters from data, `tuning` gains for requirements: `worth` makes its runs, `tuned` is
-what it returns, and `tuning_notes` what it has to say.
+finds parameters from data, `tuning` gains for requirements: `worth` makes its runs, `tuned` is what
+it returns.
 """
 
 from .fitting import Fit, fit

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 from ..expressions.graph import Expr, Graph, needed
 
-__all__ = ["Branch", "branch_of", "jumping"]
-
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
 _QUOTIENTS = {"remainder": "floor", "fmod": "trunc"}

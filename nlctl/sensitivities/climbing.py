@@ -17,8 +17,6 @@ from scipy.optimize import linprog, minimize
 
 from .worth import LOST_MARGIN, Worth
 
-__all__ = ["lower_cost", "raise_least_margin"]
-
 _REACH = 0.5  # of the first step, in widths of the box
 _SHORTEST = 2e-3  # of a reach
 _KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, more doubles it
@@ -61,17 +59,11 @@ def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
 
 
 def _step(
-    at: np.ndarray,
-    here: Worth,
-    others: list[tuple[np.ndarray, Worth]],
-    reach: float,
-    effort: float,
+    at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float, effort: float
 ) -> tuple[np.ndarray, float]:
-    """Return the best step within reach if margins were linear, and what it promises.
-
-    Slopes of other choices of gains count, too, as far as they do not say less of this one than
-    what is known of it.
-    """
+    """Return the best step within reach if margins were linear, and what it promises."""
+    # Slopes of other choices of gains count, too, as far as they do not say less of this one than
+    # what is known of it.
     rows, limits, k = [], [], at.size
     for place, worth in [(at, here), *others]:
         rows.append(np.hstack([-worth.slopes, worth.slopes, np.ones((len(worth.slopes), 1))]))

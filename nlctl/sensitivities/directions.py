@@ -9,8 +9,6 @@ from ..errors import CompileError
 from ..expressions.derivatives import tangents
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["Direction", "from_time", "one_sided", "rows_replaced", "slopes", "taken"]
-
 SomeRows = tuple[Expr, int]  # some rows: one expression, and how many
 Taken = Callable[[int, int, int | None], Expr | None]  # rows from, step, number
 
@@ -104,20 +102,15 @@ def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
 
 
 def one_sided(graph: Graph, exprs: Sequence[Expr], direction: Direction) -> list[Expr]:
-    """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads.
-
-    Their derivatives along that direction are those to its own side.
-    """
+    """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads."""
+    # Their derivatives along that direction are those to its own side.
     new: dict[Expr, Expr] = {}
     for node in needed(exprs):
         args = tuple(new.get(a, a) for a in node.args)
         if node.op in ("maximum", "minimum", "absolute") and node.varies:
             new[node] = _leading(graph, node.op, args, direction)
         elif args != node.args:
-            new[node] = graph.node(
-                node.op, *args, data=node.data, size=node.size, kind=node.kind,
-                varies=node.varies, value=node.value,
-            )  # fmt: skip
+            new[node] = graph.like(node, *args)
     return [new.get(e, e) for e in exprs]
 
 

@@ -25,8 +25,6 @@ from .response import sensitivity_response
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Fit", "fit"]
-
 _UNKNOWN = 1e-9  # of the largest singular value: a direction in which data say nothing
 _SHARE = 0.1  # of such a direction: parameters with less are not in it
 _LOST = 1e6  # noises: what a run that does not reach its end is wrong by

@@ -12,8 +12,6 @@ from ..names import unknown
 from ..native.ensemble_result import MetricLike
 from .record import SensitivityResponse
 
-__all__ = ["MetricGradient", "metric_gradient"]
-
 _STEP = 1e-5  # of the size of the signals
 _AGREE = 1e-5  # of both sides, or of a change by all of itself: less is that of the step
 

@@ -17,8 +17,6 @@ from ..native.results import Trajectory
 from .program import Differentiated
 from .record import NoDerivative
 
-__all__ = ["missing"]
-
 _TOGETHER = "two things happen at one instant, and each alone at another if it is moved"
 _GRAZING = "a condition is met at a rate of 0 (grazing), and may not be met if it is moved"
 _RETURNS = "a jump at a time that moves comes back through a delay"

@@ -18,9 +18,6 @@ from ..native.diagram.wiring import Signal as Output
 from ..native.jacobians import check_enters_alone, float_parameters
 from ..params import declared_params
 
-__all__ = ["Observed", "VariedQuantity", "declared_bounds", "observed_signals"]
-__all__ += ["varied_quantities"]
-
 _AT_START = "(0)"
 
 
@@ -128,3 +125,51 @@ def _checked(what: str, names: Any) -> list[str]:
         if list(names).count(name) > 1:
             raise ParameterError(f"{what} has '{name}' twice")
     return list(names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatePlaces:
+    """States of a program with derivatives, one group behind the other."""
+
+    states: int  # of the diagram; their derivatives follow, those by one quantity together
+    by: int  # number of quantities
+    branches: int = 0  # number of sides of jumps that are kept
+
+    def derivative(self, j: int) -> int:
+        """Return where the derivatives by quantity `j` begin."""
+        return self.states * (1 + j)
+
+    @property
+    def kept(self) -> int:
+        """Where the sides begin that are kept."""
+        return self.states * (1 + self.by)
+
+    @property
+    def together(self) -> int:
+        """When two conditions were first met at one instant, by different derivatives."""
+        return self.kept + self.branches
+
+    @property
+    def grazing(self) -> int:
+        """When a condition was first met at a rate of 0."""
+        return self.together + 1
+
+    @property
+    def jumped(self) -> int:
+        """When something first jumped at a time that moves."""
+        return self.together + 2
+
+    @property
+    def last(self) -> int:
+        """When a block last jumped, at a guard or a clock."""
+        return self.together + 3
+
+    @property
+    def at_reset(self) -> int:
+        """When a guard and a condition were first met at one instant."""
+        return self.together + 4
+
+    @property
+    def size(self) -> int:
+        """Number of all states."""
+        return self.together + 5

@@ -19,14 +19,11 @@ from ..native import Compiled
 from ..native.diagram.program import Program
 from ..native.equations.blocks import Equations
 from .directions import Direction, SomeRows
-from .names import Observed, VariedQuantity
-from .places import StatePlaces
+from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
 from .schedule import Extended, extended, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
-
-__all__ = ["Differentiated", "parameters_with", "with_its_derivatives"]
 
 _LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
 

@@ -14,8 +14,6 @@ from ..wording import counted
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["NoDerivative", "SensitivityResponse"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class NoDerivative:

@@ -15,8 +15,6 @@ from ..responses.arguments import checked_params
 from .record import SensitivityResponse
 from .run import RunWithDerivatives, differentiated_run
 
-__all__ = ["sensitivity_response"]
-
 
 @as_annotated
 def sensitivity_response(

@@ -27,8 +27,6 @@ from .names import Observed, VariedQuantity, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
 from .record import SensitivityResponse
 
-__all__ = ["RunWithDerivatives", "differentiated_run"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class RunWithDerivatives:
@@ -58,14 +56,18 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     x0 = state_array(compiled.system, run.initial_state)
     p = compiled.parameter_vector(run.params)
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
-    scale = _scale(quantities, p, x0)
+    values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
+    scale = np.array([abs(v) or 1.0 for v in values])
     span = float(run.times[-1] - run.times[0])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start = _start(differentiated, quantities, run, (u, x0, scale), whole)
     integrated = trajectory(differentiated.compiled, run.times, u, start, whole, run.settings)
     _audit(compiled, integrated, p, run)
     if integrated.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
-        _raise_of_run(compiled, run)
+        respond(
+            compiled, run.times, run.inputs, run.initial_state, settings=run.settings,
+            params=run.params, audit=False,
+        )  # fmt: skip
     names = tuple(quantity.name for quantity in quantities)
     lacks = missing(differentiated, (compiled, names), integrated, (run.times, start, whole, u))
     return _response(differentiated, (signals, quantities), (run.times, integrated), scale, lacks)
@@ -104,12 +106,6 @@ class _Kept:
 
     key: str
     differentiated: Differentiated
-
-
-def _scale(quantities: Sequence[VariedQuantity], p: np.ndarray, x0: np.ndarray) -> np.ndarray:
-    """Return of what size each quantity is: that of its value, 1 for 0."""
-    values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
-    return np.array([abs(v) or 1.0 for v in values])
 
 
 def _start(
@@ -169,14 +165,6 @@ def _audit(
         inputs=inputs, p=p, params=run.params, width=1,
     )  # fmt: skip
     audit(compiled, trial, run.audit)
-
-
-def _raise_of_run(compiled: Compiled, run: RunWithDerivatives) -> None:
-    """Raise the error of a run that does not reach its end, with its own words."""
-    respond(
-        compiled, run.times, run.inputs, run.initial_state, settings=run.settings,
-        params=run.params, audit=False,
-    )  # fmt: skip
 
 
 def _response(

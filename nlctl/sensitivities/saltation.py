@@ -20,11 +20,9 @@ from functools import cached_property
 from ..expressions.graph import Expr, Graph, needed
 from ..native.sliding.pieces import replaced_parts
 from .directions import Direction, SomeRows, Taken, rows_replaced
-from .places import StatePlaces
+from .names import StatePlaces
 from .sides import KeptSide, KeptSides
 from .source import EquationParts
-
-__all__ = ["Saltation"]
 
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
@@ -110,12 +108,10 @@ class Saltation:
 
     @cached_property
     def turning(self) -> list[tuple[Expr, Expr]]:
-        """What falls through 0 where a level turns away from 0, and whether it has touched it.
-
-        That is where d(level^2) / dt rises through 0: at conditions that are met, and where one is
-        nearly met.  With memories that switch, what is at rest has levels that are noise, and
-        nothing is looked for.
-        """
+        """What falls through 0 where a level turns away from 0, and whether it has touched it."""
+        # That is where d(level^2) / dt rises through 0: at conditions that are met, and where one
+        # is nearly met. With memories that switch, what is at rest has levels that are noise, and
+        # nothing is looked for.
         graph, turns = self.source.graph, []
         for side in () if self.source.switched else self.sides.sides:
             for k in range(0 if side.timed else side.rows):
@@ -172,10 +168,8 @@ class Saltation:
         return rows_replaced(graph, pieces, {m: self._kept(j, m) for m in self.source.driven})
 
     def _kept(self, j: int, m: int, at_turn: bool = False) -> Expr:
-        """Return the derivative of a memory, which is integrated only while it is not driven.
-
-        A step ends a little behind where it has reversed.
-        """
+        """Return the derivative of a memory, which is integrated only while it is not driven."""
+        # A step ends a little behind where it has reversed.
         graph = self.source.graph
         kept = self.sides.memories[m]
         become = self.source.driven[m]
@@ -198,10 +192,8 @@ class Saltation:
         return graph.op("select", moved, derivative, integrated)
 
     def _late(self, become: Expr) -> Expr:
-        """Return how long ago what drives a memory has reversed, 0 at a break.
-
-        Where it turns is located by a difference of rates: a little too early or too late.
-        """
+        """Return how long ago what drives a memory has reversed, 0 at a break."""
+        # Where it turns is located by a difference of rates: a little too early or too late.
         graph, source = self.source.graph, self.source
         zero = graph.const(0.0)
         forward = source.time(source.flow, delays_move=False)
@@ -241,10 +233,8 @@ class Saltation:
         return jumped
 
     def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
-        """Return the derivatives of expressions, with memories as they are kept.
-
-        The derivatives of the states are put in last: what they say of memories stays.
-        """
+        """Return the derivatives of expressions, with memories as they are kept."""
+        # The derivatives of the states are put in last: what they say of memories stays.
         graph, source = self.source.graph, self.source
 
         def place(start: int, step: int, size: int | None) -> Expr | None:
@@ -260,10 +250,8 @@ class Saltation:
         return replaced_parts(graph, kept, ways)
 
     def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
-        """Return driven memories after a jump of other states.
-
-        First they are what has driven them until then.
-        """
+        """Return driven memories after a jump of other states."""
+        # First they are what has driven them until then.
         driven = self.source.driven
         return {
             m: self.source.with_states([become], {**rows, m: become})[0]
@@ -367,11 +355,9 @@ class Saltation:
         return graph.op("add", graph.op("mul", rtol, extent), atol)
 
     def _of_causes(self, causes: Sequence[Cause]) -> When:
-        """Return how the time moves, by the first condition that was met at a rate.
-
-        What is left of a state at rest, such as a velocity that sticks, may change its sign where
-        something else sets it in motion.  That is met at no rate, and says nothing.
-        """
+        """Return how the time moves, by the first condition that was met at a rate."""
+        # What is left of a state at rest, such as a velocity that sticks, may change its sign where
+        # something else sets it in motion. That is met at no rate, and says nothing.
         graph = self.source.graph
         no, zero = graph.const(False), graph.const(0.0)
         moves, grazes, moving = [zero] * self.places.by, no, no

@@ -17,9 +17,6 @@ from ..native.diagram.parameters import Slot, length
 from ..native.diagram.schedule import Schedule
 from ..native.diagram.wiring import Signal
 
-__all__ = ["Extended", "extended", "stand_in"]
-
-
 _OWNERS = 3  # blocks of the derivatives' own: see `Extended.owner`
 
 

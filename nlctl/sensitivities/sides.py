@@ -12,8 +12,6 @@ from .branches import Branch, branch_of
 from .directions import SomeRows
 from .source import EquationParts
 
-__all__ = ["KeptSide", "KeptSides", "sides_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class KeptSide:

@@ -15,8 +15,6 @@ from ..wording import counted
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Tuned"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tuned:

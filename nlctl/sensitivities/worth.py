@@ -15,12 +15,9 @@ from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
 from .response import sensitivity_response
 
-__all__ = ["LOST_MARGIN", "PER_DERIVATIVE", "Runs", "TuningProblem", "Worth", "checked_samples"]
-
-LOST_MARGIN = -1e3
-"""The margin of a run that does not reach its end."""
+LOST_MARGIN = -1e3  # the margin of a run that does not reach its end
+# of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`
 PER_DERIVATIVE = 0.7
-"""Of a run: what one with derivatives costs more for each, as `benchmarks/sensitivities.py`."""
 _STEP = 1e-3  # of differences, in the unit cube
 _NEAREST = 6  # parts of a requirement that count: the lowest
 
@@ -361,10 +358,8 @@ def _graded(margins: np.ndarray) -> np.ndarray:
 
 
 def _lowest(values: np.ndarray, lengths: Sequence[int]) -> np.ndarray:
-    """Return the lowest parts that are not higher than the pieces of time next to them.
-
-    Others are least where they end, at what the piece next to them has, too.
-    """
+    """Return the lowest parts that are not higher than the pieces of time next to them."""
+    # Others are least where they end, at what the piece next to them has, too.
     lowest, first = [], 0
     for length in lengths:
         row = np.pad(values[first : first + length], 1, constant_values=np.inf)

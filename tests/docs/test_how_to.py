@@ -63,3 +63,12 @@ def test_signatures_on_the_page_are_those_of_the_header():
     header = c_files(controller)["controller.h"]
     (declared,) = blocks("export.md", "c")
     assert all(line in header for line in declared.splitlines())
+
+
+@pytest.mark.ci
+def test_code_of_a_page_that_runs_runs():
+    needed("ziglang", "export")
+    (code,) = blocks("live.md", "python")
+    names = {}
+    exec(compile(code, "live.md", "exec"), names)
+    assert "live" in names["page"].numbers

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlctl.expressions.graph import Graph
-from nlctl.expressions.ordered import implied_by
+from nlctl.expressions.trace import implied_by
 
 ORDERS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge}
 NUMBERS = (1.0, 2.0, 3.0)

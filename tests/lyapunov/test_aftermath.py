@@ -10,7 +10,7 @@ from rows import each_row
 from scipy.integrate import quad, solve_ivp
 
 from nlctl.analysis.lyapunov import aftermath
-from nlctl.analysis.lyapunov.nussbaum.outcome import outcome
+from nlctl.analysis.lyapunov.nussbaum.long_run import outcome
 from nlctl.analysis.lyapunov.nussbaum.property import lobe_around
 from nlctl.analysis.lyapunov.nussbaum.slow_drift import Balance, SlowDrift
 from nlctl.errors import ParameterError

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl.analysis.intervals.branch_and_bound import Box
+from nlctl.analysis.intervals.box import Box, visited_box
 from nlctl.analysis.lyapunov.bounds.decomposition import DecompositionError
-from nlctl.analysis.lyapunov.constants import constants, disturbance, kappa, visited_box
+from nlctl.analysis.lyapunov.constants import constants, disturbance, kappa
 from nlctl.errors import DiagramError, ParameterError, UnknownNameError
 
 BOX_1 = Box.of(x1=(-0.85, 1.0), x2=(-0.55, 1.1), v=(-12, 6))

@@ -23,8 +23,8 @@ from nlctl.analysis.lyapunov import (
     sharpest,
     signals_of,
 )
-from nlctl.analysis.lyapunov.assumptions import assumptions
 from nlctl.analysis.lyapunov.inequalities import terms
+from nlctl.analysis.lyapunov.lines import assumptions
 from nlctl.analysis.lyapunov.loop.instrumented import input_gain
 from nlctl.analysis.lyapunov.loop.signals import Signals, inequality
 from nlctl.errors import DiagramError

@@ -9,8 +9,7 @@ import nlctl
 from nlctl.errors import AuditError
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.native.audit import Trial, rounding
-from nlctl.native.rounding.nudged import ROUNDINGS, nudged_values
-from nlctl.native.rounding.shaken import Shaken, unit
+from nlctl.native.rounding.nudged import ROUNDINGS, Shaken, nudged_values, unit
 
 TIMES = np.linspace(0, 1, 23)
 STARTS = (0.4, 1e-2, 1e-3, 1e-5, 3e-7, -2e-4)

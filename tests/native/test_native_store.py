@@ -26,9 +26,9 @@ import nlctl
 from nlctl.errors import CacheWarning, CompileError
 from nlctl.native.integrators import integrator_key
 from nlctl.native.machine import finish, store
+from nlctl.native.machine.calls import loaded
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
-from nlctl.native.machine.module import loaded
 from nlctl.native.opaque.called import TAUGHT
 from nlctl.native.opaque.calls import Source
 

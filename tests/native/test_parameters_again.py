@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import nlctl
 from nlctl.diagrams import apart
-from nlctl.diagrams.standing import standing
+from nlctl.native.reading import standing
 
 
 def decay(t, x, u, params):

@@ -43,7 +43,10 @@ ROOMS = (  # where these hold
     *(f"analysis/{name}" for name in ("intervals", "lyapunov", "metrics", "recheck")),
     *("analysis/robustness", "analysis/studies", "benchmarks", "campaign"),
     *(f"nlctl/{name}" for name in ("actuators", "diagrams", "drawing", "expressions", "faults")),
-    *("nlctl/host", "nlctl/sensitivities"),
+    *("nlctl/controllers", "nlctl/host", "nlctl/sensitivities"),
+    *(f"nlctl/native/{name}" for name in ("codegen", "diagram", "enclosures", "equations")),
+    *(f"nlctl/native/{name}" for name in ("machine", "opaque", "purity", "rounding", "stepping")),
+    "nlctl/native/tubes",
 )
 ELSEWHERE = ("analysis/studies/page/",)
 VAGUE = {"each", "found", "made", "own", "told", "wanted"}  # a variable names the thing

@@ -15,7 +15,7 @@ from nlctl.analysis.pages.study.loop import StudyLoop, loop_of, loop_sections
 from nlctl.analysis.pages.study.report import study_report
 from nlctl.analysis.report import Equation, Figure, Table, render_html
 from nlctl.analysis.robustness import Requirement, always, eventually, in_band, prepare
-from nlctl.analysis.robustness.stl.limits import limits_of_requirements
+from nlctl.analysis.robustness.stl.spec import limits_of_requirements
 from nlctl.analysis.studies import read_study, run
 
 

@@ -26,8 +26,6 @@ from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
 from .motion import StateRates, motion_of
 
-__all__ = ["BARRIER", "Barrier", "barrier"]
-
 _STRICT = 1e-9  # B' < 0 and B > 0 are proved with this margin
 _RATES = (0.0, 1.0, -1.0, 5.0)  # k of the proposals' B' + k B < 0
 _ROUNDS = 60  # proposals for each of them
@@ -386,8 +384,5 @@ def _proposal(problem: _Problem, k: float) -> np.ndarray | None:
 
 
 BARRIER = ProofKind(
-    name="barrier",
-    about="starts and states that are unsafe",
-    result=Barrier,
-    find="barrier",
+    name="barrier", about="starts and states that are unsafe", result=Barrier, find="barrier"
 )

@@ -15,8 +15,6 @@ from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from ...intervals.box import Box
 from .motion import StateRates
 
-__all__ = ["ProvedLevel", "Quadratic", "largest_level"]
-
 _STRICT = 1e-9  # V' < 0 is proved as V' <= -1e-9 where V is not small
 _FACE = 20_000  # boxes on a face
 _SMALLEST = 2.0**-40  # of the level that fits into the box: an inner set below it is none
@@ -152,11 +150,9 @@ def _holds(V: Quadratic, level: float, box: Box) -> bool:
 
 
 def _floor(V: Quadratic, fits: float, box: Box) -> float:
-    """Return a level below which V' < 0 follows from the Jacobian alone; 0 for none.
-
-    f(x) = J (x - at) with J among the Jacobians of the segment, so that V' < 0 where P J + J^T P is
-    negative definite for all of them.
-    """
+    """Return a level below which V' < 0 follows from the Jacobian alone; 0 for none."""
+    # f(x) = J (x - at) with J among the Jacobians of the segment, so that V' < 0 where P J + J^T P
+    # is negative definite for all of them.
     level = fits * 0.25
     while level > fits * _SMALLEST:
         low, high = (side[:-2] for side in _sides(V, level, 0.0, box))

@@ -23,8 +23,6 @@ from nlctl.native.enclosures.rates import state_rates, with_leaves
 
 from ...intervals.box import Box
 
-__all__ = ["StateRates", "motion_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class StateRates:

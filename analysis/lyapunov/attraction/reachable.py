@@ -22,8 +22,6 @@ from nlctl.wording import counted
 from ...intervals.box import Box
 from .motion import motion_of
 
-__all__ = ["ReachableSet", "reachable_set"]
-
 _THREADS = 2
 _CELLS = 200  # parts of the time for which there are bounds
 _Status = Literal["proved", "refuted", "undecided"]

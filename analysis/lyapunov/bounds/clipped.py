@@ -12,16 +12,13 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import number
 from nlctl.functions import clip
 
+from ...intervals.agreement import UNREAD, reads_time
 from ...intervals.arithmetic import Ball, as_ball, common
 from ...intervals.branch_and_bound import Box, Range, Undecided, enclose
 from ...intervals.quotient import slope_in
-from ...intervals.time_dependence import UNREAD, reads_time
-
-__all__ = ["Edge", "clipped_split", "eps_range"]
 
 _UNTIMED, _TIMED = 50_000, 1_000  # boxes; the latter cannot be divided in time
-Edge = Callable[[Any, Any], Any]
-"""Output at an input and a time."""
+Edge = Callable[[Any, Any], Any]  # output at an input and a time
 
 
 @as_annotated
@@ -66,10 +63,8 @@ def clipped_split(k_1: float, k_2: float) -> Callable[[Any, Any], Any]:
 def eps_range(
     k: tuple[float, float], edges: tuple[Edge, Edge], u_max: float, tol: float
 ) -> tuple[Range, Range]:
-    """Return the ranges of eps_u along both edges, for all t >= 0.
-
-    It grows with v, so that these are its ends.
-    """
+    """Return the ranges of eps_u along both edges, for all t >= 0."""
+    # It grows with v, so that these are its ends.
     part = clipped_split(*k)
 
     def along(edge: Edge) -> Range:
@@ -90,11 +85,10 @@ def eps_range(
 
 
 def _sharpened(rest: Any, edge: Edge, k: tuple[float, float], u: Any, t: Any) -> Any:
-    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t).
-
-    v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and what
-    lies between 0 and v(0, t).  Between v and its clipped self intervals forget that t is one time.
-    """
+    """Return eps_u from the difference quotient q of v in u as well, v = q u + v(0, t)."""
+    # v - clip(v, k_1 u, k_2 u) grows with v, and no faster: it is u (q - clip(q, k_1, k_2)) and
+    # what lies between 0 and v(0, t). Between v and its clipped self intervals forget that t is one
+    # time.
     try:
         q, start = slope_in(lambda w: edge(w, t), u).value, as_ball(edge(0.0, t)).value
     except Undecided:

@@ -25,8 +25,6 @@ from ...intervals.agreement import on_balls
 from ...intervals.branch_and_bound import Range
 from .clipped import Edge, clipped_split, eps_range
 
-__all__ = ["Decomposable", "Decomposition", "DecompositionError", "decompose"]
-
 _TIMES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 100.0, 1000.0)  # s; at which declared splits are tried
 
 
@@ -139,11 +137,7 @@ def check_gain(who: str, k: Any) -> None:
 
 @as_annotated
 def decompose(
-    actuator: Any,
-    *,
-    k: tuple[float, float] | None = None,
-    u_max: float = 60.0,
-    tol: float = 1e-4,
+    actuator: Any, *, k: tuple[float, float] | None = None, u_max: float = 60.0, tol: float = 1e-4
 ) -> Decomposition:
     """Split an actuator as v = k u + eps_u and bound k and eps_u.
 

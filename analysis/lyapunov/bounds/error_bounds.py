@@ -20,8 +20,6 @@ from nlctl.errors import ParameterError
 from nlctl.params import equation_arguments
 from nlctl.references import SumOfSines
 
-__all__ = ["error_bounds", "filter_poles", "reference_bounds"]
-
 _ROUNDING = 1e-12  # added to what double precision has summed up
 
 
@@ -46,11 +44,9 @@ def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
 
 
 def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) -> tuple[arb, ...]:
-    """Bound |e_1|, ..., |e_n| for all time by |r| <= C and the initial error.
-
-    With z_0 = r and z_k' = -p_k z_k + z_{k-1}, e_1 = z_{n-1}: |z_k| <= max(|z_k(0)|, C_{k-1}/p_k),
-    and every e_i is a combination of the z_k.
-    """
+    """Bound |e_1|, ..., |e_n| for all time by |r| <= C and the initial error."""
+    # With z_0 = r and z_k' = -p_k z_k + z_{k-1}, e_1 = z_{n-1}: |z_k| <= max(|z_k(0)|,
+    # C_{k-1}/p_k), and every e_i is a combination of the z_k.
     poles = filter_poles(lambdas)
     n = len(poles) + 1
     # rows[k]: coefficients of e_1, e_1', ... in z_k = (s + p_{k+1}) ... (s + p_{n-1}) e_1
@@ -82,14 +78,13 @@ def _dot(row: Sequence[arb], values: Sequence[arb | float]) -> arb:
 
 @functools.lru_cache(maxsize=32)
 def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[float, ...]:
-    """Return sup |yd|, ..., sup |yd^(n)| over all time of a sum of sines.
-
-    Where the frequencies, as the doubles that they are, have a common period of moderate length,
-    from samples of the reference's own equation over it: between two samples h apart a function
-    exceeds the nearer one by at most |y'| h/2 + sup|y''| h^2/8.  Otherwise, and at most, the sum of
-    the amplitudes: 0.5 and 1 have a period, and so have 0.1 and 0.2, but 0.1 and 0.3 have none,
-    since the double next to 0.3 is not three times that next to 0.1 and their phases drift apart.
-    """
+    """Return sup |yd|, ..., sup |yd^(n)| over all time of a sum of sines."""
+    # Where the frequencies, as the doubles that they are, have a common period of moderate length,
+    # from samples of the reference's own equation over it: between two samples h apart a function
+    # exceeds the nearer one by at most |y'| h/2 + sup|y''| h^2/8. Otherwise, and at most, the sum
+    # of the amplitudes: 0.5 and 1 have a period, and so have 0.1 and 0.2, but 0.1 and 0.3 have
+    # none, since the double next to 0.3 is not three times that next to 0.1 and their phases drift
+    # apart.
     a, w = np.abs(reference.amplitudes), np.array(reference.frequencies)
     n = reference.order
     largest = [float(np.sum(a * w**k)) * (1 + _ROUNDING) for k in range(n + 3)]

@@ -10,42 +10,27 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["KAPPA", "Gains", "alpha_0", "alpha_1", "final_bound", "initial_V", "total_error"]
-
-KAPPA = 0.2785
-"""Bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it."""
+KAPPA = 0.2785  # bound of s - s tanh s for s >= 0, (29); `nlctl.analysis.lyapunov.kappa` proves it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """Gains of the controller (23)-(25), and where it starts.
+    """Gains of the controller (23)-(25), and where it starts."""
 
-    Attributes
-    ----------
-    beta : float
-        Gain of r, (23).
-    Gamma, sigma_1 : float
-        Adaptation gain and sigma-modification of W_hat, (25).
-    gamma, sigma_2, tau : float
-        Adaptation gain, sigma-modification and width of the robust term, (25).
-    r_0, delta_hat_0 : float
-        r(0) and delta_hat(0).
-    W_hat_0 : tuple of float
-        W_hat(0); empty where there is no network.
-    b : float
-        Width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta +
-        0.2785 b; 0 for eta of (23).
-    """
-
-    beta: float
+    beta: float  # gain of r, (23)
+    # adaptation gain and sigma-modification of W_hat, (25)
     Gamma: float
     sigma_1: float
+    # adaptation gain, sigma-modification and width of the robust term, (25)
     gamma: float
     sigma_2: float
     tau: float
+    # r(0) and delta_hat(0)
     r_0: float
     delta_hat_0: float
-    W_hat_0: tuple[float, ...]
+    W_hat_0: tuple[float, ...]  # w_hat(0); empty where there is no network
+    # width of the smooth sign of r s in a law with a damped base, r (beta r + s) <= r eta + 0.2785
+    # b; 0 for eta of (23)
     b: float = 0.0
 
 
@@ -55,10 +40,8 @@ def total_error(G_max: Any, eps_u: Any, d: Any, eps: Any) -> Any:
 
 
 def alpha_1(gains: Gains) -> float:
-    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31).
-
-    Without a network its term drops out.
-    """
+    """Return alpha_1 = min{2 beta, sigma_1 / lambda_max(Gamma^-1), sigma_2 gamma}, (31)."""
+    # Without a network its term drops out.
     rates = [2 * gains.beta, gains.sigma_2 * gains.gamma]
     if gains.W_hat_0:
         rates.append(gains.sigma_1 * gains.Gamma)
@@ -85,8 +68,6 @@ def initial_V(gains: Gains, delta: Any, W_error_squared: Any) -> Any:  # noqa: N
 
 
 def final_bound(alpha_0: Any, alpha_1: float, V_0: Any, Q: float) -> Any:
-    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0.
-
-    With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
-    """
+    """Return C_0 = sqrt(2 (alpha_0 / alpha_1 + V(0) + Q)), (36), for alpha_1 > 0."""
+    # With ``V_0 = 0`` and the limit superior of I(t) for `Q` it is the ultimate bound.
     return np.sqrt(2 * (alpha_0 / alpha_1 + V_0 + Q))

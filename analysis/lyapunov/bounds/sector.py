@@ -23,8 +23,6 @@ from ...intervals.branch_and_bound import Range, enclose
 from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
-__all__ = ["Sector", "plant_terms", "quotient_range", "sector"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Sector:

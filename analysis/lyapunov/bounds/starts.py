@@ -17,8 +17,6 @@ from nlctl.params import as_numbers
 
 from ...intervals.box import Box
 
-__all__ = ["Starts", "read_starts"]
-
 LEVEL = "V"
 _CORNERS = 12  # of sides that have a width: beyond, corners are drawn
 _INDEX = re.compile(r"\[\d+\]$")

@@ -25,35 +25,16 @@ from ..convex import at_most, minimizer
 from .final_bound import Gains, alpha_0, alpha_1, initial_V
 from .sector import plant_terms
 
-__all__ = [
-    "LARGEST_NORM",
-    "Network",
-    "approximation_error",
-    "least_squares_weights",
-    "minimax_weights",
-    "network_on_grid",
-    "tightest_weights",
-]
-
 LARGEST_NORM = 1e5  # |W|^2 = 1e10 has a rounding error of 1e-6 in double precision
 
 
 @dataclass(frozen=True, kw_only=True)
 class Network:
-    """The network and the function that it approximates, on a grid.
+    """The network and the function that it approximates, on a grid."""
 
-    Attributes
-    ----------
-    psi : ndarray of shape (m, l)
-        Basis functions at the m grid points.
-    g : ndarray of shape (m,)
-        g(x) = f(x, 0).
-    points : ndarray of shape (m, n)
-    """
-
-    psi: np.ndarray
-    g: np.ndarray
-    points: np.ndarray
+    psi: np.ndarray  # shape (m, l); basis functions at the m grid points
+    g: np.ndarray  # shape (m,); g(x) = f(x, 0)
+    points: np.ndarray  # shape (m, n)
 
     def error(self, W: np.ndarray) -> float:
         """Return max |g - W^T psi| over the grid: a lower bound of eps*."""
@@ -198,10 +179,8 @@ def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.nd
 
 
 def _cost_of_weights(gains: Gains, delta_rest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*).
-
-    The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
-    """
+    """Return alpha_0/alpha_1 + V(0) as x^T P x / 2 + q^T x but for a constant, x = (W, eps*)."""
+    # The formulas take polynomials: in eps*, in |W|^2 and in |W - W_hat(0)|^2.
     one = Polynomial([0.0, 1.0])
     by_eps, by_W = alpha_0(gains, delta_rest + one, 0.0), alpha_0(gains, 0.0, one)
     by_W_error, rate = Polynomial([0.0]), alpha_1(gains)

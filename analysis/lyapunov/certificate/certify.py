@@ -24,10 +24,8 @@ from ..proofs.result import Certificate
 from .known_sign import KNOWN_SIGN
 from .sliding_mode import SLIDING_MODE
 
-__all__ = ["PROOFS", "certify"]
-
+# the kinds of proof; a loop is proved by the first of those that it fits
 PROOFS = (MODEL_REFERENCE, SLIDING_MODE, KNOWN_SIGN, ATTRACTION, BARRIER)
-"""The kinds of proof; a loop is proved by the first of those that it fits."""
 
 
 @as_annotated

@@ -22,29 +22,17 @@ from ..proofs.result import Certificate
 from .certify import certify
 from .known_sign import KnownSignLoop, bound_of_r, read_known_sign
 
-__all__ = ["GainCandidate", "GainDesign", "design"]
-
 SLACK = 1.002  # of N_0 over 1 / min k G
 _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 
 
 @dataclass(frozen=True, kw_only=True)
 class GainCandidate:
-    """One set of gains that the search tried.
+    """One set of gains that the search tried."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name.
-    C_0 : float
-        Bound of |r|, from a table of delta* over C: close to what `certify` proves.
-    u : float
-        max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made.
-    """
-
-    gains: dict[str, float]
-    C_0: float
-    u: float
+    gains: dict[str, float]  # values by qualified name
+    C_0: float  # bound of |r|, from a table of delta* over C: close to what `certify` proves
+    u: float  # max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,10 +200,8 @@ def _with_gains(
 
 
 def _bound(loop: KnownSignLoop, table: list[Demand]) -> tuple[float, float]:
-    """Return the least C_0 for which a box of the table closes, and how far it is from closing.
-
-    Between two boxes of the table delta* is interpolated in C.
-    """
+    """Return the least C_0 for which a box of the table closes, and how far it is from closing."""
+    # Between two boxes of the table delta* is interpolated in C.
     excess = [float(bound_of_r(loop, need.delta_star).level) / need.C for need in table]
     closing = int(np.argmax(np.array(excess) < 1)) if min(excess) < 1 else None
     if closing is None:

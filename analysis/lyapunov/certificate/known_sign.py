@@ -34,16 +34,20 @@ from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import decompose
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..loop.checked import read_checked
-from ..loop.external_inputs import disturbed
+from ..loop.checked import disturbed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
-from ..proofs.filtered import Demand, FilteredLoop, as_filtered, between, demand, feedforward
-from ..proofs.filtered_certificate import FilteredCertificate
+from ..proofs.filtered import (
+    Demand,
+    FilteredCertificate,
+    FilteredLoop,
+    as_filtered,
+    between,
+    demand,
+    feedforward,
+)
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
-
-__all__ = ["KNOWN_SIGN", "KnownSignCertificate", "KnownSignLoop", "bound_of_r", "read_known_sign"]
 
 _PROVED_FOR = {
     "reference": (SumOfSines,),

@@ -25,16 +25,19 @@ from nlctl.references import SumOfSines
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import decompose
 from ..bounds.error_bounds import error_bounds
-from ..loop.checked import read_checked
-from ..loop.external_inputs import disturbed
+from ..loop.checked import disturbed, read_checked
 from ..loop.roles import Pieces, has_law
-from ..proofs.filtered import Demand, FilteredLoop, as_filtered, demand, feedforward
-from ..proofs.filtered_certificate import FilteredCertificate
+from ..proofs.filtered import (
+    Demand,
+    FilteredCertificate,
+    FilteredLoop,
+    as_filtered,
+    demand,
+    feedforward,
+)
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
-
-__all__ = ["SLIDING_MODE", "SlidingModeCertificate"]
 
 _PIECES: Pieces = {
     "reference": ("yd", ()),

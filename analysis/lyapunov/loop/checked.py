@@ -2,24 +2,63 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import control as ct
 import numpy as np
+from flint import arb
 
 from nlctl.blocks import block
 from nlctl.diagrams import initial_state, interconnect, overridden, state_names
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.names import unknown
+from nlctl.params import as_numbers
 
+from ...intervals.arithmetic import Ball
+from ...intervals.branch_and_bound import upper
+from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Sides, Starts, read_starts
 from .content import LoopContent, loop_content
-from .external_inputs import bound_of_inputs
 from .plant_form import check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
 from .same_loop import check_same, points_around
 
-__all__ = ["CheckedLoop", "read_checked"]
+ADDED = "declared bounds of external inputs, times their gains"
+
+
+def bound_of_inputs(roles: Roles, inputs: Mapping[str, float], loop: Any) -> float:
+    """Return the bound of what external inputs add to v."""
+    for name, value in inputs.items():
+        if name not in roles.disturbances:
+            raise unknown("external input", name, loop.input_labels, "that is added to v")
+        number = as_numbers(value)
+        if number is None or number.ndim or not 0 <= number < np.inf:
+            raise ParameterError(f"certify needs a finite bound >= 0 of '{name}', got {value!r}")
+    for name in roles.disturbances:
+        if name not in inputs:
+            raise DiagramError(
+                f"external input '{name}' is added to the plant's v, and may be anything: declare "
+                f"its bound, certify(loop, inputs={{'{name}': 0.1}}), or take it away"
+            )
+    return upper(
+        sum((arb(abs(gain)) * inputs[name] for name, gain in roles.disturbances.items()), arb(0))
+    )
+
+
+def disturbed(split: Decomposition, bound: float) -> Decomposition:
+    """Return the split of v = k u + (eps_u + w) with external inputs |w| <= bound."""
+    if not bound:
+        return split
+    w = Ball(arb(bound))
+    return dataclasses.replace(
+        split,
+        eps_low=-upper(w - split.eps_low),
+        eps_high=upper(w + split.eps_high),
+        how=f"{split.how}; external inputs add {bound:g} at most",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

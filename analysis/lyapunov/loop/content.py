@@ -18,8 +18,6 @@ from nlctl.diagrams import places
 
 from ...loop_record import facts_and_unseen, text_key, value_text
 
-__all__ = ["LoopContent", "Remembered", "loop_content"]
-
 _MOST = 1024  # checks that are remembered
 _RECORDS = ("spec", "current_spec")
 

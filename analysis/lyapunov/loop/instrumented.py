@@ -2,11 +2,16 @@
 
 The rates are the blocks' own update equations on the loop's own signals, so that V' is the
 gradient of V times the right-hand side of the diagram, and no difference of samples.
+
+Whether a plant's update is, as expressions, the chain (1) of the f and d that it declares.
+
+What is proved of f and d over a box is about the plant only if its runs integrate them.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -15,26 +20,26 @@ import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.blocks import Block, block
-from nlctl.diagrams import interconnect
+from nlctl.diagrams import Place, interconnect
 from nlctl.equations import equation
 from nlctl.errors import DiagramError
+from nlctl.expressions.graph import Ambiguous, Graph, Untraceable
+from nlctl.expressions.trace import trace
+from nlctl.native.diagram.parameters import slots_of
+from nlctl.native.diagram.trace import traced_arguments
+from nlctl.plants import PureFeedback, integrator_chain
 
 from ..bounds.decomposition import Decomposition
-from .declared_terms import terms_with_parameters
 from .integral import NussbaumIntegral
 from .roles import Parts, joined_again
-
-__all__ = ["input_gain", "observed"]
 
 NEAR = 1e-5  # |v| below which G is interpolated: F/v would lose its digits
 
 
 def input_gain(f: Callable) -> Callable:
-    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0.
-
-    For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
-    order of the rounding, 1e-11, for a twice differentiable F.
-    """
+    """Make the equation G(x, v) = F(x, v) / v of (6), (7), with its limit at v = 0."""
+    # For |v| < 1e-5 it is the line through its values at v = -1e-5 and 1e-5, whose error is of the
+    # order of the rounding, 1e-11, for a twice differentiable F.
 
     @equation
     def gain(x, v, p):
@@ -135,11 +140,9 @@ def _plant_terms(plant: Any) -> tuple[tuple[str, ...], Callable]:
 
 
 def _with_outputs(spec: Any, names: tuple[str, ...] = (), terms: Callable | None = None) -> Any:
-    """Return a record with the same parameters and equations, and with more outputs.
-
-    These are the rates of its states, of a record of vectors also the states that it does not
-    output, and what `terms` returns.
-    """
+    """Return a record with the same parameters and equations, and with more outputs."""
+    # These are the rates of its states, of a record of vectors also the states that it does not
+    # output, and what `terms` returns.
     if not spec.states:
         return spec
     vector = getattr(spec, "vector", False)
@@ -180,3 +183,26 @@ def _longer_tuple(spec: Any, terms: Callable | None) -> Callable:
 def no_terms(t, x, u, p):
     """Nothing to add."""
     return ()
+
+
+def terms_with_parameters(plant: Any) -> tuple[Callable, Callable]:
+    """Return ``f(x, v, p)`` and ``d(x, t, p)`` as equations that machine code can call."""
+    return plant.terms if isinstance(plant, PureFeedback) else (plant.f, plant.d)
+
+
+@functools.lru_cache(maxsize=32)
+def update_is_declared(plant: Place) -> bool:
+    """Whether the update function and the chain of f and d are the same expressions."""
+    # False where they differ, and where that is unknown: expressions that are equal but written in
+    # another way count as different.
+    system, graph = plant.system, Graph()
+    declared = integrator_chain(*terms_with_parameters(system.current_spec))
+
+    given = functools.partial(traced_arguments, graph, system, slots_of(system))
+    try:
+        with np.errstate(all="ignore"):
+            one, other = (trace(graph, f, given) for f in (system.updfcn, declared))
+    except (Untraceable, Ambiguous):
+        return False
+    pairs = zip(one.cells.flat, other.cells.flat, strict=False)
+    return one.shape == other.shape and all(a is b for a, b in pairs)

@@ -20,8 +20,6 @@ from nlctl.params import param, record
 from ..bounds.clipped import clipped_split
 from ..bounds.decomposition import Decomposition
 
-__all__ = ["NussbaumIntegral", "sharpest"]
-
 
 @as_annotated
 def sharpest(split: Decomposition) -> Decomposition:

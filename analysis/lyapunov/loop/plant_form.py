@@ -27,8 +27,6 @@ from ...intervals.agreement import on_balls
 from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.paths import Undecided, every_way
 
-__all__ = ["Acceleration", "acceleration", "check_chain", "on_intervals"]
-
 
 class Acceleration(Protocol):
     """x_n' of a plant."""
@@ -88,12 +86,10 @@ def acceleration(plant: Place) -> Acceleration:
 
 
 def check_chain(plant: Place) -> None:
-    """Prove x_i' = x_{i+1} for i < n, and that the outputs are y = x_1 and x_1, ..., x_n.
-
-    For all x and v and all t >= 0: on every path through the function each is the coordinate
-    itself, or, where there is one path only, it has the coordinate's gradient everywhere and its
-    value at 0.
-    """
+    """Prove x_i' = x_{i+1} for i < n, and that the outputs are y = x_1 and x_1, ..., x_n."""
+    # For all x and v and all t >= 0: on every path through the function each is the coordinate
+    # itself, or, where there is one path only, it has the coordinate's gradient everywhere and its
+    # value at 0.
     system, n = plant.system, plant.system.nstates
     states, outputs = coordinate_names(n), list(system.current_spec.outputs)
     update = [(i, f"{states[i]}'", i + 1) for i in range(n - 1)]

@@ -29,17 +29,6 @@ from nlctl.upstream.control_internals import Around
 from ..bounds.final_bound import Gains
 from .content import Remembered
 
-__all__ = [
-    "PIECES",
-    "Parts",
-    "Roles",
-    "check_kind",
-    "joined_again",
-    "loop_parts",
-    "read_parts",
-    "read_roles",
-]
-
 _PURE = Remembered()  # loops whose functions were read
 Pieces = Mapping[str, tuple[str, tuple[str, ...]]]
 # A block is known by a signal that it outputs, and by what the proof reads of its record.

@@ -15,13 +15,18 @@ import control as ct
 import numpy as np
 
 from nlctl.diagrams import state_names
-from nlctl.diagrams.points import PointFunction, PointValues, agree, explained, rates_and_outputs
+from nlctl.diagrams.points import (
+    PointFunction,
+    PointValues,
+    agree,
+    explained,
+    first_difference,
+    rates_and_outputs,
+)
 from nlctl.errors import DiagramError, UsageError
 
 from ...loop_record import array_text, text_key
 from .content import Remembered
-
-__all__ = ["check_same", "points_around"]
 
 _Point = tuple[float, np.ndarray]
 _COUNT, SPREADS = 8, (0.03, 0.3, 1.0)  # points of each spread
@@ -30,10 +35,8 @@ _AGREED = Remembered()
 
 
 def points_around(x: np.ndarray, *, seed: int = 0) -> list[_Point]:
-    """Return times and states at which loops are compared: the start, and points around it.
-
-    Shapes: `x` (n,).
-    """
+    """Return times and states at which loops are compared: the start, and points around it."""
+    # Shapes: `x` (n,).
     rng = np.random.default_rng(seed)
     points = [(0.0, x)]
     for spread in SPREADS:
@@ -104,13 +107,13 @@ def _compare(
 ) -> None:
     """Compare one point; what is not a number in both is the same."""
     (a,), (b,) = (function(*point) for function in both)
-    differ = ~agree(a, b) & ~(np.isnan(a) & np.isnan(b))
-    if differ.any():
-        (most,) = explained(both[0], point, (a,))
-        differ &= ~agree(a, b, most)
-    if differ.any():
-        i = int(np.argmax(differ))
+    a, b = (np.where(np.isnan(a) & np.isnan(b), 0.0, values) for values in (a, b))
+    if agree(a, b).all():
+        return
+    differ = first_difference([what], (a,), (b,), explained(both[0], point, (a,)))
+    if differ is not None:
+        label, one, other = differ
         raise DiagramError(
             f"'{given.name}' is not the loop that the proof is about: at t = {point[0]:.6g} s "
-            f"{what[i]} is {a[i]:.9g}, and {b[i]:.9g} with the blocks connected by name"
+            f"{label} is {one:.9g}, and {other:.9g} with the blocks connected by name"
         )

@@ -13,8 +13,6 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-__all__ = ["Margin", "Signals", "equality", "inequality", "peak_by_rates", "signals_of"]
-
 POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
 

@@ -1,4 +1,13 @@
-"""Runs of a loop that are observed for the proof."""
+r"""Runs of a loop that are observed for the proof.
+
+Whether yd1, ..., ydn are the derivatives of yd, along a run.
+
+The reference block itself is differentiated: with its own rates :math:`x' = f(t, x)`,
+
+.. math:: \frac{d}{dt} y_d^{(k-1)} = \frac{d}{ds} g_{k-1}(t + s, x + s f(t, x)) \Big|_{s=0},
+
+by central differences of order 8 with four steps, so that one fits whatever the frequencies are.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +20,21 @@ import numpy as np
 
 from nlctl import native
 from nlctl.arguments import number
-from nlctl.diagrams import initial_state
+from nlctl.diagrams import Place, initial_state
 from nlctl.diagrams import state_names as all_states
 from nlctl.errors import AlgebraicLoopError, DiagramError, ParameterError
+from nlctl.references import derivative_names
 from nlctl.response import input_output_response
+from nlctl.upstream.control_internals import outputs_now, rates_now
 from nlctl.wording import counted
 
 from ...response_of_loop import own_parameters
 from ..bounds.decomposition import Decomposition
 from ..bounds.final_bound import Gains, alpha_1
 from .instrumented import observed
-from .reference_rates import reference_margin
-from .roles import Parts, read_parts
+from .roles import Parts, declared, read_parts
 from .same_loop import check_same, points_around
-from .signals import Margin, Signals, signals_of
-
-__all__ = ["SAMPLING_INTERVAL", "Member", "MemberRun", "members_of", "observe", "observed_loop"]
+from .signals import Margin, Signals, equality, signals_of
 
 SAMPLING_INTERVAL = 4e-3  # s, sampling interval of a run that is given by its horizon
 _LOOKS = 12  # samples of a run at which the observed loop is compared with the one given
@@ -36,20 +44,12 @@ _AGREE = 1e-3  # relative distance beyond which a response is not one of the loo
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """Where a run starts, and its parameters, both by qualified name.
-
-    Attributes
-    ----------
-    start, params : mapping
-    times : ndarray of shape (m,)
-    expected : control.TimeResponseData or None
-        A response that the run must reproduce.
-    """
+    """Where a run starts, and its parameters, both by qualified name."""
 
     start: Mapping[str, float]
     params: Mapping[str, Any]
-    times: np.ndarray
-    expected: Any = None
+    times: np.ndarray  # shape (m,)
+    expected: Any = None  # a response that the run must reproduce
 
     @property
     def options(self) -> str:
@@ -67,7 +67,7 @@ class MemberRun:
     signals: Signals  # up to the time that the run reached
     lost: float | None  # time (s) at which the run ended early, diverged or too stiff
     message: str = ""  # why it ended early
-    # of the reference's derivatives, see `nlctl.analysis.lyapunov.loop.reference_rates`
+    # of the reference's derivatives
     reference: Margin | None = None
 
     @property
@@ -178,10 +178,7 @@ def _along(loop: ct.InterconnectedSystem, response: Any, count: int) -> list[Any
 
 
 def _reference(
-    loop: ct.InterconnectedSystem,
-    parts: Parts,
-    response: Any,
-    signals: Signals,
+    loop: ct.InterconnectedSystem, parts: Parts, response: Any, signals: Signals
 ) -> Margin | None:
     """Compare the reference's derivatives with those of its own outputs."""
     states = np.asarray(response.states)[: loop.nstates or 0]
@@ -216,3 +213,59 @@ def _check_reproduced(member: Member, signals: Signals) -> None:
             f"the response is not one of this loop: at t = {at:g} s its r is off by "
             f"{np.max(far):.3g} from a run with the same start and parameters"
         )
+
+
+WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of differences at 1, ..., 4 steps
+_STEPS = (1e-1, 1e-2, 1e-3, 1e-4)  # s
+SAMPLES = 120
+_TOLERANCE = 1e-6  # relative to the largest value of a derivative
+SHIFT = 0.381966  # of a sampling interval: corners of a function of time lie on the samples
+
+
+def reference_margin(place: Place, time: np.ndarray, states: np.ndarray) -> Margin | None:
+    """Return how far the reference's derivatives are from those of its own outputs."""
+    # Shapes: `time` (m,), `states` (n, m).
+    names, block = declared(place, "outputs"), place.system
+    order = sum(name in names for name in derivative_names(len(names))) - 1
+    if order < 1 or block.ninputs:
+        return None
+    rows = [names.index(name) for name in derivative_names(order)]
+    block_states = states[place.state_offset :][: block.nstates or 0]
+    picked = np.unique(np.linspace(0, time.size - 2, SAMPLES).astype(int))
+    times, outputs, rates = [], [], []
+    for i in picked:
+        shift = 0.0 if block.nstates else SHIFT * (time[i + 1] - time[i])
+        t, x = float(time[i] + shift), block_states[:, i]
+        here, slopes = outputs_now(block, t, x, np.zeros(0))[rows], _slopes(block, t, x, rows)
+        far = np.abs(slopes - here[1:])
+        best = np.argmin(np.where(np.isnan(far), np.inf, far), axis=0)
+        times.append(t)
+        outputs.append(here[1:])
+        rates.append(slopes[best, np.arange(order)])
+    return _worst(np.array(times), np.array(outputs), np.array(rates))
+
+
+def _slopes(block: Any, t: float, x: np.ndarray, rows: list[int]) -> np.ndarray:
+    """Return the derivatives of yd, ..., yd^(n-1) by each step, shape (steps, n)."""
+    none = np.zeros(0)
+    rate = rates_now(block, t, x, none) if block.nstates else none
+
+    def along(s: float) -> np.ndarray:
+        return outputs_now(block, t + s, x + s * rate, none)[rows[:-1]]
+
+    with np.errstate(all="ignore"):
+        return np.array([
+            sum(w * (along(j * h) - along(-j * h)) for j, w in enumerate(WEIGHTS, 1)) / h
+            for h in _STEPS
+        ])  # fmt: skip
+
+
+def _worst(t: np.ndarray, outputs: np.ndarray, rates: np.ndarray) -> Margin:
+    """Return the equality for the derivative that is farthest off, relative to its size."""
+    size = np.max(np.maximum(np.abs(outputs), np.abs(rates)), axis=0)
+    size = np.where(size > 0, size, 1.0)
+    k = int(np.argmax(np.max(np.nan_to_num(np.abs(outputs - rates), nan=np.inf) / size, axis=0)))
+    return equality(
+        "(yd)", "yd1, ..., ydn are the derivatives of yd", t, outputs[:, k], rates[:, k],
+        float(size[k]), _TOLERANCE,
+    )  # fmt: skip

@@ -1,12 +1,18 @@
 """Model reference adaptive control, proved by intervals: V <= C gives a box, and the box V_max(C).
 
 On the box |delta| <= D is proved, and with that D follows V <= V_max(C) for all time.
+
+Whether V' of the proof is V' of the loop, by python-control's own right-hand side at points.
+
+The proof's V' is made of what was read: P, Q, beta, lambda, W, the rest, the leakage of the
+weights.  The loop's is the gradient of V times its rates.  Signals u and v are the loop's own, so
+that both agree at every state, whether a run comes there or not.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,23 +20,27 @@ from flint import arb
 
 from nlctl.actuators import Gain
 from nlctl.arguments import vector
-from nlctl.errors import ParameterError
+from nlctl.controllers import AdaptiveWeights, ProjectedWeights
+from nlctl.controllers.mrac.reference_model import model_state_names
+from nlctl.diagrams import initial_state
+from nlctl.diagrams.points import rates_and_outputs
+from nlctl.errors import DiagramError, ParameterError
+from nlctl.plants import coordinate_names
 from nlctl.wording import counted
 
+from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.branch_and_bound import upper
 from ..bounds.clipped import clipped_split
 from ..bounds.decomposition import Decomposition, decompose
-from ..loop.external_inputs import disturbed
+from ..loop.checked import disturbed
+from ..loop.same_loop import points_around
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
-from .audit import check_decrease
 from .decrease import Decrease, decrease, outside_ball
-from .matching import matching
+from .matching import Matching, matching
 from .model_certificate import ModelReferenceCertificate
 from .model_loop import ModelReferenceLoop, is_model_reference, read_model_reference
 from .quadratic_form import ball
 from .region import Region, region
-
-__all__ = ["MODEL_REFERENCE"]
 
 _LIMIT = 1e12  # a bound of V beyond which the iteration counts as without end
 _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it falls by more
@@ -148,3 +158,67 @@ MODEL_REFERENCE = ProofKind(
     largest_input=lambda subject, need, bound: need.u,
     fields=_fields,
 )
+
+
+_EQUAL = 1e-7  # relative to the size of the terms
+
+
+def check_decrease(loop: Any, match: Matching, params: Mapping[str, Any] | None = None) -> None:
+    """Compare V' of the proof with that of the loop, at points."""
+    u, understood = np.zeros(loop.ninputs or 0), match.loop.understood
+    rates_of, outputs_of = rates_and_outputs(loop, params), rates_and_outputs(understood)
+    labels = list(understood.output_labels)
+    for t, x in points_around(initial_state(loop), seed=1):
+        with np.errstate(all="ignore"):
+            (rates, _), (_, seen) = rates_of(t, x, u), outputs_of(t, x, u[:0])
+        signals = dict(zip(labels, seen, strict=True))
+        proved, true, scale = _both(match, t, x, rates, signals)
+        projected = isinstance(match.loop.spec("weights"), ProjectedWeights)
+        excess = true - proved if projected else abs(true - proved)
+        if np.isfinite(scale) and not excess <= _EQUAL * scale:
+            raise DiagramError(
+                f"'{loop.name}' is not the loop that the proof is about: at t = {t:.6g} s V' is "
+                f"{true:.9g}, and {proved:.9g} by the proof"
+            )
+
+
+def _both(
+    match: Matching, t: float, x: np.ndarray, rates: np.ndarray, signals: Mapping[str, float]
+) -> tuple[float, float, float]:
+    """Return V' by the proof and of the loop, and the size of its terms."""
+    loop, places = match.loop, match.loop.roles.places
+
+    def of(part: str, values: np.ndarray) -> np.ndarray:
+        place = places[part]
+        return values[place.state_offset :][: place.system.nstates or 0]
+
+    P, Q = (_floats(M) for M in (loop.form.P, loop.form.Q))
+    W, lam, weights = np.array(match.W, dtype=float), float(match.lam), loop.spec("weights")
+    E, E_rate = (of("plant", values) - of("model", values) for values in (x, rates))
+    W_hat, W_rate = of("weights", x), of("weights", rates)
+    true = 2 * E @ P @ E_rate + 2 * lam * (W_hat - W) @ W_rate / weights.Gamma
+    r, delta = float(E @ P[:, -1]), _delta(match, t, signals)
+    leak = W_hat @ W_hat + (W_hat - W) @ (W_hat - W) - W @ W
+    terms = [-E @ Q @ E, 2 * r * delta, -lam * _rate_of_leakage(weights, r) * leak]
+    size = abs(2 * lam * (W_hat - W) @ W_rate / weights.Gamma) + sum(map(abs, terms))
+    return float(sum(terms)), float(true), 1.0 + float(size)
+
+
+def _rate_of_leakage(weights: Any, r: float) -> float:
+    """Return sigma, times |r| for e-modification; what projection takes away is left out."""
+    if isinstance(weights, ProjectedWeights):
+        return 0.0
+    return weights.sigma_1 if isinstance(weights, AdaptiveWeights) else weights.sigma * abs(r)
+
+
+def _delta(match: Matching, t: float, signals: Mapping[str, float]) -> float:
+    order = match.loop.order
+    names = (*coordinate_names(order), *model_state_names(order), "yd", "v")
+    values = {"t": t} | {name: signals[name] for name in names}
+    balls = {name: Ball(arb(float(value))) for name, value in values.items()}
+    rest = float(as_ball(match.rest.on(balls)).value.mid())
+    return rest + float(match.beta) * (signals["v"] - float(match.k) * signals["u"])
+
+
+def _floats(M: Any) -> np.ndarray:
+    return np.array([[float(arb(v)) for v in row] for row in M.tolist()])

@@ -24,8 +24,6 @@ from ...intervals.normal_form import exact
 from .matching import Matching
 from .quadratic_form import ball
 
-__all__ = ["Decrease", "decrease", "largest_weights", "outside_ball"]
-
 _SQUARE = "the integral of E^T Q E is finite"
 _FINE = 1e-6  # relative: of the one-dimensional maximum of e-modification
 
@@ -121,11 +119,9 @@ def _best_rate(cost: Callable[[float], float], fastest: float) -> float:
 
 
 def _e_modification(match: Matching, sigma: arb, D: arb, V_0: arb) -> Decrease:
-    """V' <= -E^T Q E + |r| h(s) with h = 2 D + sigma |W|^2/2 - 2 sigma s^2, s = |W_hat - W/2|.
-
-    V' > 0 only where the root of E^T Q E is below sqrt(q) h(s): the largest V there is the level.
-    Where V stays above it in the end, the integral of E^T Q E is finite, and E -> 0.
-    """
+    """V' <= -E^T Q E + |r| h(s) with h = 2 D + sigma |W|^2/2 - 2 sigma s^2, s = |W_hat - W/2|."""
+    # V' > 0 only where the root of E^T Q E is below sqrt(q) h(s): the largest V there is the level.
+    # Where V stays above it in the end, the integral of E^T Q E is finite, and E -> 0.
     form, W = match.loop.form, ball(match.W_squared).sqrt()
     mu, Gamma, q = arb(form.mu), ball(match.Gamma), ball(form.q)
     h_0 = 2 * D + sigma * W * W / 2

@@ -33,8 +33,6 @@ from ..bounds.decomposition import Decomposition
 from .model_loop import ModelReferenceLoop
 from .quadratic_form import ball
 
-__all__ = ["Matching", "matching"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:
@@ -85,12 +83,10 @@ class Matching:
         return exact(self.loop.spec("weights").Gamma) / self.lam
 
     def rest_on(self, values: Mapping[str, Any]) -> Any:
-        """Return the rest where the symbols have these values, balls by name.
-
-        Where functions take part it is what two enclosures have in common: that of the sum of
-        products, in which what is equal has cancelled, and that of the equation as it is written.
-        Of symbols that have cancelled the latter is taken at 0, as it does not depend on them.
-        """
+        """Return the rest where the symbols have these values, balls by name."""
+        # Where functions take part it is what two enclosures have in common: that of the sum of
+        # products, in which what is equal has cancelled, and that of the equation as it is written.
+        # Of symbols that have cancelled the latter is taken at 0, as it does not depend on them.
         tight = as_ball(self.rest.on(values))
         if not any(atom.arguments for product in self.rest.terms for atom, _ in product):
             return tight
@@ -189,11 +185,9 @@ def matching(
 def _taken_away(
     target: Sum, psi: Sequence[Sum], given: Sequence[Fraction] | None
 ) -> tuple[list[Fraction], Sum]:
-    """Return weights w and target - w^T psi.
-
-    Those that match are found by elimination: each regressor, less those before it, takes away one
-    product of the target, if the target becomes no longer by that.
-    """
+    """Return weights w and target - w^T psi."""
+    # Those that match are found by elimination: each regressor, less those before it, takes away
+    # one product of the target, if the target becomes no longer by that.
     if given is not None:
         for w, one in zip(given, psi, strict=True):
             target = target - w * one

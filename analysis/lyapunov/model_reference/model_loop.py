@@ -38,8 +38,6 @@ from ..loop.plant_form import Acceleration, acceleration, on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
 
-__all__ = ["ModelReferenceLoop", "is_model_reference", "read_model_reference"]
-
 ADAPTIVE_PIECES: Pieces = {
     "reference": ("yd", ()),
     "plant": ("y", ()),

@@ -21,8 +21,6 @@ from nlctl.errors import DiagramError
 
 from ...intervals.normal_form import exact
 
-__all__ = ["QuadraticForm", "ball", "quadratic_form"]
-
 _SHRUNK = 1 - 1e-9  # of the least eigenvalue in floating point, to be proved a lower bound
 
 
@@ -74,10 +72,8 @@ class QuadraticForm:
         return (square * ball(self.Q.inv()[0, 0])).sqrt()
 
     def driven(self, D: arb) -> arb:
-        """Return the level that E^T P E does not leave while |d| <= D.
-
-        Where E^T Q E > 4 q D^2 it falls, and elsewhere it is at most 4 q D^2 / mu.
-        """
+        """Return the level that E^T P E does not leave while |d| <= D."""
+        # Where E^T Q E > 4 q D^2 it falls, and elsewhere it is at most 4 q D^2 / mu.
         return 4 * ball(self.q) * D * D / arb(self.mu)
 
 
@@ -97,10 +93,7 @@ def is_positive_definite(M: fmpq_mat) -> bool:
 
 
 def quadratic_form(path: str, K: Sequence[float], P: np.ndarray) -> QuadraticForm:
-    """Prove that E^T P E is a Lyapunov function of E_n' = -K^T E.
-
-    Shapes: `P` (n, n).
-    """
+    """Prove that E^T P E is a Lyapunov function of E_n' = -K^T E; shapes: `P` (n, n)."""
     n = len(K)
     lower = [[float(P[max(i, j), min(i, j)]) for j in range(n)] for i in range(n)]
     for i in range(n):

@@ -22,46 +22,25 @@ from .decrease import largest_weights
 from .matching import Matching
 from .quadratic_form import ball
 
-__all__ = ["Region", "model_reach", "region"]
-
 _BOXES = 2_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Bounds that hold while V <= C.
+    """Bounds that hold while V <= C."""
 
-    Attributes
-    ----------
-    C : float
-        Bound of V.
-    box : Box
-        What t, x1, ..., xm1, ..., yd and v stay in.
-    errors : tuple of n floats
-        Bounds of |E_1|, ..., |E_n|.
-    W_error, W_hat, psi, u : float
-        Bounds of |W_hat - W|, |W_hat|, |psi| and |u|.
-    rest : float
-        Proved bound of what neither the law nor the weights know of the plant's equation.
-    D : float
-        Proved bound of |delta|: of the rest, and of what the actuator and inputs add.
-    boxes : int
-        Boxes of the proof.
-    arithmetic : {"balls"}
-        What proved it.
-    """
-
-    C: float
-    box: Box
-    errors: tuple[float, ...]
+    C: float  # bound of V
+    box: Box  # what t, x1, ..., xm1, ..., yd and v stay in
+    errors: tuple[float, ...]  # bounds of |E_1|, ..., |E_n|
+    # bounds of |W_hat - W|, |W_hat|, |psi| and |u|
     W_error: float
     W_hat: float
     psi: float
     u: float
-    rest: float
-    D: float
-    boxes: int
-    arithmetic: Literal["balls"] = "balls"
+    rest: float  # proved bound of what neither the law nor the weights know of the plant's equation
+    D: float  # proved bound of |delta|: of the rest, and of what the actuator and inputs add
+    boxes: int  # boxes of the proof
+    arithmetic: Literal["balls"] = "balls"  # what proved it
 
 
 def model_reach(match: Matching) -> arb:

@@ -28,8 +28,6 @@ from nlctl.params import as_numbers
 
 from .property import Antiderivative, GainFunction, Lobe, antiderivative, lobe_around, root
 
-__all__ = ["Aftermath", "aftermath"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Aftermath:

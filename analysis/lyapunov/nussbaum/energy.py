@@ -28,8 +28,6 @@ from nlctl.names import unknown
 
 from .property import GainFunction, antiderivative, lobes
 
-__all__ = ["Drift", "DriftMargin", "SafeHorizon", "drift", "drift_margin", "safe_horizon"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Drift:

@@ -14,8 +14,6 @@ from nlctl.errors import ParameterError
 from .property import lobe_around
 from .slow_drift import slow_drift
 
-__all__ = ["BurstForecast"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class _Samples:

@@ -22,17 +22,6 @@ from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 
-__all__ = [
-    "Antiderivative",
-    "Lobe",
-    "NussbaumProperty",
-    "antiderivative",
-    "lobe_around",
-    "lobes",
-    "nussbaum_property",
-    "running_means",
-]
-
 GainFunction = Callable[[float], float]
 Antiderivative = Callable[[np.ndarray], np.ndarray]
 DENSE = 4096
@@ -42,21 +31,13 @@ GROWTH = 1.5  # what a quantity must gain from the middle of the range to its en
 
 @dataclass(frozen=True, kw_only=True)
 class Lobe:
-    """The stretch between two neighbouring zeros of N.
+    """The stretch between two neighbouring zeros of N."""
 
-    Attributes
-    ----------
-    low, high : float
-        Its ends: zeros of N, or ends of the range that was searched.
-    integral : float
-        Integral of N from `low` to `high`.
-    place, extremum : float
-        Where |N| is largest, and the value of N there.
-    """
-
+    # its ends: zeros of N, or ends of the range that was searched
     low: float
     high: float
-    integral: float
+    integral: float  # integral of N from `low` to `high`
+    # where |N| is largest, and the value of N there
     place: float
     extremum: float
 
@@ -113,12 +94,10 @@ class NussbaumProperty:
 
 
 def antiderivative(N: GainFunction) -> Antiderivative:
-    """Return int_0^s N as a function of arrays.
-
-    The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
-    between neighbouring arguments; of more than 4096 of them, between 4096 nodes, with N as the
-    slope of the interpolation.
-    """
+    """Return int_0^s N as a function of arrays."""
+    # The closed form for the paper's function, otherwise adaptive quadrature (scipy.integrate.quad)
+    # between neighbouring arguments; of more than 4096 of them, between 4096 nodes, with N as the
+    # slope of the interpolation.
     if N is functions.nussbaum:
         return functions.nussbaum_integral
 
@@ -201,10 +180,8 @@ def _lobe(N: GainFunction, low: float, high: float) -> Lobe:
 
 
 def lobe_around(zeta: float, N: GainFunction = functions.nussbaum, *, reach: float = 4.0) -> Lobe:
-    """Return the whole lobe that zeta lies in, searched within `reach` on both sides.
-
-    At a zero of N it is the lobe above.
-    """
+    """Return the whole lobe that zeta lies in, searched within `reach` on both sides."""
+    # At a zero of N it is the lobe above.
     near = lobes(N, zeta - reach, zeta + reach)
     inside = [lobe for lobe in near if lobe.low <= zeta + 1e-9 and zeta + 1e-9 < lobe.high]
     if not inside or inside[0] in (near[0], near[-1]):

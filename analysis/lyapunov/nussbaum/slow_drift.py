@@ -28,13 +28,43 @@ from scipy.integrate import quad, trapezoid
 from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
-from nlctl.errors import ParameterError
+from nlctl.diagrams import known_system, state_names
+from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
+from nlctl.errors import DiagramError, ParameterError
 
+from ...response_of_loop import check_response, check_shape, own_outputs, own_parameters
+from ..loop.roles import read_parts
 from .energy import Drift, drift
-from .law import law_of_response
 from .property import GainFunction, Lobe, antiderivative, lobe_around, root
 
-__all__ = ["Balance", "SlowDrift", "burst_peak", "slow_drift"]
+_SIGNALS = ("zeta", "r", "u")
+
+
+def law_of_response(loop: Any, response: Any) -> GainFunction:
+    """Return the Nussbaum function of the loop that a response is of."""
+    # The response is compared with the loop, see `nlctl.analysis.response_of_loop`, and at its
+    # samples N(zeta) zeta' with r u, zeta' from the diagram's own right-hand side.
+    loop = known_system("slow_drift", loop)
+    check_shape(loop, response, _SIGNALS)
+    params = own_parameters(loop, response)
+    parts = read_parts(loop, params=params)
+    check_response(loop, response, params, _SIGNALS)
+    if "zeta" not in parts.law.states or not hasattr(parts.law, "N"):
+        raise DiagramError(
+            f"slow_drift is about laws with a Nussbaum argument, got {type(parts.law).__name__}"
+        )
+    place = state_names(loop).index(f"{parts.paths['law']}.zeta")
+    evaluate = rates_and_outputs(loop, params)
+    for i, signals in own_outputs(loop, response, params):
+        t, x = float(response.time[i]), np.asarray(response.states)[:, i]
+        rate = float(evaluate(t, x, np.zeros(0))[0][place])
+        a, b = parts.law.N(signals["zeta"]) * rate, signals["r"] * signals["u"]
+        if not agree(a, b, OF_RESPONSES, relative=OF_RESPONSES):
+            raise DiagramError(
+                f"N(zeta) zeta' and r u of '{loop.name}' differ at t = {t:g} s: {a:.9g} and {b:.9g}"
+            )
+    return parts.law.N
+
 
 SAMPLED = 0.1  # mismatch beyond which the samples do not show that N is that of the law
 ERRORS, MODEL = 2.0, 0.05  # standard errors, and share of the time left, that the range allows
@@ -43,19 +73,12 @@ BLOCKS = 5  # fits that leave one of so many parts out give the range of a predi
 
 @dataclass(frozen=True, kw_only=True)
 class Balance:
-    """The fitted law of the drift, A' = p / |N| - q.
+    """The fitted law of the drift, A' = p / |N| - q."""
 
-    Attributes
-    ----------
-    p, q : float
-        Fitted to the mean rates over the windows, by least squares.
-    residual : float
-        Root mean square of what the fit leaves, in the unit of the rate (1/s).
-    """
-
+    # fitted to the mean rates over the windows, by least squares
     p: float
     q: float
-    residual: float
+    residual: float  # root mean square of what the fit leaves, in the unit of the rate (1/s)
 
     def rate(self, N: float) -> float:
         """Rate A' (1/s) at a value of N."""
@@ -226,7 +249,7 @@ def slow_drift(
         The Nussbaum function of the law.
     loop : control.InterconnectedSystem or Compiled, optional
         The loop that the response is of: N is then that of its law, and it is checked that the
-        loop is one that this is about, see `nlctl.analysis.lyapunov.nussbaum.law`.
+        loop is one that this is about.
     window : float, optional
         Length of the windows (s) over which rates are averaged; whole periods of the reference,
         of which the default holds four for the paper's.
@@ -334,10 +357,8 @@ def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
 
 
 def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
-    """Return the zeta of the lobe, below its extremum, at which the balance stops the drift.
-
-    Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
-    """
+    """Return the zeta of the lobe, below its extremum, at which the balance stops the drift."""
+    # Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
     if not (balance.p > 0 and balance.q > 0):
         return None
     gain = balance.p / balance.q
@@ -349,10 +370,8 @@ def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
 def _rest(
     rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Return the resting zeta, and its range over fits that leave a part of the windows out.
-
-    A fit in which the drift does not stop counts as the lobe's upper end.
-    """
+    """Return the resting zeta, and its range over fits that leave a part of the windows out."""
+    # A fit in which the drift does not stop counts as the lobe's upper end.
     rests = []
     for part in np.array_split(np.arange(rates.size), BLOCKS):
         rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
@@ -366,17 +385,21 @@ def _rest(
 def _forecast(
     rates: np.ndarray, inverse: np.ndarray, N: GainFunction, lobe: Lobe, zeta: float
 ) -> tuple[float, float, float]:
-    """Return how long the budget lasts, and the shortest and the longest time that it may.
-
-    The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0.  Windows that saw little of the lobe
-    say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
-    """
+    """Return how long the budget lasts, and the shortest and the longest time that it may."""
+    # The rate is taken as <A'> + p (1/|N| - <1/|N|>), p >= 0. Windows that saw little of the lobe
+    # say little about p: it is shrunk by p^2 / (p^2 + its variance), towards a constant rate.
     mean, centre = float(rates.mean()), float(inverse.mean())
     slope, of_slope, of_mean = _slope(rates, inverse)
     p = max(slope, 0.0) ** 3 / (slope**2 + of_slope**2) if slope else 0.0
 
     def lasts(rate: float, slope: float) -> float:
-        return _duration(Balance(p=slope, q=slope * centre - rate, residual=0.0), zeta, N, lobe)
+        balance = Balance(p=slope, q=slope * centre - rate, residual=0.0)
+        if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
+            return np.inf
+        slowest = balance.rate(N(zeta) if zeta > lobe.place else lobe.extremum)
+        if not slowest > 0:
+            return np.inf
+        return quad(lambda z: abs(N(z)) / balance.rate(N(z)), zeta, lobe.high, limit=200)[0]
 
     slopes = {max(p - ERRORS * of_slope, 0.0), p, max(slope + ERRORS * of_slope, 0.0)}
     moved = [lasts(mean + s * of_mean, q) for s in (-ERRORS, ERRORS) for q in slopes]
@@ -390,13 +413,3 @@ def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]
     of_slope = np.sqrt((BLOCKS - 1) * np.var(slopes))
     freedom = max(rates.size - 2, 1)
     return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))
-
-
-def _duration(balance: Balance, zeta: float, N: GainFunction, lobe: Lobe) -> float:
-    """Time until the budget is spent by the balance: int |N| dzeta / A'."""
-    if balance.rate(lobe.extremum) <= 0 and zeta < lobe.place:
-        return np.inf
-    slowest = balance.rate(N(zeta) if zeta > lobe.place else lobe.extremum)
-    if not slowest > 0:
-        return np.inf
-    return quad(lambda z: abs(N(z)) / balance.rate(N(z)), zeta, lobe.high, limit=200)[0]

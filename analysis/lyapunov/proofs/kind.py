@@ -20,8 +20,6 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, only_declared
 from .result import Certificate, ProofResult
 
-__all__ = ["Closed", "ProofKind", "ProofOptions", "Subject", "certified", "wider", "without_end"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ProofOptions:
@@ -75,51 +73,28 @@ class ProofKind:
     """A kind of proof.
 
     Those that `certify` knows have all fields; of others the first four say what they are.
-
-    Attributes
-    ----------
-    name : str
-        As in files and in the recheck: lower-case words.
-    about : str
-        What it is about, in words.
-    result : type of ProofResult
-        What it finds.
-    find : str
-        The function of `nlctl.analysis.lyapunov` that finds it.
-    fits : callable, optional
-        ``fits(loop)`` says whether a loop is one for it.
-    takes_W : bool
-        Whether weights may be chosen.
-    bounded : str
-        What is bounded, ``"|r|"``.
-    begin : callable, optional
-        ``begin(loop, options)`` reads a loop and returns the `Subject`.
-    region : callable, optional
-        ``region(subject, level)`` returns what the signals stay in below a little more than a
-        level: an object with that bound `C`, its `box`, and the `boxes` and `arithmetic` of proofs.
-    bound : callable, optional
-        ``bound(subject, region)`` returns what the region implies: an object with the new `level`,
-        and a `doubt` where there is none.
-    endless : callable, optional
-        ``endless(region, iterations)`` says why the iteration is given up; nothing if it is not.
-    largest_input : callable, optional
-        ``largest_input(subject, region, bound)`` returns a bound of |u|.
-    fields : callable, optional
-        ``fields(subject, closed)`` returns the fields of `result` that are its own.
     """
 
-    name: str
-    about: str
-    result: type[ProofResult]
-    find: str = "certify"
-    fits: Callable[[Any], bool] | None = None
-    takes_W: bool = False
-    bounded: str = ""
+    name: str  # as in files and in the recheck: lower-case words
+    about: str  # what it is about, in words
+    result: type[ProofResult]  # what it finds
+    find: str = "certify"  # the function of `nlctl.analysis.lyapunov` that finds it
+    fits: Callable[[Any], bool] | None = None  # ``fits(loop)`` says whether a loop is one for it
+    takes_W: bool = False  # whether weights may be chosen
+    bounded: str = ""  # what is bounded, ``"|r|"``
+    # ``begin(loop, options)`` reads a loop and returns the `Subject`
     begin: Callable[[Any, ProofOptions], Subject] | None = None
+    # ``region(subject, level)`` returns what the signals stay in below a little more than a level:
+    # an object with that bound `C`, its `box`, and the `boxes` and `arithmetic` of proofs
     region: Callable[[Subject, arb], Any] | None = None
+    # ``bound(subject, region)`` returns what the region implies: an object with the new `level`,
+    # and a `doubt` where there is none
     bound: Callable[[Subject, Any], Any] | None = None
+    # ``endless(region, iterations)`` says why the iteration is given up; nothing if it is not
     endless: Callable[[Any, Sequence[float]], str] = _not_looked_at
+    # ``largest_input(subject, region, bound)`` returns a bound of |u|
     largest_input: Callable[[Subject, Any, Any], float] | None = None
+    # ``fields(subject, closed)`` returns the fields of `result` that are its own
     fields: Callable[[Subject, Closed], Mapping[str, Any]] | None = None
 
 

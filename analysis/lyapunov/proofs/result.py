@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -16,8 +16,6 @@ from ...intervals.box import Box
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
 from .saved import Content, save_certificate
-
-__all__ = ["FROM_STARTS", "Certificate", "Constant", "ProofResult", "Provenance", "per_second"]
 
 FROM_STARTS = "all t, from the starts"
 Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
@@ -57,6 +55,20 @@ class Constant:
     provenance: Provenance
     how: str
     over: str
+
+
+def constants_of_rows(rows: Iterable[Row]) -> tuple[Constant, ...]:
+    """Return the constants of a table."""
+    return tuple(
+        Constant(symbol=s, value=float(v), unit=per, provenance=p, how=how, over=where)
+        for s, v, per, p, how, where in rows
+    )
+
+
+def rows_of_split(split: Decomposition) -> Iterator[Row]:
+    """Yield the constants of an actuator's split."""
+    for symbol, value in (("k_1", split.k_1), ("k_2", split.k_2), ("eps_u*", split.eps_star)):
+        yield symbol, value, "1", split.provenance, split.how, split.over
 
 
 def per_second(power: int) -> str:
@@ -193,21 +205,12 @@ class Certificate(ProofResult):
     @property
     def constants(self) -> tuple[Constant, ...]:
         """Every constant of the proof; without the bounds if nothing is proved."""
-        return tuple(
-            Constant(symbol=s, value=float(v), unit=per, provenance=p, how=how, over=where)
-            for s, v, per, p, how, where in self._rows()
-        )
+        return constants_of_rows(self._rows())
 
     @property
     def _sure(self) -> Provenance:
         """What is known of a constant that the actuator's split enters."""
         return "given" if self.split.provenance == "given" else "proved"
-
-    def _of_split(self) -> Iterator[Row]:
-        how = (self.split.provenance, self.split.how, self.split.over)
-        yield "k_1", self.split.k_1, "1", *how
-        yield "k_2", self.split.k_2, "1", *how
-        yield "eps_u*", self.split.eps_star, "1", *how
 
     @as_annotated
     def save(self, file: str | os.PathLike[str]) -> Path:

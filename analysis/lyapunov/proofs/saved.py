@@ -24,14 +24,6 @@ from ...recheck import FORMAT, Refuted, proved_bounds, recheck, seal_of
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
 
-__all__ = [
-    "Content",
-    "save_certificate",
-    "split_content",
-    "starts_content",
-    "texts",
-]
-
 Content = dict[str, Any]
 
 

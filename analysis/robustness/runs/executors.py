@@ -31,8 +31,6 @@ from nlctl.native.ensemble import cores
 from ..uncertainty.design import Design, rows, seed_number
 from .experiment import Prepared, columns_of, evaluate, typed
 
-__all__ = ["LostChunkError", "chunk_table", "computed_elsewhere", "computed_here"]
-
 _LOOK = 0.5  # s between looks at Ctrl-C while workers are busy
 Chunk = tuple[range, pd.DataFrame]
 
@@ -50,11 +48,9 @@ def chunk_table(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> pd.DataFrame:
-    """Run some rows of a design.
-
-    A pure function, except for the column ``wall_time``.  `points` are these rows of a listed
-    design that was sent without them.
-    """
+    """Run some rows of a design."""
+    # A pure function, except for the column ``wall_time``. `points` are these rows of a listed
+    # design that was sent without them.
     start = time.perf_counter()
     table = rows(design, numbers) if points is None else points
     try:
@@ -94,11 +90,9 @@ def computed_elsewhere(
     *,
     threads: int | None = None,
 ) -> Generator[Chunk, None, None]:
-    """Yield chunks as the executor finishes them.
-
-    Two per worker are in flight at most.  When no more are wanted, or one has failed, those that
-    have not begun are cancelled and the others are waited for.
-    """
+    """Yield chunks as the executor finishes them."""
+    # Two per worker are in flight at most. When no more are wanted, or one has failed, those that
+    # have not begun are cancelled and the others are waited for.
     payload, todo = _packed(prepared, design), iter(chunks)
     waiting: dict[Future, range] = {}
     failures: list[tuple[range, BaseException]] = []
@@ -137,10 +131,8 @@ def computed_elsewhere(
 
 
 def _packed(prepared: Prepared, design: Design) -> bytes:
-    """Return what a worker needs, as bytes; functions made at run time travel by value.
-
-    What builds diagrams stays at home, and the rows of a listed design go with their chunks.
-    """
+    """Return what a worker needs, as bytes; functions made at run time travel by value."""
+    # What builds diagrams stays at home, and the rows of a listed design go with their chunks.
     experiment = replace(prepared.experiment, build=_stays_at_home)
     light = replace(design, points=None, details={})
     return cloudpickle.dumps((replace(prepared, experiment=experiment), light))

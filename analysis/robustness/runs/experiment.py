@@ -28,19 +28,6 @@ from ..stl.spec import Requirement, Spec, unfinished_margin
 from ..uncertainty.binding import diagrams, resolved
 from ..uncertainty.space import Space, arguments, checked_rows
 
-__all__ = [
-    "Columns",
-    "Experiment",
-    "Prepared",
-    "by_diagram",
-    "columns_of",
-    "compile_experiment_ahead",
-    "evaluate",
-    "prepare",
-    "simulate_rows",
-    "typed",
-]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,10 +268,8 @@ def simulate_rows(
     threads: int | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Ensemble:
-    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment.
-
-    `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
-    """
+    """Simulate rows of one diagram, see `by_diagram`, with the settings of an experiment."""
+    # `metrics` and the arguments after them are those of `nlctl.ensemble_response`.
     varied = arguments(experiment.space, rows)
     return ensemble_response(
         loop,
@@ -347,16 +332,14 @@ def _fast(metric: Metric) -> Metric:
     return replace(metric, function=in_machine_code(metric.function))
 
 
+# for each column the name of its type, or the labels that it may hold
 Columns = Mapping[str, str | Sequence[str]]
-"""For each column the name of its type, or the labels that it may hold."""
 
 
 def columns_of(prepared: Prepared) -> Columns:
-    """Return the columns of a sweep's table, in order.
-
-    Those of `experiment.evaluate`, then ``seed`` (see `design.seed_number`) and ``wall_time``, the
-    time (s) that a row's chunk took over its number of rows.
-    """
+    """Return the columns of a sweep's table, in order."""
+    # Those of `experiment.evaluate`, then ``seed`` (see `design.seed_number`) and ``wall_time``,
+    # the time (s) that a row's chunk took over its number of rows.
     experiment = prepared.experiment
     numbers = (*experiment.space.names, *experiment.measured)
     columns: dict[str, str | Sequence[str]] = dict.fromkeys(numbers, "float64")

@@ -23,14 +23,6 @@ from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space
 from .experiment import Prepared
 
-__all__ = [
-    "differences_of",
-    "experiment_facts",
-    "identity_of",
-    "labels_text",
-    "versions_of_numbers",
-]
-
 VERSIONS = ("control", "numpy", "scipy", "numba", "llvmlite", "cma")
 COMPUTING = {
     Path(errors.__file__).parent: ("**/*.py",),
@@ -48,10 +40,8 @@ PROBES = np.array([0.01, 0.25, 0.5, 0.75, 0.99])
 def identity_of(
     prepared: Prepared, design: Design, more: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
-    """Return everything that the numbers of a study follow from, as data for a JSON file.
-
-    It names no path and no machine.
-    """
+    """Return everything that the numbers of a study follow from, as data for a JSON file."""
+    # It names no path and no machine.
     content = experiment_facts(prepared, design.space) | {
         "design": {
             "kind": design.kind,

@@ -9,8 +9,6 @@ import pandas as pd
 
 from nlctl.errors import UsageError
 
-__all__ = ["parquet", "read_parquet"]
-
 
 def parquet() -> ModuleType:
     """Return ``pyarrow.parquet``; say what to install where it is missing."""
@@ -25,10 +23,8 @@ def parquet() -> ModuleType:
 
 
 def read_parquet(path: Path) -> pd.DataFrame:
-    """Read a table that `DataFrame.to_parquet` has written, without threads.
-
-    Those of pyarrow's datasets, which `read_table` begins, wait for ever where memory is too short
-    to begin others.
-    """
+    """Read a table that `DataFrame.to_parquet` has written, without threads."""
+    # Those of pyarrow's datasets, which `read_table` begins, wait for ever where memory is too
+    # short to begin others.
     with parquet().ParquetFile(path) as file:
         return file.read(use_threads=False).to_pandas(use_threads=False)

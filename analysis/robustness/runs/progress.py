@@ -17,8 +17,6 @@ from ..statistics.sequential import SequentialTest, decision, sequence_bounds
 from ..stl.spec import violates
 from ..uncertainty.design import Design
 
-__all__ = ["Progress", "Tally", "until_decided"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:

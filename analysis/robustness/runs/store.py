@@ -38,18 +38,6 @@ if TYPE_CHECKING:
 CHUNKS_FORMAT = 2
 SEALS = b"nlctl.seals"  # a key of each column, in a chunk's file
 
-__all__ = [
-    "ChunkStore",
-    "StoreError",
-    "claimed",
-    "locked",
-    "opened",
-    "put",
-    "stored",
-    "table_of",
-    "taken_up",
-]
-
 
 class StoreError(UsageError):
     """A folder that a sweep cannot be kept in; the message names it and says what is kept.
@@ -85,10 +73,8 @@ class ChunkStore:
 
 @contextmanager
 def locked(folder: Path, error: type[UsageError] = StoreError) -> Iterator[None]:
-    """Hold a folder for this process alone; it is made where there is none.
-
-    The lock is the operating system's: it ends with the process, however that ends.
-    """
+    """Hold a folder for this process alone; it is made where there is none."""
+    # The lock is the operating system's: it ends with the process, however that ends.
     owner, lock = folder / ".owner", FileLock(folder / ".lock", timeout=0)
     me = f"process {os.getpid()} on {socket.gethostname()}".encode()
     try:

@@ -28,8 +28,6 @@ from .identity import identity_of
 from .progress import Progress, Tally
 from .store import ChunkStore, claimed, opened, put, stored, table_of, taken_up
 
-__all__ = ["Interrupt", "Sweep", "gentle_interrupt", "load", "sweep"]
-
 _LARGEST = 1024  # rows of a chunk: some 200 kB on disk, and seconds of work
 FEWEST = 20  # chunks of a sweep, so that a kill costs little
 _STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
@@ -289,10 +287,6 @@ def _check(
         integer("a sweep", "threads", threads, at_least=1)
     if nothing_kept:
         raise ParameterError("a sweep needs a folder to resume, got none")
-    _check_space(prepared, design)
-
-
-def _check_space(prepared: Prepared, design: Design) -> None:
     names, given = prepared.experiment.space.names, design.space.names
     for name in given:
         if name not in names:
@@ -341,9 +335,7 @@ class _Run:
             self.decided = self.stop(self.tally.progress()) or None
 
     def through(
-        self,
-        chunks: Iterator[tuple[range, pd.DataFrame]],
-        keep: Callable[[pd.DataFrame], object],
+        self, chunks: Iterator[tuple[range, pd.DataFrame]], keep: Callable[[pd.DataFrame], object]
     ) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
         self.report()
@@ -369,11 +361,9 @@ class Interrupt:
 
 @contextmanager
 def gentle_interrupt() -> Iterator[Interrupt]:
-    """Take down the first SIGINT; the second one raises KeyboardInterrupt.
-
-    Only Python's main thread may listen to signals: in another one, and where SIGINT is ignored,
-    nothing changes.  What listened before listens again afterwards.
-    """
+    """Take down the first SIGINT; the second one raises KeyboardInterrupt."""
+    # Only Python's main thread may listen to signals: in another one, and where SIGINT is ignored,
+    # nothing changes. What listened before listens again afterwards.
     interrupt = Interrupt()
 
     def pressed(number: int, frame: Any) -> None:

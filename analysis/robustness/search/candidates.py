@@ -17,29 +17,13 @@ from ..uncertainty.lattice import corners
 from ..uncertainty.space import Space, ends, from_unit_cube
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = [
-    "Search",
-    "corner_count",
-    "evolve",
-    "in_batches",
-    "search_worst",
-    "some_corners",
-    "uniform",
-    "unit_places",
-]
-
-_SHARE = 4
-"""Corners, and uniform draws, take one part in this many of the runs each."""
-BATCH = 64
-"""Rows that run together."""
+_SHARE = 4  # corners, and uniform draws, take one part in this many of the runs each
+BATCH = 64  # rows that run together
+# CMA-ES has at least so many rows in a generation: they fill the lanes of two cores
 GENERATION = 16
-"""CMA-ES has at least so many rows in a generation: they fill the lanes of two cores."""
-SPREAD = 0.25
-"""First standard deviation of CMA-ES, in units of the boxes."""
-RESOLUTION = 1e-6
-"""A search ends where margins, or places in the unit cube, differ by less."""
-EXTREME = 1e9
-"""CMA-ES, which needs finite numbers, sees margins up to this size."""
+SPREAD = 0.25  # first standard deviation of CMA-ES, in units of the boxes
+RESOLUTION = 1e-6  # a search ends where margins, or places in the unit cube, differ by less
+EXTREME = 1e9  # CMA-ES, which needs finite numbers, sees margins up to this size
 
 
 class Search:

@@ -22,18 +22,12 @@ from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import arguments, checked_row
 from .evaluation import as_table
 
-__all__ = ["TIGHTER", "Confirmation", "confirm"]
-
-TIGHTER = 100.0
-"""Tolerances are divided by this."""
-_OTHERS = ("tsit5", "rodas5p")
-"""The explicit integrator and the stiff one."""
-_REFERENCE = "LSODA"
-"""SciPy's, in python-control."""
+TIGHTER = 100.0  # tolerances are divided by this
+_OTHERS = ("tsit5", "rodas5p")  # the explicit integrator and the stiff one
+_REFERENCE = "LSODA"  # SciPy's, in python-control
+# how a run may end where its states leave the finite numbers
 _BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
-"""How a run may end where its states leave the finite numbers."""
-_SAME = 0.01
-"""Bursts are the same if their times differ by at most this part of the later one."""
+_SAME = 0.01  # bursts are the same if their times differ by at most this part of the later one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,12 +140,7 @@ def confirm(
 
 
 def _replay(
-    engine: str,
-    experiment: Experiment,
-    status: str,
-    time: float,
-    margin: float,
-    method: str = "",
+    engine: str, experiment: Experiment, status: str, time: float, margin: float, method: str = ""
 ) -> dict[str, Any]:
     return {
         "engine": engine,

@@ -17,8 +17,6 @@ from ..uncertainty.design import checked_entropy, independent
 from ..uncertainty.space import Space, scaled
 from .evaluation import Evaluate, evaluated
 
-__all__ = ["Degradation", "degradation_curve"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Degradation:

@@ -14,22 +14,14 @@ from ..uncertainty.space import Space, from_unit_cube
 from .candidates import GENERATION, Search, evolve, in_batches, some_corners, uniform, unit_places
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
-__all__ = ["search_with_derivatives", "test_signals"]
-
-_DRAWS = 4
-"""Corners, and uniform draws, of each round."""
-_GENERATIONS = 2
-"""Of CMA-ES in each round."""
-_STEPS = 10
-"""Descents have at most so many steps."""
-_SMALLEST = 1 / 256
-"""Shortest step of a descent, in units of the boxes."""
-_SHORTER = 4
-"""By what a step is shortened that did not go down."""
+_DRAWS = 4  # corners, and uniform draws, of each round
+_GENERATIONS = 2  # of CMA-ES in each round
+_STEPS = 10  # descents have at most so many steps
+_SMALLEST = 1 / 256  # shortest step of a descent, in units of the boxes
+_SHORTER = 4  # by what a step is shortened that did not go down
+# the next step is twice as long where one gains this part of what the first order says
 _TRUSTED = 0.5
-"""The next step is twice as long where one gains this part of what the first order says."""
-_MOST_CONSTANT = 16
-"""Test signals that are constant."""
+_MOST_CONSTANT = 16  # test signals that are constant
 _PIECE = re.compile(r"(.*)\[(\d+)\]")
 
 

@@ -14,11 +14,9 @@ from nlctl.errors import ParameterError
 from ..uncertainty.quantity import Uncertain
 from ..uncertainty.space import Space, moved, nominal
 
-__all__ = ["Evaluate", "as_table", "evaluated", "margins_of", "row_text", "towards_nominal"]
-
+# takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
+# ``functools.partial(evaluate, prepared)``
 Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
-"""Takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
-``functools.partial(evaluate, prepared)``."""
 
 
 def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:

@@ -19,18 +19,12 @@ from ..uncertainty.design import affordable, with_row_numbers
 from ..uncertainty.space import Space, ends, from_unit_cube, nominal
 from .evaluation import Evaluate, evaluated, margins_of
 
-__all__ = ["FailureMap", "boundary", "failure_map"]
-
-_Cell = tuple[int, int, int]
-"""Lower left corner and side, in steps of the finest grid."""
+_Cell = tuple[int, int, int]  # lower left corner and side, in steps of the finest grid
+# a cell is near the boundary if its least |margin| is below this part of their range in it
 CLOSE = 0.5
-"""A cell is near the boundary if its least |margin| is below this part of their range in it."""
-_FINEST = 30
-"""Divisions beyond which the finest cells are no wider than rounding."""
-_WORK = 40
-"""What a point of the first grid takes next to its row, in numbers."""
-NEW = 5
-"""Points that the refinement of a cell adds at most."""
+_FINEST = 30  # divisions beyond which the finest cells are no wider than rounding
+_WORK = 40  # what a point of the first grid takes next to its row, in numbers
+NEW = 5  # points that the refinement of a cell adds at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

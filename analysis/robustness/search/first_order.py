@@ -20,8 +20,6 @@ from scipy.optimize import linprog
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
 
-__all__ = ["FirstOrder", "FirstOrderOf", "lowest_nearby"]
-
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
 _NESTED = 60  # arguments of a largest value of windows that are followed
@@ -69,16 +67,14 @@ class FirstOrder:
     reason: str = ""
 
 
+# takes a row; for a loop ``functools.partial(first_order, prepared)``
 FirstOrderOf = Callable[[Mapping[str, Any]], FirstOrder]
-"""Takes a row; for a loop ``functools.partial(first_order, prepared)``."""
 
 
 def lowest_nearby(of: FirstOrder, place: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
-    """Return where the first order makes the least margin lowest, and that margin.
-
-    No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite
-    where there is no derivative.
-    """
+    """Return where the first order makes the least margin lowest, and that margin."""
+    # No coordinate moves further than `radius`, nor out of the unit cube; the margin is infinite
+    # where there is no derivative.
     best, least = place, np.inf
     for requirement in of.requirements:
         lowered = _lowered(of, requirement, place, radius)

@@ -21,10 +21,7 @@ from ..uncertainty.binding import owner_of
 from ..uncertainty.space import Space, ends, nominal
 from .evaluation import towards_nominal
 
-__all__ = ["largest_scale", "refusal_of"]
-
-FEW = 10
-"""Of up to so many quantities of one block all corners are tried."""
+FEW = 10  # of up to so many quantities of one block all corners are tried
 
 
 @as_annotated

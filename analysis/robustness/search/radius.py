@@ -19,14 +19,10 @@ from ..uncertainty.space import Space, combinations, nominal, scaled
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
 from .worst_case import worst_case
 
-__all__ = ["Radius", "robustness_radius", "size_of"]
-
+# smallest size that is searched first, as a part of the largest; then twice that, and so on
 START = 1 / 16
-"""Smallest size that is searched first, as a part of the largest; then twice that, and so on."""
-_SMALLEST = 1e-3
-"""Smaller sizes are not searched, as a part of the largest."""
-RAY = 12
-"""Bisections along the ray to a witness."""
+_SMALLEST = 1e-3  # smaller sizes are not searched, as a part of the largest
+RAY = 12  # bisections along the ray to a witness
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,10 +99,8 @@ class Radius:
 
 
 def size_of(space: Space, row: Mapping[str, Any]) -> float:
-    """Return the smallest factor by which the box must be scaled to hold a row.
-
-    The largest deviation from nominal, each as a multiple of its side of the box.
-    """
+    """Return the smallest factor by which the box must be scaled to hold a row."""
+    # The largest deviation from nominal, each as a multiple of its side of the box.
     middle, sizes = nominal(space), [0.0]
     for quantity in space.quantities:
         low, high = quantity.box

@@ -17,8 +17,6 @@ from ..uncertainty.space import arguments, checked_row, ends
 from .evaluation import as_table
 from .first_order import FirstOrder
 
-__all__ = ["first_order"]
-
 
 @as_annotated
 def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:

@@ -18,8 +18,6 @@ from nlctl.wording import counted, some_of
 from ..uncertainty.space import Space, checked_row, nominal
 from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
 
-__all__ = ["Shrunk", "shrink"]
-
 _Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
 
@@ -69,12 +67,7 @@ class Shrunk:
 
 @as_annotated
 def shrink(
-    evaluate: Evaluate,
-    space: Space,
-    row: Mapping[str, Any],
-    *,
-    steps: int = 10,
-    most: int = 2000,
+    evaluate: Evaluate, space: Space, row: Mapping[str, Any], *, steps: int = 10, most: int = 2000
 ) -> Shrunk:
     """Set as much of a violating row back to nominal as the violation bears.
 

@@ -19,8 +19,6 @@ from .descent import search_with_derivatives
 from .evaluation import Evaluate, margins_of, row_text
 from .first_order import FirstOrderOf
 
-__all__ = ["WorstCase", "worst_case"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WorstCase:

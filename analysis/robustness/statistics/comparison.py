@@ -22,8 +22,6 @@ from ..uncertainty.quantity import Choice
 from .guarantee import clopper_pearson
 from .paired import Better, differences, mcnemar, wins
 
-__all__ = ["Comparison", "compare", "crossed"]
-
 _Columns = dict[str, np.ndarray]
 
 

@@ -18,28 +18,10 @@ from nlctl.wording import counted, some_of
 from ..stl.spec import violates
 from ..uncertainty.design import Design
 
-__all__ = [
-    "Margins",
-    "NoGuaranteeError",
-    "Side",
-    "Violation",
-    "check_iid",
-    "checked_confidence",
-    "clopper_pearson",
-    "design_assumptions",
-    "least_count",
-    "rounded_down",
-    "rounded_up",
-    "runs_needed",
-    "series_of",
-    "violation_probability",
-    "violations_of",
-]
-
 Side = Literal["upper", "lower", "both"]
 Margins = Sequence[float] | np.ndarray | pd.Series
+# up to so many runs the beta quantiles are good to four digits; beyond, SciPy's are not always
 MOST_RUNS = 10**9
-"""Up to so many runs the beta quantiles are good to four digits; beyond, SciPy's are not always."""
 
 
 class NoGuaranteeError(UsageError):
@@ -263,10 +245,7 @@ def least_count(
 
 @as_annotated
 def violation_probability(
-    design: Design,
-    margins: Margins,
-    confidence: float = 0.99,
-    side: Side = "upper",
+    design: Design, margins: Margins, confidence: float = 0.99, side: Side = "upper"
 ) -> Violation:
     """Bound the probability of a violation from all runs of a design.
 

@@ -5,26 +5,19 @@ from __future__ import annotations
 import numpy as np
 from scipy import special, stats
 
-__all__ = ["independence_test"]
-
-MOST_TABLES = 200_000
-"""Up to so many tables are enumerated; of more, so many are drawn."""
+MOST_TABLES = 200_000  # up to so many tables are enumerated; of more, so many are drawn
 PERMUTATIONS = 99_999
-LARGE = 20.0
-"""From this expected number on in every field the chi-square law is as good as exact."""
+LARGE = 20.0  # from this expected number on in every field the chi-square law is as good as exact
 _ROUNDING = 1e-9
 
 
 def independence_test(counts: np.ndarray, entropy: int) -> tuple[float, float]:
-    """Test whether failing is independent of an option, given how many rows have and do each.
-
-    The statistic is chi-square's; its p-value is exact, the probability of a table at least as far
-    from independence among all with the same sums (the test of Fisher, Freeman and Halton).  Where
-    these are too many they are drawn (a permutation test, whose p is (1 + b) / (1 + draws) and
-    never too small), and where every field expects `LARGE` the law of chi-square is taken.
-
-    Shapes: `counts` (options, 2).
-    """
+    """Test whether failing is independent of an option, given how many rows have and do each."""
+    # The statistic is chi-square's; its p-value is exact, the probability of a table at least as
+    # far from independence among all with the same sums (the test of Fisher, Freeman and Halton).
+    # Where these are too many they are drawn (a permutation test, whose p is (1 + b) / (1 + draws)
+    # and never too small), and where every field expects `LARGE` the law of chi-square is taken.
+    # Shapes: `counts` (options, 2).
     rows, failing = counts.sum(axis=1), int(counts[:, 0].sum())
     if len(rows) == 1:
         return 0.0, 1.0

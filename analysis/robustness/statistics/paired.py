@@ -20,20 +20,8 @@ from ..stl.spec import violates
 from ..uncertainty.design import Design
 from .guarantee import Margins, check_iid, checked_confidence, series_of
 
-__all__ = [
-    "TRUSTED_ROWS",
-    "Better",
-    "differences",
-    "holm",
-    "mcnemar",
-    "mean_is_trusted",
-    "median_interval",
-    "wins",
-]
-
 Better = Literal["smaller", "larger"]
-BCA_ROWS = 5000
-"""Up to so many rows the bootstrap is corrected for bias and acceleration."""
+BCA_ROWS = 5000  # up to so many rows the bootstrap is corrected for bias and acceleration
 TRUSTED_ROWS = 300
 LARGEST_SHARE = 0.1
 
@@ -224,12 +212,10 @@ def mcnemar(design: Design, margins: Mapping[str, Margins]) -> pd.DataFrame:
 
 
 def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float, float]:
-    """Return an exact interval of the median from independent draws of any law.
-
-    The l-th smallest and l-th largest value, with l the (1 - confidence) / 2 quantile of
-    Binomial(n, 1/2), so that P(fewer than l draws on one side) is less than that; infinite where n
-    is too small.
-    """
+    """Return an exact interval of the median from independent draws of any law."""
+    # The l-th smallest and l-th largest value, with l the (1 - confidence) / 2 quantile of
+    # Binomial(n, 1/2), so that P(fewer than l draws on one side) is less than that; infinite where
+    # n is too small.
     ordered = np.sort(values)
     low = int(stats.binom.ppf((1 - checked_confidence(confidence)) / 2, ordered.size, 0.5))
     if low == 0:
@@ -238,16 +224,13 @@ def median_interval(values: np.ndarray, confidence: float = 0.95) -> tuple[float
 
 
 def mean_is_trusted(values: np.ndarray) -> bool:
-    """Return whether the bootstrap interval of a mean has about the confidence that it claims.
-
-    No interval of a mean does for every law (Bahadur and Savage 1956): what happens in one run of a
-    thousand may be the whole mean, and is in no hundred rows.  It is trusted where there are
-    `TRUSTED_ROWS`, which hold what one run in a hundred does with a probability of 95 %; the values
-    are not skew, n >= 25 g^2 with the skewness g (Cochran 1977); and no single one of them makes a
-    tenth of their sum of squares.  The interval of the median needs none of this.
-
-    Shapes: `values` (n,).
-    """
+    """Return whether the bootstrap interval of a mean has about the confidence that it claims."""
+    # No interval of a mean does for every law (Bahadur and Savage 1956): what happens in one run of
+    # a thousand may be the whole mean, and is in no hundred rows. It is trusted where there are
+    # `TRUSTED_ROWS`, which hold what one run in a hundred does with a probability of 95 %; the
+    # values are not skew, n >= 25 g^2 with the skewness g (Cochran 1977); and no single one of them
+    # makes a tenth of their sum of squares. The interval of the median needs none of this.
+    # Shapes: `values` (n,).
     if not np.all(np.isfinite(values)) or values.size < TRUSTED_ROWS:
         return False
     apart = values - values.mean()

@@ -21,8 +21,6 @@ from .guarantee import Margins, checked_confidence, series_of
 from .independence import independence_test
 from .paired import holm
 
-__all__ = ["censored", "elementary_effects", "morris", "regional", "saltelli", "sobol_indices"]
-
 _WHO = "shares of the variance"
 
 

@@ -23,17 +23,7 @@ from .guarantee import (
     violations_of,
 )
 
-__all__ = [
-    "SequentialTest",
-    "confidence_sequence",
-    "decide",
-    "decision",
-    "log_evidence",
-    "sequence_bounds",
-]
-
-PRIOR = 0.5
-"""Both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')."""
+PRIOR = 0.5  # both parameters of the Beta distribution that alternatives are mixed with (Jeffreys')
 
 
 def log_evidence(violations: Any, runs: Any, p: float) -> Any:
@@ -100,10 +90,7 @@ def sequence_bounds(violations: int, runs: int, confidence: float = 0.99) -> tup
 
 
 def _zero(
-    excess: Callable[[float], float],
-    inside: float,
-    outside: float,
-    scale: Callable[[float], float],
+    excess: Callable[[float], float], inside: float, outside: float, scale: Callable[[float], float]
 ) -> float:
     """Return where excess(p) changes sign between two places; p = scale(place)."""
     if excess(scale(outside)) <= 0:  # a confidence next to 1
@@ -140,11 +127,7 @@ class SequentialTest:
 
 
 @as_annotated
-def confidence_sequence(
-    design: Design,
-    margins: Margins,
-    confidence: float = 0.99,
-) -> Violation:
+def confidence_sequence(design: Design, margins: Margins, confidence: float = 0.99) -> Violation:
     """Bound the probability of a violation from the runs that are done, at any time.
 
     Parameters
@@ -200,10 +183,7 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
 
 @as_annotated
 def decide(
-    design: Design,
-    margins: Margins,
-    threshold: float,
-    confidence: float = 0.99,
+    design: Design, margins: Margins, threshold: float, confidence: float = 0.99
 ) -> SequentialTest:
     """Test whether the probability of a violation is below or above a threshold.
 

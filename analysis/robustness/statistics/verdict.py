@@ -16,8 +16,6 @@ from nlctl.wording import counted
 from .guarantee import MOST_RUNS, Violation, least_count, runs_needed
 from .sequential import SequentialTest, log_evidence
 
-__all__ = ["Answer", "Verdict", "better_verdict", "bound_verdict", "test_verdict"]
-
 Answer = Literal["shown", "refuted", "not shown yet"]
 
 

@@ -27,23 +27,6 @@ from nlctl.names import unknown
 
 from .piecewise import Trace, extremes, largest, pointwise_maximum, with_vertices
 
-__all__ = [
-    "Always",
-    "And",
-    "Band",
-    "Eventually",
-    "Formula",
-    "Not",
-    "SampledSignals",
-    "always",
-    "eventually",
-    "horizon",
-    "in_band",
-    "margin_trace",
-    "signals_named",
-]
-
-
 HOW = 'in_band("y", upper=1.0), always(...), eventually(...)'
 
 

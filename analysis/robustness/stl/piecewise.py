@@ -14,8 +14,6 @@ from nlctl.native.machine.machine_code import kept
 
 from ...metrics.curves import path, turning_points
 
-__all__ = ["Trace", "extremes", "higher", "largest", "pointwise_maximum", "with_vertices"]
-
 
 @dataclass(frozen=True)
 class Trace:
@@ -54,12 +52,10 @@ _NONE = np.empty(0)
 def with_vertices(
     t: np.ndarray, y: np.ndarray, breaks: np.ndarray = _NONE, apart: float = 0.0
 ) -> Trace:
-    """Return a signal between samples: lines, through the extremes that samples support.
-
-    Peaks between samples are then seen as `nlctl.analysis.metrics.highest` sees them.  With breaks
-    it is the path of `nlctl.analysis.metrics.curves`: curves between them, and jumps, each `apart`
-    (s) before and after its break.
-    """
+    """Return a signal between samples: lines, through the extremes that samples support."""
+    # Peaks between samples are then seen as `nlctl.analysis.metrics.highest` sees them. With breaks
+    # it is the path of `nlctl.analysis.metrics.curves`: curves between them, and jumps, each
+    # `apart` (s) before and after its break.
     if breaks.size:
         return Trace(*_path(t, y, breaks, apart), jump=3 * apart)
     at, place, value = _vertices(t, y, breaks)
@@ -102,10 +98,8 @@ def extremes(
 
 
 def crossings(t0, t1, a0, a1, b0, b1, jump=0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return where two lines cross inside an interval, and in which intervals they do.
-
-    Shapes: `t0, t1` (n,), `a0, a1, b0, b1` (n,).
-    """
+    """Return where two lines cross inside an interval, and in which intervals they do."""
+    # Shapes: `t0, t1` (n,), `a0, a1, b0, b1` (n,).
     d0, d1 = a0 - b0, a1 - b1
     k = np.nonzero((((d0 < 0) & (d1 > 0)) | ((d0 > 0) & (d1 < 0))) & (t1 - t0 > jump))[0]
     share = 1 / (1 - d1[k] / d0[k])

@@ -1,9 +1,20 @@
-"""Requirements: named formulas, and the margins that a response leaves."""
+"""Requirements: named formulas, and the margins that a response leaves.
+
+A formula as the conjunction of many: what the least margin is the least of.
+
+    rho of always(a & b) = min(rho of always(a), rho of always(b))
+    rho of always over [s, e] = min of those over the pieces of [s, e]
+    rho of lower <= y <= upper = min of those of both bounds
+
+Each of many has fewer kinks than all of them together: which time and which bound decide changes
+only within a piece.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,22 +27,68 @@ from nlctl.names import unknown
 from nlctl.params import as_numbers
 from nlctl.plotting.bands import Limit
 
-from .formula import HOW, Formula, SampledSignals, horizon, margin_trace, signals_named
-from .limits import limits_of_requirements
-from .parts import conjunction
+from .formula import (
+    HOW,
+    Always,
+    And,
+    Band,
+    Formula,
+    SampledSignals,
+    horizon,
+    margin_trace,
+    signals_named,
+)
 
-__all__ = [
-    "FAILED",
-    "Requirement",
-    "Spec",
-    "margin",
-    "margins",
-    "unfinished_margin",
-    "violates",
-]
 
+def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]]:
+    """Return what requirements always ask of each signal; what they ask else is not a line."""
+    limits: dict[str, list[Limit]] = {}
+
+    def walk(formula: Formula, start: float, end: float, until: float) -> None:
+        if isinstance(formula, And):
+            for part in formula.parts:
+                walk(part, start, end, until)
+        elif isinstance(formula, Always):
+            walk(formula.part, start + formula.start, end + formula.end, until)
+        elif isinstance(formula, Band) and end > start:
+            for value in (formula.lower, formula.upper):
+                line = (value, start, min(end, until))
+                if np.isfinite(value) and line not in limits.setdefault(formula.signal, []):
+                    limits[formula.signal].append(line)
+
+    for requirement in requirements:
+        walk(requirement.formula, 0.0, 0.0, requirement.until)
+    return limits
+
+
+def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
+    """Return formulas whose margins have that of `formula` as the least, at the start."""
+    # Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
+    # same window follow each other in a row of their own. What is not a conjunction is alone.
+    return tuple(_rows(formula, until, pieces))
+
+
+def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula, ...]]:
+    match formula:
+        case And():
+            for part in formula.parts:
+                yield from _rows(part, until, pieces)
+        case Band() if np.isfinite([formula.lower, formula.upper]).all():
+            yield (replace(formula, lower=-np.inf),)
+            yield (replace(formula, upper=np.inf),)
+        case Always():
+            last = min(formula.end, until - horizon(formula.part))
+            cuts = np.linspace(formula.start, last, pieces + 1).tolist()
+            windows = list(pairwise(cuts))
+            for row in _rows(formula.part, until, 1):
+                for part in row:
+                    yield tuple(replace(formula, part=part, start=a, end=b) for a, b in windows)
+        case _:
+            yield (formula,)
+
+
+# no margin of a run that reached its end is below -FAILED, and none of another run above it
 FAILED = 1e6
-"""No margin of a run that reached its end is below -FAILED, and none of another run above it."""
 _PIECES = 16  # of a window, where a requirement is taken apart
 
 
@@ -290,11 +347,7 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
 
 @as_annotated
 def margins(
-    spec: Spec,
-    t: np.ndarray,
-    signals: Mapping[str, np.ndarray],
-    *,
-    breaks: ArrayLike | None = None,
+    spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray], *, breaks: ArrayLike | None = None
 ) -> dict[str, float]:
     """Return the margin of every requirement by key, and the least of them as ``"spec"``.
 

@@ -19,17 +19,7 @@ from collections.abc import Callable, Sequence
 
 from nlctl.errors import ParameterError
 
-from .formula import (
-    And,
-    Formula,
-    always,
-    begins_window,
-    eventually,
-    in_band,
-    looks_ahead,
-)
-
-__all__ = ["parse_formula"]
+from .formula import And, Formula, always, begins_window, eventually, in_band, looks_ahead
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
@@ -42,11 +32,9 @@ EXAMPLE = "always from 10 s on |e| <= 0.15"
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a requirement such as ``always from 10 s on |e| <= 0.15``.
-
-    It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales other
-    than the default one.
-    """
+    """Read a requirement such as ``always from 10 s on |e| <= 0.15``."""
+    # It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales
+    # other than the default one.
     reader = _Reader(text)
     formula = _formula(reader, 0)
     if reader.here:

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from .formula import Always, And, Formula, SampledSignals, horizon, margin_trace
 from .spec import Requirement, checked_breaks, margin
 
-__all__ = ["ViolationTime", "violation_time"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class ViolationTime:
@@ -54,15 +52,12 @@ def violation_time(
     *,
     breaks: ArrayLike | None = None,
 ) -> float:
-    """Return the first time in s at which a response violates a requirement; inf if it does not.
-
-    Of ``always`` it is the first time at which what should hold does not, with the signals linear
-    between their samples; of what is asked once, ``eventually``, the time ``until`` which the
-    requirement looks.  A response that ended before is violated at its last good time, if it was
-    not earlier.
-
-    Shapes: `t` (m,), `breaks` (k,).
-    """
+    """Return the first time in s at which a response violates a requirement; inf if it does not."""
+    # Of ``always`` it is the first time at which what should hold does not, with the signals linear
+    # between their samples; of what is asked once, ``eventually``, the time ``until`` which the
+    # requirement looks. A response that ended before is violated at its last good time, if it was
+    # not earlier.
+    # Shapes: `t` (m,), `breaks` (k,).
     rows = np.array([t, *(signals[name] for name in requirement.signals)], dtype=float)
     good = np.all(np.isfinite(rows), axis=0)
     count = rows.shape[1] if good.all() else int(np.argmin(good))

@@ -25,8 +25,6 @@ from nlctl.upstream.control_internals import is_system
 from .quantity import SpaceError, Uncertain
 from .space import Space, combinations
 
-__all__ = ["check_keyword", "diagrams", "owner_of", "resolved"]
-
 
 @as_annotated
 def resolved(space: Space, diagram: ct.InputOutputSystem | Compiled) -> Space:
@@ -93,7 +91,12 @@ def _parameter(quantity: Uncertain, system: Any) -> Uncertain:
         block, key = owner
         for end in map(np.rint, quantity.box) if quantity.is_integer else quantity.box:
             with_overrides(block.current_spec, {key: end}, full.rpartition(".")[0])
-        _check_integer(quantity, full in rows and isinstance(value, int))
+        is_integer = full in rows and isinstance(value, int)
+        if is_integer and not quantity.is_integer:
+            raise SpaceError(
+                f"'{quantity.name}' is an integer and needs a law of integers, such as "
+                f"scipy.stats.randint(0, 10), got {quantity.law_text}"
+            )
     if suffix:
         value = np.asarray(value)[tuple(int(k) for k in re.findall(r"\d+", suffix))]
     if np.ndim(value):
@@ -112,14 +115,6 @@ def owner_of(system: ct.InputOutputSystem, name: str) -> tuple[Block, str] | Non
             return within(leaf.system), name.removeprefix(f"{path}.")
     block = dict(samplings(system)).get(path)
     return None if block is None else (block, name.removeprefix(f"{path}."))
-
-
-def _check_integer(quantity: Uncertain, is_integer: bool) -> None:
-    if is_integer and not quantity.is_integer:
-        raise SpaceError(
-            f"'{quantity.name}' is an integer and needs a law of integers, such as "
-            f"scipy.stats.randint(0, 10), got {quantity.law_text}"
-        )
 
 
 def _filled(quantity: Uncertain, name: str, value: float, unit: str) -> Uncertain:

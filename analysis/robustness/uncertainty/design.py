@@ -17,27 +17,8 @@ from nlctl.names import unknown
 
 from .space import Space, from_quantiles
 
-__all__ = [
-    "Design",
-    "_Kind",
-    "affordable",
-    "checked_entropy",
-    "from_table",
-    "independent",
-    "latin_hypercube",
-    "listed",
-    "row_seed",
-    "rows",
-    "seed_number",
-    "sobol",
-    "sobol_points",
-    "with_row_numbers",
-]
-
-_MOST_ROWS = 10**9
-"""Rows of a design at most: what is drawn row by row."""
-MOST_HELD = 10**8
-"""Numbers that a design holds in memory at most, 800 MB: rows times columns."""
+_MOST_ROWS = 10**9  # rows of a design at most: what is drawn row by row
+MOST_HELD = 10**8  # numbers that a design holds in memory at most, 800 MB: rows times columns
 
 _Kind = Literal[
     "i.i.d.", "Sobol'", "Latin hypercube", "grid", "corners", "one at a time", "Saltelli",

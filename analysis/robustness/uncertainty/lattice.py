@@ -17,8 +17,6 @@ from nlctl.names import unknown
 from .design import Design, affordable, checked_entropy, listed
 from .space import Space, from_unit_cube, nominal
 
-__all__ = ["corners", "grid", "one_at_a_time"]
-
 
 @as_annotated
 def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = None) -> Design:

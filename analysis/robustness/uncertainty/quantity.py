@@ -15,10 +15,8 @@ from nlctl.errors import UsageError
 from nlctl.params import as_numbers
 from nlctl.wording import counted
 
-__all__ = ["QUANTILES", "Choice", "SpaceError", "Uncertain"]
-
+# ends of the box of a law without finite support: it holds 99.8 % of the law
 QUANTILES = (0.001, 0.999)
-"""Ends of the box of a law without finite support: it holds 99.8 % of the law."""
 
 
 class SpaceError(UsageError):

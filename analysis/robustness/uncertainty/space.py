@@ -17,20 +17,6 @@ from nlctl.names import unknown
 
 from .quantity import Choice, SpaceError, Uncertain
 
-__all__ = [
-    "Space",
-    "arguments",
-    "checked_row",
-    "checked_rows",
-    "combinations",
-    "ends",
-    "from_quantiles",
-    "from_unit_cube",
-    "moved",
-    "nominal",
-    "scaled",
-]
-
 
 @as_annotated
 @dataclass(frozen=True, kw_only=True)
@@ -167,12 +153,9 @@ def moved(middle: float, value: Any, factor: float) -> Any:
 
 
 def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
-    """Turn points of the unit cube into values, each coordinate by its law's quantile function.
-
-    Uniform points become draws of the laws.
-
-    Shapes: `unit` (n, len(space.names).
-    """
+    """Turn points of the unit cube into values, each coordinate by its law's quantile function."""
+    # Uniform points become draws of the laws.
+    # Shapes: `unit` (n, len(space.names).
     inner = np.clip(_checked(space, unit), 2.0**-54, 1 - 2.0**-53)
 
     def drawn(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
@@ -182,10 +165,8 @@ def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
 
 
 def from_unit_cube(space: Space, unit: np.ndarray) -> pd.DataFrame:
-    """Turn points of the unit cube into values, linearly between the ends of each box.
-
-    Arguments and errors as in `sampled`; integers are rounded.
-    """
+    """Turn points of the unit cube into values, linearly between the ends of each box."""
+    # Arguments and errors as in `sampled`; integers are rounded.
 
     def between(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
         low, high = quantity.box

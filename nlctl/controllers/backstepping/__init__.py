@@ -1,6 +1,5 @@
 """Backstepping without derivatives of virtual controls: dynamic surface control."""
 
-from .connected import dynamic_surface_control
-from .dynamic_surface import DynamicSurface
+from .dynamic_surface import DynamicSurface, dynamic_surface_control
 
 __all__ = ["DynamicSurface", "dynamic_surface_control"]

@@ -9,8 +9,6 @@ from ...equations import equation
 from ...params import param, record
 from ..rbf import NetworkWeights, network_output, regressor_names, weight_inputs
 
-__all__ = ["ConcurrentWeights", "HistoryStack"]
-
 
 def sum_names(nodes: int) -> tuple[str, ...]:
     """Return ("z[0]", ..., "Omega[0,0]", "Omega[0,1]", ...)."""

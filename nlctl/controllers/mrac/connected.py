@@ -17,8 +17,6 @@ from .model_error import ModelError
 from .reference_model import ReferenceModel, model_state_names
 from .regressors import LinearRegressor
 
-__all__ = ["mrac"]
-
 
 @as_annotated
 def mrac(
@@ -57,7 +55,7 @@ def mrac(
     Returns
     -------
     control.InterconnectedSystem
-        The controller, in the place of one block.
+        The controller, as one block.
 
     Raises
     ------

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...equations import equation
 from ...functions import clip
 from ...params import param, record
 from ...plants import coordinate_names
-from .model_error import check_error_gains, lyapunov_matrix, seen_error
+from .model_error import WeightedError, seen_error
 from .reference_model import model_state_names
-
-__all__ = ["ConstrainedError", "ConstrainedLaw"]
 
 
 @record
@@ -43,9 +39,9 @@ class ConstrainedLaw:
     @equation
     def output(t, x, u, p):
         """The law, and its deficit."""
-        wanted = -u[0]
-        allowed = clip(wanted, -p.u_max, p.u_max)
-        return allowed, allowed - wanted
+        desired = -u[0]
+        allowed = clip(desired, -p.u_max, p.u_max)
+        return allowed, allowed - desired
 
     @staticmethod
     @equation
@@ -55,7 +51,7 @@ class ConstrainedLaw:
 
 
 @record
-class ConstrainedError:
+class ConstrainedError(WeightedError):
     """Error that an adaptive law may learn from when its input is constrained.
 
         E_d' = A E_d + b beta_hat du,   beta_hat' = gamma_d r du,   r = b^T P (E - E_d)
@@ -77,24 +73,9 @@ class ConstrainedError:
     2.0 0.0
     """
 
-    K: tuple[float, ...] = param(
-        (4.0, 2.0), unit="s^-(n+1-i)", meaning="gains of the error; their number is the order n"
-    )
-    Q: tuple[float, ...] = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
     gamma_d: float = param(1.0, unit="1", meaning="adaptation gain of beta_hat", above=0)
 
     outputs = ("e", "r", "nu_e", "E_norm", "beta_hat")
-    feedthrough = True
-    vector = True
-
-    def check(self) -> None:
-        """One entry of Q for each gain, and an error that decays."""
-        check_error_gains("ConstrainedError", self.K, self.Q)
-
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.K)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -106,10 +87,6 @@ class ConstrainedError:
     def states(self) -> tuple[str, ...]:
         """Names E_d1, ..., E_dn, beta_hat."""
         return (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat")
-
-    def derived(self) -> dict[str, Any]:
-        """The last column of P, for the equation."""
-        return {"P_b": lyapunov_matrix(self.K, self.Q)[:, -1]}
 
     @staticmethod
     @equation

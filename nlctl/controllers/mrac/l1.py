@@ -22,8 +22,6 @@ from .modified_weights import ProjectedWeights
 from .reference_model import model_state_names
 from .regressors import AffineRegressor
 
-__all__ = ["FilteredLaw", "StatePredictor", "l1_adaptive"]
-
 
 @record
 class StatePredictor:

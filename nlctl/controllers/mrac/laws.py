@@ -6,8 +6,6 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record
 
-__all__ = ["DirectLaw", "ModelReferenceLaw"]
-
 
 def check_input_gain(who: str, gain: float) -> None:
     """Refuse an input without an effect."""

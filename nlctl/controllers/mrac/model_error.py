@@ -14,21 +14,12 @@ from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from .reference_model import model_state_names
 
-__all__ = ["ModelError", "check_error_gains", "lyapunov_matrix", "seen_error"]
-
 
 def lyapunov_matrix(K: tuple[float, ...], Q: tuple[float, ...]) -> np.ndarray:
     """Return P of A^T P + P A = -diag(Q), shape (n, n), where E' = A E is E_n' = -K^T E."""
     A = np.diag(np.ones(len(K) - 1), 1)
     A[-1] = -np.array(K)
     return np.atleast_2d(ct.lyap(A.T, np.diag(Q)))
-
-
-def check_error_gains(who: str, K: tuple[float, ...], Q: tuple[float, ...]) -> None:
-    """Refuse an entry of Q without a gain, and an error that does not decay."""
-    if len(Q) != len(K):
-        raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
-    check_hurwitz(who, "K", K)
 
 
 @equation
@@ -38,7 +29,41 @@ def seen_error(E, p):
 
 
 @record
-class ModelError:
+class WeightedError:
+    """What errors of adaptive loops share: their gains, and the matrix P that weights them."""
+
+    K: tuple[float, ...] = param(
+        (4.0, 2.0), unit="s^-(n+1-i)", meaning="gains of the error; their number is the order n"
+    )
+    Q: tuple[float, ...] = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
+
+    feedthrough = True
+    vector = True
+
+    def check(self) -> None:
+        """One entry of Q for each gain, and an error that decays."""
+        who, K, Q = type(self).__name__, self.K, self.Q
+        if len(Q) != len(K):
+            raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
+        check_hurwitz(who, "K", K)
+
+    @property
+    def plant_order(self) -> int:
+        """Order n of the plants that it is made for."""
+        return len(self.K)
+
+    @property
+    def lyapunov_matrix(self) -> np.ndarray:
+        """The matrix P, of shape (n, n)."""
+        return lyapunov_matrix(self.K, self.Q)
+
+    def derived(self) -> dict[str, Any]:
+        """The last column of P, for the equation."""
+        return {"P_b": self.lyapunov_matrix[:, -1]}
+
+
+@record
+class ModelError(WeightedError):
     """Error of a plant of class (1) against its reference model, weighted for adaptation.
 
         E = x - xm,   nu_e = -K^T E,   r = b^T P E,   b = (0, ..., 0, 1)
@@ -56,38 +81,13 @@ class ModelError:
     [ 2.   0.5 -4.   2. ]
     """
 
-    K: tuple[float, ...] = param(
-        (4.0, 2.0), unit="s^-(n+1-i)", meaning="gains of the error; their number is the order n"
-    )
-    Q: tuple[float, ...] = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
-
     states = ()
     outputs = ("e", "r", "nu_e", "E_norm")
-    feedthrough = True
-    vector = True
-
-    def check(self) -> None:
-        """One entry of Q for each gain, and an error that decays."""
-        check_error_gains("ModelError", self.K, self.Q)
-
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.K)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names x1, ..., xn, xm1, ..., xmn."""
         return (*coordinate_names(len(self.K)), *model_state_names(len(self.K)))
-
-    @property
-    def lyapunov_matrix(self) -> np.ndarray:
-        """The matrix P, of shape (n, n)."""
-        return lyapunov_matrix(self.K, self.Q)
-
-    def derived(self) -> dict[str, Any]:
-        """The last column of P, for the equation."""
-        return {"P_b": self.lyapunov_matrix[:, -1]}
 
     @staticmethod
     @equation

@@ -12,8 +12,6 @@ from ...equations import equation
 from ...params import param, record
 from ..rbf import NetworkWeights
 
-__all__ = ["EModifiedWeights", "ProjectedWeights"]
-
 
 @record
 class EModifiedWeights(NetworkWeights):

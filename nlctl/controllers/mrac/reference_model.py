@@ -8,8 +8,6 @@ from ...equations import equation
 from ...params import param, record
 from ..filtered_error import check_hurwitz
 
-__all__ = ["ReferenceModel", "model_state_names"]
-
 
 def model_state_names(order: int) -> tuple[str, ...]:
     """Return ("xm1", ..., "xmn")."""

@@ -10,8 +10,6 @@ from ...params import record
 from ...plants import coordinate_names, wing_rock_regressor
 from ..rbf import regressor_names
 
-__all__ = ["AffineRegressor", "LinearRegressor", "WingRockRegressor"]
-
 
 @record
 class _StateRegressor:

@@ -9,9 +9,7 @@ from ...equations import equation
 from ...params import param, record
 from ...plants import coordinate_names
 from ...references import derivative_names
-from .bound import performance_bound
-
-__all__ = ["FunnelControl"]
+from .prescribed import performance_bound
 
 
 @equation

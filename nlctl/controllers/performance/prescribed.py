@@ -8,9 +8,12 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import param, record
 from ...plants import coordinate_names
-from .bound import performance_bound
 
-__all__ = ["PrescribedPerformance"]
+
+@equation
+def performance_bound(t, rho_0, rho_inf, decay):
+    """Performance function rho(t) = (rho_0 - rho_inf) exp(-decay t) + rho_inf."""
+    return (rho_0 - rho_inf) * np.exp(-decay * t) + rho_inf
 
 
 @equation
@@ -69,10 +72,10 @@ class PrescribedPerformance:
         """As many bounds as gains."""
         sizes = {key: len(getattr(self, key)) for key in ("k", "rho_0", "rho_inf", "decay")}
         if len(set(sizes.values())) > 1 or not self.k:
-            told = ", ".join(f"{n} of {key}" for key, n in sizes.items())
+            counted = ", ".join(f"{n} of {key}" for key, n in sizes.items())
             raise ParameterError(
                 "PrescribedPerformance needs k, rho_0, rho_inf and decay of equal length, one "
-                f"value for each state of the plant, got {told}"
+                f"value for each state of the plant, got {counted}"
             )
 
     @property
@@ -90,8 +93,8 @@ class PrescribedPerformance:
     def output(t, x, u, p):
         """The error, the control input, and the bound of the error."""
         yd = u[-1]
-        wanted = yd  # a_{i-1}
+        target = yd  # a_{i-1}
         for i in range(p.k.size):
             rho = performance_bound(t, p.rho_0[i], p.rho_inf[i], p.decay[i])
-            wanted = -p.k[i] * transformed_error((u[i] - wanted) / rho)
-        return u[0] - yd, wanted, performance_bound(t, p.rho_0[0], p.rho_inf[0], p.decay[0])
+            target = -p.k[i] * transformed_error((u[i] - target) / rho)
+        return u[0] - yd, target, performance_bound(t, p.rho_0[0], p.rho_inf[0], p.decay[0])

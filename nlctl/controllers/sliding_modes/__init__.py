@@ -1,6 +1,5 @@
 """Sliding mode control: a law that switches across a boundary layer, and a continuous one."""
 
-from .boundary_layer import SlidingModeLaw, sliding_mode
-from .super_twisting import SuperTwistingLaw
+from .boundary_layer import SlidingModeLaw, SuperTwistingLaw, sliding_mode
 
 __all__ = ["SlidingModeLaw", "SuperTwistingLaw", "sliding_mode"]

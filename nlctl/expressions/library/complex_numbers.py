@@ -15,8 +15,6 @@ from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
 from .table import enter
 
-__all__ = ["ComplexPair", "holds_complex", "paired"]
-
 
 class ComplexPair(Special):
     """An array of complex numbers: the real and the imaginary parts."""

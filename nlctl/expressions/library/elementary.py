@@ -23,24 +23,6 @@ def square(np: Facade, x: Any) -> Any:
     return x * x
 
 
-@formula(np.reciprocal)
-def reciprocal(np: Facade, x: Any) -> Any:
-    """1 / x."""
-    return 1.0 / x
-
-
-@formula(np.deg2rad, np.radians, math.radians)
-def radians(np: Facade, x: Any) -> Any:
-    """Degrees in radians."""
-    return x * (np.pi / 180.0)
-
-
-@formula(np.rad2deg, np.degrees, math.degrees)
-def degrees(np: Facade, x: Any) -> Any:
-    """Radians in degrees."""
-    return x * (180.0 / np.pi)
-
-
 @formula(np.sinc)
 def sinc(np: Facade, x: Any) -> Any:
     """sin(pi x) / (pi x)."""
@@ -48,77 +30,11 @@ def sinc(np: Facade, x: Any) -> Any:
     return np.sin(y) / y
 
 
-@formula(np.float_power)
-def float_power(np: Facade, x: Any, y: Any) -> Any:
-    """x^y of floats."""
-    return np.power(x * 1.0, y)
-
-
-@formula(np.positive, np.real)
-def positive(np: Facade, x: Any) -> Any:
-    """x."""
-    return x.real if isinstance(x, ComplexPair) else x
-
-
-@formula(np.conj)
-def conjugate(np: Facade, x: Any) -> Any:
-    """The conjugate complex number."""
-    return x.conjugate() if isinstance(x, ComplexPair) else x
-
-
-@formula(np.imag)
-def imaginary(np: Facade, x: Any) -> Any:
-    """The imaginary part."""
-    return x.imag if isinstance(x, ComplexPair) else 0.0 * x
-
-
 @formula(np.angle)
 def angle(np: Facade, x: Any, deg: bool = False) -> Any:
     """The angle of a complex number."""
     phase = np.arctan2(x.imag, x.real) if isinstance(x, ComplexPair) else np.arctan2(0.0 * x, x)
     return phase * (180.0 / np.pi) if deg else phase
-
-
-@formula(np.isnan, math.isnan)
-def isnan(np: Facade, x: Any) -> Any:
-    """Whether x is NaN."""
-    return x != x
-
-
-@formula(np.isfinite, math.isfinite)
-def isfinite(np: Facade, x: Any) -> Any:
-    """Whether x is a number."""
-    return np.abs(x) < math.inf
-
-
-@formula(np.isinf, math.isinf)
-def isinf(np: Facade, x: Any) -> Any:
-    """Whether x is infinite."""
-    return np.abs(x) == math.inf
-
-
-@formula(np.signbit)
-def signbit(np: Facade, x: Any) -> Any:
-    """Whether the sign of x is a minus."""
-    return np.copysign(1.0, x) < 0.0
-
-
-@formula(np.remainder, np.mod)
-def remainder(np: Facade, x: Any, y: Any) -> Any:
-    """What is left of x by y, with the sign of y."""
-    return x % y
-
-
-@of(np.floor_divide)
-def floor_divide(graph: Graph, x: Any, y: Any) -> Tracer:
-    """How often y fits into x."""
-    return floor_quotient(graph, x, y)
-
-
-@of(np.divmod)
-def both_of_division(graph: Graph, x: Any, y: Any) -> tuple[Tracer, Tracer]:
-    """How often y fits into x, and what is left."""
-    return floor_quotient(graph, x, y), elementwise(graph, "remainder", x, y)
 
 
 @formula(np.modf)
@@ -134,12 +50,6 @@ def logaddexp2(np: Facade, x: Any, y: Any) -> Any:
     """log2(2^x + 2^y)."""
     two = math.log(2.0)
     return np.logaddexp(x * two, y * two) / two
-
-
-@formula(np.ldexp)
-def ldexp(np: Facade, x: Any, n: Any) -> Any:
-    """x 2^n."""
-    return x * 2.0**n
 
 
 def _of_two(name: str) -> Any:
@@ -167,12 +77,6 @@ def _rounded(np: Facade, x: Any, decimals: int = 0) -> Any:
     return np.rint(x * ten) / ten
 
 
-@formula(np.fix)
-def fix(np: Facade, x: Any) -> Any:
-    """The integer next to x on the way to 0."""
-    return np.trunc(x)
-
-
 @formula(np.unwrap)
 def unwrap(np: Facade, x: Any) -> Any:
     """Angles without jumps by 2 pi."""
@@ -193,12 +97,6 @@ def where(graph: Graph, condition: Any, *values: Any) -> Any:
     if not values:
         return (flatnonzero(graph, condition),)
     return elementwise(graph, "select", condition, *values)
-
-
-@of(np.nonzero)
-def nonzero(graph: Graph, condition: Any) -> tuple[MaskedPlaces]:
-    """Return where a condition holds."""
-    return (flatnonzero(graph, condition),)
 
 
 @of(np.flatnonzero)
@@ -279,21 +177,41 @@ def _isclose(np: Facade, a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08) -
     return np.logical_or(near, np.equal(a, b))
 
 
-@formula(np.allclose)
-def allclose(np: Facade, a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08) -> Any:
-    """Whether all of a are next to b."""
-    return np.all(np.isclose(a, b, rtol, atol))
-
-
-@formula(np.array_equal)
-def array_equal(np: Facade, a: Any, b: Any) -> Any:
-    """Whether all elements are equal."""
-    return np.all(np.equal(a, b))
-
-
 def conj(graph: Graph, values: Tracer) -> Tracer:
     """Return an array of real numbers as it is."""
     return values
 
 
 ARRAY_METHODS.update(clip=_clip, round=np.round, conj=conj, conjugate=conj)
+
+# what is one expression: of NumPy, of which `np` has the functions, and of numbers
+_FORMULAS = (
+    ((np.reciprocal,), lambda np, x: 1.0 / x),
+    ((np.deg2rad, np.radians, math.radians), lambda np, x: x * (np.pi / 180.0)),
+    ((np.rad2deg, np.degrees, math.degrees), lambda np, x: x * (180.0 / np.pi)),
+    ((np.float_power,), lambda np, x, y: np.power(x * 1.0, y)),
+    ((np.positive, np.real), lambda np, x: x.real if isinstance(x, ComplexPair) else x),
+    ((np.conj,), lambda np, x: x.conjugate() if isinstance(x, ComplexPair) else x),
+    ((np.imag,), lambda np, x: x.imag if isinstance(x, ComplexPair) else 0.0 * x),
+    ((np.isnan, math.isnan), lambda np, x: x != x),
+    ((np.isfinite, math.isfinite), lambda np, x: np.abs(x) < math.inf),
+    ((np.isinf, math.isinf), lambda np, x: np.abs(x) == math.inf),
+    ((np.signbit,), lambda np, x: np.copysign(1.0, x) < 0.0),
+    ((np.remainder, np.mod), lambda np, x, y: x % y),
+    ((np.ldexp,), lambda np, x, n: x * 2.0**n),
+    ((np.fix,), lambda np, x: np.trunc(x)),
+    ((np.allclose,), lambda np, a, b, rtol=1e-05, atol=1e-08: np.all(np.isclose(a, b, rtol, atol))),
+    ((np.array_equal,), lambda np, a, b: np.all(np.equal(a, b))),
+)  # fmt: skip
+for _functions, _written in _FORMULAS:
+    formula(*_functions)(_written)
+
+# the same, of the graph
+_OF_GRAPHS = (
+    ((np.floor_divide,), lambda graph, x, y: floor_quotient(graph, x, y)),
+    ((np.divmod,),
+     lambda graph, x, y: (floor_quotient(graph, x, y), elementwise(graph, "remainder", x, y))),
+    ((np.nonzero,), lambda graph, condition: (flatnonzero(graph, condition),)),
+)  # fmt: skip
+for _functions, _written in _OF_GRAPHS:
+    of(*_functions)(_written)

@@ -36,23 +36,18 @@ def _square(graph: Graph, matrix: Any) -> _Rows:
     return rows
 
 
-def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
-    """Note that NumPy raises an error for a singular matrix."""
-    for pivot in pivots:
-        guard = elementwise(graph, "ne", pivot, 0.0).only
-        if guard.op != "const":
-            graph.guards.append(guard)
-        elif not guard.data:
-            raise Untraceable("a singular matrix")
-
-
 def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
     right = traced(graph, b)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
     rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
     triangular, pivots = eliminated(Facade(graph), rows)
-    _guard(graph, pivots)
+    for pivot in pivots:
+        guard = elementwise(graph, "ne", pivot, 0.0).only
+        if guard.op != "const":
+            graph.guards.append(guard)
+        elif not guard.data:
+            raise Untraceable("a singular matrix")
     x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
 

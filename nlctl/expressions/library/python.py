@@ -17,8 +17,6 @@ from ..graph import Expr, Graph, Untraceable
 from ..operators import elementwise
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
-__all__ = ["Builtins", "guard_of_math"]
-
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter", "len",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip

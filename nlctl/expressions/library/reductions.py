@@ -285,10 +285,8 @@ def sort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
 
 @of(np.argsort)
 def argsort(graph: Graph, values: Any, axis: object = -1) -> Tracer:
-    """Return where the elements of an ordered array were.
-
-    Equal ones stay in their order; NumPy's own depends on the machine there.
-    """
+    """Return where the elements of an ordered array were."""
+    # Equal ones stay in their order; NumPy's own depends on the machine there.
     if traced(graph, values).shape[-1] > 16:
         raise Untraceable("the order of many elements, some of which may be equal")
     return _along(graph, values, axis, lambda row: in_order(graph, row)[1])

@@ -14,8 +14,6 @@ from ..graph import Graph, Untraceable
 from ..operators import elementwise, product
 from .table import WRITTEN
 
-__all__ = ["Turn", "enter_rotations"]
-
 SMALL_ANGLE = 1e-3  # rad, below which SciPy takes a series
 _AXES = "xyz"
 

@@ -18,6 +18,7 @@ from .table import ARRAY_METHODS, enter, of
 
 __all__: list[str] = []
 
+# functions that move elements
 _MOVING = (
     np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
@@ -26,7 +27,7 @@ _MOVING = (
     np.repeat, np.take, np.insert, np.delete, np.tril, np.triu, np.resize,
     np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
 )  # fmt: skip
-"""Functions that move elements."""
+# functions that add and multiply
 _COMPUTING = (
     np.convolve, np.correlate, np.kron, np.cross, np.einsum, np.trace,
     np.inner, np.vdot, np.tensordot, np.linalg.multi_dot, np.linalg.matrix_power, np.cumsum,
@@ -34,7 +35,6 @@ _COMPUTING = (
     np.polysub, np.ediff1d, np.linalg.cross, np.linalg.outer, np.linalg.trace,
     np.linalg.vecdot, np.linalg.tensordot,
 )  # fmt: skip
-"""Functions that add and multiply."""
 
 
 def by_moving(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -208,18 +208,6 @@ def atleast_1d(graph: Graph, *values: Any) -> Any:
     return arrays_of_one[0] if len(arrays_of_one) == 1 else tuple(arrays_of_one)
 
 
-@of(np.ravel)
-def ravel(graph: Graph, values: Any, order: str = "C") -> Tracer:
-    """Return an array in one dimension."""
-    return traced(graph, values).reshape(-1, order=order)
-
-
-@of(np.reshape)
-def reshape(graph: Graph, values: Any, shape: Any, order: str = "C") -> Tracer:
-    """Return an array in another shape."""
-    return traced(graph, values).reshape(shape, order=order)
-
-
 @of(np.copyto)
 def copyto(graph: Graph, target: Any, source: Any, where: Any = True) -> None:
     """Assign to an array where a condition holds."""
@@ -261,12 +249,6 @@ def fill_diagonal(graph: Graph, target: Any, value: Any) -> None:
         target[k, k] = value if not getattr(value, "shape", ()) else value[k]
 
 
-@of(np.ndim)
-def ndim(graph: Graph, values: Any) -> int:
-    """Return the number of axes."""
-    return traced(graph, values).ndim
-
-
 @of(np.size)
 def size(graph: Graph, values: Any, axis: Any = None) -> int:
     """Return the number of elements."""
@@ -278,12 +260,6 @@ def size(graph: Graph, values: Any, axis: Any = None) -> int:
 def shape(graph: Graph, values: Any) -> tuple[int, ...]:
     """Return the shape."""
     return traced(graph, values).shape
-
-
-@of(np.isscalar)
-def isscalar(graph: Graph, value: object) -> bool:
-    """Return whether a value is a number and no array."""
-    return not traced(graph, value).shape
 
 
 def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
@@ -314,3 +290,14 @@ ARRAY_METHODS.update(transpose=permuted, fill=_filled, tolist=_listed, item=item
 for _name in ("squeeze", "swapaxes", "repeat", "take", "diagonal", "trace", "cumsum", "cumprod",
               "dot", "compress"):  # fmt: skip
     ARRAY_METHODS[_name] = getattr(np, _name)
+
+# what is one expression, of the graph
+_OF_GRAPHS = (
+    ((np.ravel,), lambda graph, values, order='C': traced(graph, values).reshape(-1, order=order)),
+    ((np.reshape,),
+     lambda graph, values, shape, order='C': traced(graph, values).reshape(shape, order=order)),
+    ((np.ndim,), lambda graph, values: traced(graph, values).ndim),
+    ((np.isscalar,), lambda graph, value: not traced(graph, value).shape),
+)  # fmt: skip
+for _functions, _written in _OF_GRAPHS:
+    of(*_functions)(_written)

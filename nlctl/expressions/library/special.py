@@ -16,8 +16,6 @@ from .reductions import norm_of, prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, of
 
-__all__ = ["enter_scipy"]
-
 
 @functools.cache
 def enter_scipy() -> None:
@@ -81,31 +79,6 @@ def _with_facade(written: Any) -> Any:
     return lambda graph, *rest, **named: written(Facade(graph), *rest, **named)
 
 
-def expit(np: Facade, x: Any) -> Any:
-    """1 / (1 + e^-x)."""
-    return 1.0 / (1.0 + np.exp(-1.0 * x))
-
-
-def logit(np: Facade, x: Any) -> Any:
-    """The inverse of expit."""
-    return np.log(x / (1.0 - x))
-
-
-def log_expit(np: Facade, x: Any) -> Any:
-    """ln expit(x)."""
-    return -1.0 * np.logaddexp(0.0, -1.0 * x)
-
-
-def xlogy(np: Facade, x: Any, y: Any) -> Any:
-    """x ln y, 0 for x = 0."""
-    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y))
-
-
-def xlog1py(np: Facade, x: Any, y: Any) -> Any:
-    """x ln(1 + y), 0 for x = 0."""
-    return np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y))
-
-
 def softmax(np: Facade, x: Any, axis: object = None) -> Any:
     """e^x, divided by the sum of all."""
     e = np.exp(x - np.max(x, axis=axis, keepdims=True))
@@ -121,9 +94,14 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
 
 
 _FORMULAS = {
-    "expit": expit, "logit": logit, "log_expit": log_expit, "xlogy": xlogy, "xlog1py": xlog1py,
-    "softmax": softmax, "logsumexp": logsumexp,
-}  # fmt: skip
+    "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
+    "logit": lambda np, x: np.log(x / (1.0 - x)),
+    "log_expit": lambda np, x: -1.0 * np.logaddexp(0.0, -1.0 * x),
+    "xlogy": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log(y)),
+    "xlog1py": lambda np, x, y: np.where(np.logical_and(x == 0.0, y == y), 0.0, x * np.log1p(y)),
+    "softmax": softmax,
+    "logsumexp": logsumexp,
+}
 
 
 # -- math ------------------------------------------------------------------------------------------
@@ -132,19 +110,14 @@ _FORMULAS = {
 def _whole(name: str) -> Any:
     def written(graph: Graph, x: Any) -> Any:
         value = traced(graph, x)
-        _finite(graph, value)
+        if value.shape:
+            raise Untraceable("a function of math of an array")
+        finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
+        if finite.op != "const":
+            graph.guards.append(finite)
         return whole_numbers(graph, elementwise(graph, name, value))
 
     return written
-
-
-def _finite(graph: Graph, value: Tracer) -> None:
-    """Note that Python raises an error where a number is none."""
-    if value.shape:
-        raise Untraceable("a function of math of an array")
-    finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
-    if finite.op != "const":
-        graph.guards.append(finite)
 
 
 of(math.floor)(_whole("floor"))

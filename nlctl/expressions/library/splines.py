@@ -13,8 +13,6 @@ from ..graph import Expr, Graph, Untraceable
 from .table import enter
 from .tables import MOST_PIECES, interval_choice, polynomial
 
-__all__ = ["called_object", "enter_splines"]
-
 
 def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
     """Return what an object of a library, that can be called, makes of arrays of expressions."""

@@ -12,15 +12,13 @@ from ..functions import FUNCTIONS
 from ..graph import NUMPY, Graph, Untraceable
 from ..operators import elementwise
 
+# of a function of a library: the same of arrays of expressions; it takes the graph first
 WRITTEN: dict[Any, Callable[..., Any]] = {}
-"""Of a function of a library: the same of arrays of expressions; it takes the graph first."""
+# functions whose results a traced function may change: taken from here even of numbers
 ARRAY_MAKERS: set[Any] = set()
-"""Functions whose results a traced function may change: taken from here even of numbers."""
-ARRAY_METHODS: dict[str, Any] = {}
-"""Of an array's method: the function that does the same."""
+ARRAY_METHODS: dict[str, Any] = {}  # of an array's method: the function that does the same
 UFUNC_OPERATIONS = {name: op for op, name in NUMPY.items()} | {name: name for name in FUNCTIONS}
-UFUNC_OPERATIONS["divide"] = "div"
-"""Of the name of a ufunc: the operation of expressions."""
+UFUNC_OPERATIONS["divide"] = "div"  # of the name of a ufunc: the operation of expressions
 
 
 def of(*functions: Any, makes: bool = False) -> Callable[[Any], Any]:
@@ -135,16 +133,12 @@ def of_ufunc(
     if where is not True:
         if out is None:
             raise Untraceable("where= without out=: what is not computed is arbitrary")
-        return _where(graph, written, arguments, out, where)
+        out[...] = elementwise(graph, "select", where, written(*arguments), out)
+        return out
     result = written(*arguments)
     if out is None:
         return result
     out[...] = result
-    return out
-
-
-def _where(graph: Graph, written: Any, arguments: Any, out: Any, where: Any) -> Any:
-    out[...] = elementwise(graph, "select", where, written(*arguments), out)
     return out
 
 

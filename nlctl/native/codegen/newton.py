@@ -33,11 +33,13 @@ SMALL_STEP = 1e-9  # relative; the next one, of about its square, would not be s
 _ROUNDING = 4 * 2.0**-52
 
 
-def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[Solver, list[Expr]]:
+def solver(
+    name: str, guesses: Sequence[Expr], outputs: Sequence[Expr]
+) -> tuple[Solver, list[Expr]]:
     """Return what solves for guesses, and the expressions from outside that it is given."""
     if len(guesses) > _MOST:
         raise Untraceable(f"{len(guesses)} signals have to be found together, {_MOST} can be")
-    nodes = needed(found)
+    nodes = needed(outputs)
     within = inside(nodes, guesses)
     outside = dict.fromkeys(
         arg
@@ -46,30 +48,30 @@ def solver(name: str, guesses: Sequence[Expr], found: Sequence[Expr]) -> tuple[S
         for arg in node.args
         if arg not in within and _is_given(arg)
     )
-    outside |= dict.fromkeys(e for e in found if e not in within and _is_given(e))
+    outside |= dict.fromkeys(e for e in outputs if e not in within and _is_given(e))
     places: dict[Expr, int] = {}
     for expr in outside:
         places[expr] = sum(e.size or 1 for e in places)
     graph, new = _within(nodes, guesses, places)
-    function, exact = _pass(graph, [new[e] for e in found], [new[g] for g in guesses])
-    made = Solver(
+    function, exact = _pass(graph, [new[e] for e in outputs], [new[g] for g in guesses])
+    search = Solver(
         name=name, given=sum(e.size or 1 for e in places), count=len(guesses), function=function,
         exact=exact, initial=(BASE, 0.0, 0.0, np.inf, *[STARTS[0]] * len(guesses),
                               *[0.0] * len(guesses)),
     )  # fmt: skip
-    return made, list(places)
+    return search, list(places)
 
 
 def inside(nodes: Sequence[Expr], guesses: Sequence[Expr]) -> set[Expr]:
-    """Return what depends on a guess, and the truth values beside it: no array holds these."""
-    found = set(guesses)
+    """Return what depends on a guess, and the truth values next to it: no array holds these."""
+    within = set(guesses)
     for node in nodes:
-        if any(arg in found for arg in node.args):
-            found.add(node)
+        if any(arg in within for arg in node.args):
+            within.add(node)
     for node in reversed(nodes):
-        if node in found:
-            found.update(arg for arg in node.args if arg.kind == "b")
-    return found
+        if node in within:
+            within.update(arg for arg in node.args if arg.kind == "b")
+    return within
 
 
 def _within(
@@ -84,10 +86,7 @@ def _within(
             where = ("w", places[node], 1 if node.size else 0)
             new[node] = graph.node("leaf", data=where, size=node.size, varies=True)
         elif all(arg in new for arg in node.args):
-            new[node] = graph.node(
-                node.op, *(new[a] for a in node.args), data=node.data, size=node.size,
-                kind=node.kind, varies=node.varies, value=node.value,
-            )  # fmt: skip
+            new[node] = graph.like(node, *(new[a] for a in node.args))
     return graph, new
 
 
@@ -96,18 +95,18 @@ def _is_given(expr: Expr) -> bool:
 
 
 def _pass(
-    graph: Graph, found: Sequence[Expr], guesses: Sequence[Expr]
+    graph: Graph, results: Sequence[Expr], guesses: Sequence[Expr]
 ) -> tuple[Function, frozenset[Expr]]:
     """Return the plan of one step of the search."""
     n = len(guesses)
     columns = [
-        tangents(graph, found, lambda leaf, g=g: graph.const(1.0) if leaf is g else None)
+        tangents(graph, results, lambda leaf, g=g: graph.const(1.0) if leaf is g else None)
         for g in guesses
     ]
     zero = graph.const(0.0)
     jacobian = [[scalar(graph, columns[j][i] or zero) for j in range(n)] for i in range(n)]
     state = [scalar(graph, graph.leaf("s", i, None)) for i in range(GUESS + 2 * n)]
-    values = [scalar(graph, graph.number(e)) for e in found]
+    values = [scalar(graph, graph.number(e)) for e in results]
     following = Stage(graph).copied(improved)(n, state, values, jacobian)
     exprs = [e.only if isinstance(e, Tracer) else graph.const(float(e)) for e in following]
     stores = [Store(array="n", row=i, expr=e, size=1) for i, e in enumerate(exprs)]
@@ -116,18 +115,18 @@ def _pass(
 
 
 def improved(
-    n: int, state: Sequence[Any], found: Sequence[Any], jacobian: Sequence[Sequence[Any]]
+    n: int, state: Sequence[Any], results: Sequence[Any], jacobian: Sequence[Sequence[Any]]
 ) -> list[Any]:
     """Return the next state of a search."""
     phase, count, start, best = state[:4]
     guess, base = state[4 : 4 + n], state[4 + n : 4 + 2 * n]
-    apart = largest_magnitude([found[i] - guess[i] for i in range(n)])
+    apart = largest_magnitude([results[i] - guess[i] for i in range(n)])
     count = count + 1.0
-    solved = np.logical_and(phase == _TRIAL, apart <= _ROUNDING * largest_magnitude(found))
+    solved = np.logical_and(phase == _TRIAL, apart <= _ROUNDING * largest_magnitude(results))
     better = apart < best  # NaN is not; the first one is infinite
     step, is_regular = linear_solution(
         [[jacobian[i][j] - (1.0 if i == j else 0.0) for j in range(n)] for i in range(n)],
-        [guess[i] - found[i] for i in range(n)],
+        [guess[i] - results[i] for i in range(n)],
     )
     moved = [guess[i] + step[i] for i in range(n)]
     is_short = largest_magnitude(step) <= SMALL_STEP * largest_magnitude(moved)

@@ -32,33 +32,16 @@ class Store:
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionPlan:
-    """What is computed when.
+    """What is computed when."""
 
-    Attributes
-    ----------
-    known : mapping
-        Expressions that lie in memory when the function begins, and where: (array, row).
-    nodes : tuple of Expr
-        Everything that is needed, in an order in which it can be computed.
-    level : dict
-        When each is known.
-    stored : dict
-        Vectors that lie in memory, and where: (array, row).
-    loops : dict
-        For every loop its vectors and sums, in order.
-    stores : tuple of Store
-        Everything to be written, the vectors in memory included.
-    rows : int
-        Rows of memory that are taken, those before included.
-    """
-
+    # expressions that lie in memory when the function begins, and where: (array, row)
     known: Mapping[Expr, tuple[str, int]]
-    nodes: tuple[Expr, ...]
-    level: dict[Expr, int]
-    stored: dict[Expr, tuple[str, int]]
-    loops: dict[_Loop, list[Expr]]
-    stores: tuple[Store, ...]
-    rows: int
+    nodes: tuple[Expr, ...]  # everything that is needed, in an order in which it can be computed
+    level: dict[Expr, int]  # when each is known
+    stored: dict[Expr, tuple[str, int]]  # vectors that lie in memory, and where: (array, row)
+    loops: dict[_Loop, list[Expr]]  # for every loop its vectors and sums, in order
+    stores: tuple[Store, ...]  # everything to be written, the vectors in memory included
+    rows: int  # rows of memory that are taken, those before included
 
     @cached_property
     def levels(self) -> tuple[Level, ...]:
@@ -74,8 +57,8 @@ class FunctionPlan:
                 numbers.setdefault(self.level[node], []).append(node)
         loops: dict[int, list[LoopOfLevel]] = {}
         for loop, nodes in sorted(self.loops.items(), key=lambda item: item[0]):
-            made = LoopOfLevel(size=loop[1], nodes=tuple(nodes), stores=tuple(inner.get(loop, ())))
-            loops.setdefault(loop[0], []).append(made)
+            part = LoopOfLevel(size=loop[1], nodes=tuple(nodes), stores=tuple(inner.get(loop, ())))
+            loops.setdefault(loop[0], []).append(part)
         count = max(self.level.values(), default=-1) + 1
         return tuple(
             Level(numbers=tuple(numbers.get(i, ())), loops=tuple(loops.get(i, ())))
@@ -85,11 +68,11 @@ class FunctionPlan:
     @cached_property
     def places(self) -> dict[Expr, list[tuple[str, int]]]:
         """Where each number is to be written: (array, row)."""
-        found: dict[Expr, list[tuple[str, int]]] = {}
+        places: dict[Expr, list[tuple[str, int]]] = {}
         for store in self.stores:
             if store.size == 1:
-                found.setdefault(store.expr, []).append((store.array, store.row))
-        return found
+                places.setdefault(store.expr, []).append((store.array, store.row))
+        return places
 
     def summed(self, node: Expr) -> bool:
         """Whether a number comes out of a loop of this function."""
@@ -136,20 +119,11 @@ class Level:
 
 @dataclass(frozen=True, kw_only=True)
 class Function:
-    """One function of a program.
+    """One function of a program."""
 
-    Attributes
-    ----------
-    arguments : tuple of str
-        The arrays that it reads and writes.
-    plan : Plan
-    copied : int
-        So many rows of the first array are copied to the second before anything else.
-    """
-
-    arguments: tuple[str, ...]
+    arguments: tuple[str, ...]  # the arrays that it reads and writes
     plan: FunctionPlan
-    copied: int = 0
+    copied: int = 0  # so many rows of the first array are copied to the second before anything else
 
 
 def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
@@ -164,25 +138,25 @@ def split(store: Store, known: Collection[Expr] = ()) -> list[Store]:
 
 
 def plan_function(
-    wanted: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int
+    stores: Sequence[Store], known: dict[Expr, tuple[str, int]], rows: int
 ) -> FunctionPlan:
     """Plan a function."""
-    wanted = [part for store in wanted for part in split(store, known)]
-    nodes = needed([s.expr for s in wanted], known)
+    stores = [part for store in stores for part in split(store, known)]
+    nodes = needed([s.expr for s in stores], known)
     stored = dict(known)
-    places = {s.expr: s.row for s in wanted if s.array == "c"}  # it is to lie there anyway
+    places = {s.expr: s.row for s in stores if s.array == "c"}  # it is to lie there anyway
     for node in _in_memory(nodes, known):
         if node in places:
             stored[node] = ("c", places[node])
         else:
             stored[node], rows = ("c", rows), rows + _rows(node)
     level = _levels(nodes, known)
-    written = _written(wanted, nodes, stored, known)
+    written = _written(stores, nodes, stored, known)
     users = _loops(nodes, level, stored, known, written)
-    for node, found in users.items():
-        if len(found) > 1 and node not in stored and node.kind != "b":
+    for node, used_in in users.items():
+        if len(used_in) > 1 and node not in stored and node.kind != "b":
             stored[node], rows = ("c", rows), rows + (node.size or 1)
-    written = _written(wanted, nodes, stored, known)
+    written = _written(stores, nodes, stored, known)
     users = _loops(
         nodes, level, stored, known, written
     )  # again: what lies in memory is computed once
@@ -205,27 +179,25 @@ def plan_function(
 
 
 def _rows(node: Expr) -> int:
-    """Rows in memory: a call has its arguments there as well, before its results.
-
-    Behind these are whether an opaque function has failed, and with which arguments.
-    """
+    """Rows in memory: a call has its arguments there as well, before its results."""
+    # Behind these are whether an opaque function has failed, and with which arguments.
     given = sum(node.data[1]) if node.op in CALLS else 0
     return (node.size or 1) + given + (1 + given if node.op == "call" else 0)
 
 
 def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:
     """Return the vectors that must lie in memory."""
-    found: dict[Expr, None] = {}
+    vectors: dict[Expr, None] = {}
     for node in nodes:
         if node in known:
             continue
         if node.op in CALLS:
-            found[node] = None
+            vectors[node] = None
         for arg in node.args:
             apart = node.op in ("item", "slice") or (arg.op in STORED and node.op not in STORED)
             if apart and arg.size and arg not in known:
-                found[arg] = None
-    return list(found)
+                vectors[arg] = None
+    return list(vectors)
 
 
 def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
@@ -244,7 +216,7 @@ def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
 
 
 def _written(
-    wanted: Sequence[Store],
+    stores: Sequence[Store],
     nodes: Sequence[Expr],
     stored: dict[Expr, tuple[str, int]],
     known: Collection[Expr],
@@ -260,7 +232,7 @@ def _written(
             for arg, size in zip(node.args, node.data[1], strict=True):
                 inner += split(Store(array="c", row=row, expr=arg, size=size), known)
                 row += size
-    return list(dict.fromkeys([*inner, *wanted]))
+    return list(dict.fromkeys([*inner, *stores]))
 
 
 def _loops(
@@ -271,19 +243,19 @@ def _loops(
     written: Sequence[Store],
 ) -> dict[Expr, set[_Loop]]:
     """Return in which loops each vector and sum is computed."""
-    found: dict[Expr, set[_Loop]] = {}
+    users: dict[Expr, set[_Loop]] = {}
     for store in written:
         if store.expr.size:
-            found.setdefault(store.expr, set()).add((level[store.expr], store.size))
+            users.setdefault(store.expr, set()).add((level[store.expr], store.size))
     for node in reversed(nodes):
         if node.op == "sum" and node not in known:
-            found[node] = {(level[node] - 1, node.args[0].size or 1)}
-        if node in known or node.op in READ or node not in found:
-            found.pop(node, None)
+            users[node] = {(level[node] - 1, node.args[0].size or 1)}
+        if node in known or node.op in READ or node not in users:
+            users.pop(node, None)
             continue
         if node in stored:
-            found[node] = {min(found[node])}  # elsewhere it is read
+            users[node] = {min(users[node])}  # elsewhere it is read
         for arg in node.args:
             if arg.size:
-                found.setdefault(arg, set()).update(found[node])
-    return {node: loops for node, loops in found.items() if node.size or node.op == "sum"}
+                users.setdefault(arg, set()).update(users[node])
+    return {node: loops for node, loops in users.items() if node.size or node.op == "sum"}

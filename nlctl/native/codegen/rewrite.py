@@ -29,27 +29,24 @@ def rewritten(
     for node in nodes:
         args = tuple(new[a] for a in node.args)
         other = None if node in decisive else _reworded(fresh, node, args)
-        new[node] = other or fresh.node(
-            node.op, *args, data=node.data, size=node.size, kind=node.kind,
-            varies=node.varies, value=node.value,
-        )  # fmt: skip
-    made = {
+        new[node] = other or fresh.like(node, *args)
+    new_stores = {
         name: [Store(array=s.array, row=s.row, expr=new[s.expr], size=s.size) for s in part]
         for name, part in stores.items()
     }
-    return made, frozenset(new[node] for node in decisive), fresh
+    return new_stores, frozenset(new[node] for node in decisive), fresh
 
 
 def _decisive(nodes: Sequence[Expr]) -> set[Expr]:
     """Return what reaches a jump by arithmetic alone."""
-    found: set[Expr] = set()
+    decisive: set[Expr] = set()
     for node in reversed(nodes):
-        passes = node in found and node.op in (*ALGEBRAIC, *_PARTS)
+        passes = node in decisive and node.op in (*ALGEBRAIC, *_PARTS)
         if node.op in _JUMPS or passes:
-            found.update(node.args)
+            decisive.update(node.args)
         elif node.op == "select":
-            found.add(node.args[0])
-    return found
+            decisive.add(node.args[0])
+    return decisive
 
 
 def _reworded(graph: Graph, node: Expr, args: tuple[Expr, ...]) -> Expr | None:
@@ -83,5 +80,5 @@ def _shifted(graph: Graph, node: Expr, angle: Expr, shift: Expr) -> Expr | None:
     if not 0 < abs(k) <= 8 or shift.data != k * (math.pi / 2):
         return None
     quarter = (k + (node.op == "cos")) % 4
-    found = graph.node("cos" if quarter % 2 else "sin", angle, size=node.size)
-    return graph.op("neg", found) if quarter >= 2 else found
+    shifted = graph.node("cos" if quarter % 2 else "sin", angle, size=node.size)
+    return graph.op("neg", shifted) if quarter >= 2 else shifted

@@ -22,29 +22,14 @@ DONE = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Solver:
-    """A search.
-
-    Attributes
-    ----------
-    name : str
-    given : int
-        How many numbers it is given.
-    count : int
-        How many it results in.
-    function : Function
-        One step, for one member.
-    exact : frozenset of Expr
-        Operations of it that are rounded one by one.
-    initial : tuple of float
-        The state that it begins with.
-    """
+    """A search."""
 
     name: str
-    given: int
-    count: int
-    function: Function
-    exact: frozenset[Expr]
-    initial: tuple[float, ...]
+    given: int  # how many numbers it is given
+    count: int  # how many it results in
+    function: Function  # one step, for one member
+    exact: frozenset[Expr]  # operations of it that are rounded one by one
+    initial: tuple[float, ...]  # the state that it begins with
 
 
 def searched(solver: Solver) -> Callable[[np.ndarray], np.ndarray]:

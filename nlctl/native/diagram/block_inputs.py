@@ -14,10 +14,8 @@ from ...upstream.systems import System
 def block_inputs(
     system: System, u: np.ndarray, outputs: Mapping[int, np.ndarray]
 ) -> Iterator[tuple[Any, np.ndarray]]:
-    """Yield every block of a diagram with its inputs, in the order of the state vector.
-
-    Shapes: `u` (ninputs,).
-    """
+    """Yield every block of a diagram with its inputs, in the order of the state vector."""
+    # Shapes: `u` (ninputs,).
     places = iter(range(len(outputs)))
     yield from ((block, given) for block, given, _ in _walked(system, u, outputs, places))
 
@@ -27,13 +25,13 @@ def _walked(system: System, u: np.ndarray, outputs: Any, places: Any) -> list[An
     if not isinstance(system, ct.InterconnectedSystem):
         return [(system, u, next(places))]
     counts = [_count(part) for part in system.syslist]
-    own = [[next(places) for _ in range(count)] for count in counts]
-    stacked = _inside(system, u, outputs, own)
-    found = []
-    for part, numbers, offset in zip(system.syslist, own, system.input_offset, strict=True):
+    of_parts = [[next(places) for _ in range(count)] for count in counts]
+    stacked = _inside(system, u, outputs, of_parts)
+    walked = []
+    for part, numbers, offset in zip(system.syslist, of_parts, system.input_offset, strict=True):
         given = stacked[offset : offset + (part.ninputs or 0)]
-        found += _walked(part, given, outputs, iter(numbers))
-    return found
+        walked += _walked(part, given, outputs, iter(numbers))
+    return walked
 
 
 def _count(system: System) -> int:
@@ -42,17 +40,25 @@ def _count(system: System) -> int:
     return 1
 
 
-def _inside(system: Any, u: np.ndarray, outputs: Any, own: list[list[int]]) -> np.ndarray:
+def _inside(system: Any, u: np.ndarray, outputs: Any, numbers: list[list[int]]) -> np.ndarray:
     """Return the stacked inputs of a diagram's parts; wires through parts take some rounds."""
     y = np.zeros(system.connect_map.shape[1])
-    stacked = np.zeros(system.connect_map.shape[0])
     for _ in range(len(system.syslist) + 1):
         stacked = system.connect_map @ y + system.input_map @ u
-        for i, part in enumerate(system.syslist):
-            given = stacked[system.input_offset[i] :][: part.ninputs or 0]
-            made = _delivered(part, given, outputs, own[i])
-            y[system.output_offset[i] : system.output_offset[i] + made.size] = made
+        y = _of_parts(system, stacked, outputs, numbers)
     return system.connect_map @ y + system.input_map @ u
+
+
+def _of_parts(
+    system: Any, stacked: np.ndarray, outputs: Any, numbers: list[list[int]]
+) -> np.ndarray:
+    """Return the stacked outputs of a diagram's parts, given those of all blocks."""
+    given = zip(system.syslist, system.input_offset, numbers, strict=True)
+    parts = [
+        _delivered(part, stacked[offset:][: part.ninputs or 0], outputs, inner)
+        for part, offset, inner in given
+    ]
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _delivered(system: System, u: np.ndarray, outputs: Any, numbers: list[int]) -> np.ndarray:
@@ -60,11 +66,6 @@ def _delivered(system: System, u: np.ndarray, outputs: Any, numbers: list[int]) 
     if not isinstance(system, ct.InterconnectedSystem):
         return np.asarray(outputs[numbers[0]], dtype=float)
     rest = iter(numbers)
-    own = [[next(rest) for _ in range(_count(part))] for part in system.syslist]
-    stacked = _inside(system, u, outputs, own)
-    y = np.zeros(system.connect_map.shape[1])
-    for i, part in enumerate(system.syslist):
-        given = stacked[system.input_offset[i] :][: part.ninputs or 0]
-        made = _delivered(part, given, outputs, own[i])
-        y[system.output_offset[i] : system.output_offset[i] + made.size] = made
-    return system.output_map @ np.concatenate((y, stacked))
+    inner = [[next(rest) for _ in range(_count(part))] for part in system.syslist]
+    stacked = _inside(system, u, outputs, inner)
+    return system.output_map @ np.concatenate((_of_parts(system, stacked, outputs, inner), stacked))

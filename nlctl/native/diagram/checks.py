@@ -31,15 +31,13 @@ def check_sizes(system: System, blocks: Iterable[Any]) -> None:
 
 
 def check_functions(path: str, system: System) -> FunctionReading:
-    """Check that a block's functions depend on their arguments alone, and return enough values.
-
-    The functions are read, not called, until they are known to remember nothing.
-    """
-    is_block, found = isinstance(system, Block), []
+    """Check that a block's functions depend on their arguments alone, and return enough values."""
+    # The functions are read, not called, until they are known to remember nothing.
+    is_block, readings = isinstance(system, Block), []
     for what, function in _functions(system):
         values = current_parameters(system) if is_block else current_values(system)
         try:
-            found.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
+            readings.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:
             place = f" ({error.place})" if error.place else ""
             raise CompileError(
@@ -49,8 +47,8 @@ def check_functions(path: str, system: System) -> FunctionReading:
     if not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
     return FunctionReading(
-        captured=tuple(note for each in found for note in each.captured),
-        unbound=tuple(name for each in found for name in each.unbound),
+        captured=tuple(note for reading in readings for note in reading.captured),
+        unbound=tuple(name for reading in readings for name in reading.unbound),
     )
 
 
@@ -74,7 +72,7 @@ def _check_counts(path: str, system: Any) -> None:
     if system.outfcn is not None and system.noutputs:
         calls.append(("output", outputs_now, system.noutputs, "outputs"))
     x, u = np.zeros(system.nstates or 0), np.zeros(system.ninputs or 0)
-    for what, function, wanted, kind in calls:
+    for what, function, size, kind in calls:
         try:
             with np.errstate(all="ignore"):
                 got = np.size(function(system, 0.0, x, u))
@@ -84,10 +82,10 @@ def _check_counts(path: str, system: Any) -> None:
             ) from error
         except Exception:  # what fails at this point alone may work at others
             continue
-        if got != wanted:
+        if got != size:
             raise CompileError(
                 f"block '{path}' returns {counted(got, 'value')} from its {what} function, needs "
-                f"{wanted}, one for each of its {kind}"
+                f"{size}, one for each of its {kind}"
             )
 
 
@@ -95,10 +93,8 @@ def _check_counts(path: str, system: Any) -> None:
 
 
 def sized(system: System, inputs: Any, initial_state: Any) -> Any:
-    """Return a block with the numbers of states, inputs and outputs that a run gives it.
-
-    python-control takes them from the run's arguments where a block does not declare them.
-    """
+    """Return a block with the numbers of states, inputs and outputs that a run gives it."""
+    # python-control takes them from the run's arguments where a block does not declare them.
     counts = (system.nstates, system.ninputs, system.noutputs)
     diagram = isinstance(system, ct.InterconnectedSystem)
     if diagram or not isinstance(system, ct.NonlinearIOSystem) or None not in counts:
@@ -115,12 +111,12 @@ def sized(system: System, inputs: Any, initial_state: Any) -> Any:
 
 
 def _with(system: Any, states: int, inputs: int, outputs: int | None) -> Any:
-    made = ct.NonlinearIOSystem(
+    block = ct.NonlinearIOSystem(
         system.updfcn, system.outfcn, states=states, inputs=inputs, outputs=outputs,
         dt=system.dt, params=system.params, name=system.name,
     )  # fmt: skip
-    set_parameters(made, None)
-    return made
+    set_parameters(block, None)
+    return block
 
 
 def _output_size(system: System, states: int, inputs: int) -> int:

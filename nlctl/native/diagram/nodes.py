@@ -13,31 +13,18 @@ from .wiring import Combination
 
 @dataclass(frozen=True, kw_only=True)
 class Node:
-    """One block of the schedule.
+    """One block of the schedule."""
 
-    Attributes
-    ----------
-    path : str
-        Names of the diagrams around it and its own, separated by dots.
-    system : control.InputOutputSystem
-    state_offset : int
-        Where its states begin in the diagram's state vector.
-    inputs : tuple of mappings
-        For every input the linear combination of signals that feeds it.
-    direct : ndarray of bool, shape (noutputs, ninputs)
-        Which outputs depend on which inputs at the same instant.
-    unbound : tuple of str
-        Names in its functions that have no value on one of the ways: only traced are these right.
-    sampled : Sampled or None
-        What samples the block, whose states are the first ones of this.
-    """
-
-    path: str
+    path: str  # names of the diagrams around it and its own, separated by dots
     system: Any
-    state_offset: int
+    state_offset: int  # where its states begin in the diagram's state vector
+    # for every input the linear combination of signals that feeds it
     inputs: tuple[Combination, ...]
+    # shape (noutputs, ninputs); which outputs depend on which inputs at the same instant
     direct: np.ndarray
+    # names in its functions that have no value on one of the ways: only traced are these right
     unbound: tuple[str, ...] = ()
+    # what samples the block, whose states are the first ones of this
     sampled: Sampled | None = None
 
     @property

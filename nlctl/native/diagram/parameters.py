@@ -20,23 +20,12 @@ from .nodes import Node
 
 @dataclass(frozen=True, kw_only=True)
 class Slot:
-    """One number, vector or matrix in the parameter vector.
+    """One number, vector or matrix in the parameter vector."""
 
-    Attributes
-    ----------
-    name : str
-        Qualified name for nlctl's blocks; path and key for third-party ones.
-    offset : int
-        Where it begins.
-    shape : tuple of int
-    kind : str
-        ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean.
-    """
-
-    name: str
-    offset: int
+    name: str  # qualified name for nlctl's blocks; path and key for third-party ones
+    offset: int  # where it begins
     shape: tuple[int, ...]
-    kind: str
+    kind: str  # ``"f"`` float, ``"i"`` integer, ``"b"`` Boolean
 
     @property
     def size(self) -> int:
@@ -59,11 +48,9 @@ class Slot:
 
 
 def current_values(system: Any) -> Mapping[str, Any]:
-    """Return a block's parameters as python-control has resolved them.
-
-    A third-party block in a diagram with nlctl's blocks is handed their qualified names as well;
-    they are none of its business.
-    """
+    """Return a block's parameters as python-control has resolved them."""
+    # A third-party block in a diagram with nlctl's blocks is handed their qualified names as well;
+    # they are none of its business.
     if isinstance(system, Block):
         return current_parameters(system)._asdict()
     if isinstance(system, ct.StateSpace):
@@ -79,17 +66,17 @@ def is_numeric(value: object) -> bool:
 
 def slots(nodes: Sequence[Node]) -> dict[int, dict[str, Slot]]:
     """Lay out the numeric parameters of all blocks."""
-    found: dict[int, dict[str, Slot]] = {}
+    places: dict[int, dict[str, Slot]] = {}
     offset = 0
     for i, node in enumerate(nodes):
-        found[i] = slots_of(node.system, node.path, offset)
-        offset += sum(slot.size for slot in found[i].values())
-    return found
+        places[i] = slots_of(node.system, node.path, offset)
+        offset += sum(slot.size for slot in places[i].values())
+    return places
 
 
 def slots_of(system: System, path: str = "", offset: int = 0) -> dict[str, Slot]:
     """Lay out the numeric parameters of one block from `offset` on, as `slots` does."""
-    found: dict[str, Slot] = {}
+    by_name: dict[str, Slot] = {}
     path = path or system.name
     for name, value in current_values(system).items():
         if not isinstance(name, str):
@@ -98,11 +85,11 @@ def slots_of(system: System, path: str = "", offset: int = 0) -> dict[str, Slot]
             )
         if is_numeric(value):
             array = np.asarray(value)
-            found[name] = Slot(
+            by_name[name] = Slot(
                 name=f"{path}.{name}", offset=offset, shape=array.shape, kind=array.dtype.kind
             )
-            offset += found[name].size
-    return found
+            offset += by_name[name].size
+    return by_name
 
 
 def length(layout: Mapping[int, Mapping[str, Slot]]) -> int:

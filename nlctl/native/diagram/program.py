@@ -27,50 +27,31 @@ _MOST = 40  # ways in which clocks meet
 
 @dataclass(frozen=True, kw_only=True)
 class Program:
-    """The arrays of a program.
+    """The arrays of a program."""
 
-    Attributes
-    ----------
-    layout : mapping
-        For every block the places of its parameters in the flat vector `p`.
-    fixed : mapping
-        For every block its parameters that are no numbers.
-    switching : int
-        Number of switching functions.
-    memory : tuple of int
-        Indices of the memory states.
-    guards : tuple of int
-        Of each guard, in their order, the block that it belongs to.
-    jumping : tuple of tuple
-        Of each block with guards its number, and where its states begin and end.
-    sampled : tuple of int
-        Indices of the states of sampled blocks.
-    clocks : mapping
-        Of these blocks, as they were when the diagram was compiled, by their owners.
-    """
-
+    # for every block the places of its parameters in the flat vector `p`
     layout: Mapping[int, Mapping[str, Slot]]
-    fixed: Mapping[int, Mapping[str, Any]]
-    switching: int
-    memory: tuple[int, ...]
-    guards: tuple[int, ...] = ()
+    fixed: Mapping[int, Mapping[str, Any]]  # for every block its parameters that are no numbers
+    switching: int  # number of switching functions
+    memory: tuple[int, ...]  # indices of the memory states
+    guards: tuple[int, ...] = ()  # of each guard, in their order, the block that it belongs to
+    # of each block with guards its number, and where its states begin and end
     jumping: tuple[tuple[int, int, int], ...] = ()
-    sampled: tuple[int, ...] = ()
+    sampled: tuple[int, ...] = ()  # indices of the states of sampled blocks
+    # of these blocks, as they were when the diagram was compiled, by their owners
     clocks: Mapping[Any, Clock] = field(default_factory=dict)
 
     @cached_property
     def meetings(self) -> tuple[Happening, ...]:
-        """What may happen at one instant: there is a function of the program for each.
-
-        Where parameters of clocks are overridden, more may; see `machine.evaluations`.
-        """
-        found = tuple(meetings(self.clocks))
-        if len(found) > _MOST:
+        """What may happen at one instant: there is a function of the program for each."""
+        # Where parameters of clocks are overridden, more may; see `machine.evaluations`.
+        every = tuple(meetings(self.clocks))
+        if len(every) > _MOST:
             raise CompileError(
-                f"{len(self.clocks)} clocks of sampled blocks may meet in {len(found)} ways, at "
+                f"{len(self.clocks)} clocks of sampled blocks may meet in {len(every)} ways, at "
                 f"most {_MOST} can be compiled: give blocks of one rate the same offset and delay"
             )
-        return found
+        return every
 
     @property
     def events(self) -> int:
@@ -118,14 +99,14 @@ def instants_of(
     """Return what is due to sampled blocks, for each column of `p`; at the last time, too."""
     begin, behind_end = float(times[0]), float(np.nextafter(times[-1], np.inf))
     known: dict[tuple[Clock, ...], Instants] = {}
-    found = []
+    every = []
     for column in p.T:
         clocks = clocks_at(schedule, program, column)
         key = tuple(clocks.values())
         if key not in known:
             known[key] = instants(clocks, begin, behind_end, program.meetings)
-        found.append(known[key])
-    return found
+        every.append(known[key])
+    return every
 
 
 def clocks_at(schedule: Schedule, program: Program, p: np.ndarray) -> dict[Any, Clock]:

@@ -8,13 +8,15 @@ evaluated more than once and is not an algebraic loop.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import CycleError, TopologicalSorter
-from typing import Any
+from typing import Any, TypeVar
 
 import control as ct
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ...blocks import supplied_of, within
 from ...delays.transport import PAST
@@ -26,80 +28,43 @@ from ...sliding.relay import SLIDING
 from ...upstream.systems import System
 from ..purity.captured import Captured, noted
 from .checks import check_functions
-from .feedthrough import closer_feedthrough, feedthrough
 from .nodes import Node
-from .tearing import first_loop, tear
+from .trace import closer_feedthrough, feedthrough
 from .wiring import Combination, Signal, Wiring
-
-__all__ = [
-    "AlgebraicLoop",
-    "AlgebraicLoopError",
-    "Combination",
-    "Schedule",
-    "Signal",
-    "schedule",
-]
 
 
 @dataclass(frozen=True, kw_only=True)
 class AlgebraicLoop:
-    """Signals that depend on each other at the same instant and are solved for together.
+    """Signals that depend on each other at the same instant and are solved for together."""
 
-    Attributes
-    ----------
-    start, stop : int
-        The part of the order that is repeated until the signals fit.
-    torn : tuple of Signal
-        Signals that are guessed: with these, all others of the loop follow.
-    """
-
+    # the part of the order that is repeated until the signals fit
     start: int
     stop: int
-    torn: tuple[Signal, ...]
+    torn: tuple[Signal, ...]  # signals that are guessed: with these, all others of the loop follow
 
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
-    """A flattened diagram.
+    """A flattened diagram."""
 
-    Attributes
-    ----------
-    system : control.InputOutputSystem
-        The diagram that was read.
-    nodes : tuple of Node
-        Blocks in the order of the state vector.
-    order : tuple of int
-        Indices of the blocks in the order of their evaluation.  A block comes more than once if
-        some of its outputs are needed before all of its inputs are known.
-    unknown : tuple of frozenset of int
-        For every entry of `order` the inputs of the block that are not known yet.
-    outputs : tuple of mappings
-        Linear combination of signals that makes each output of the diagram, and then of what
-        arrives at each line.
-    lines : tuple of Signal
-        Outputs of transport delays.  A run gives them as further inputs.
-    loops : tuple of Loop
-        Parts of the order that are solved for; empty unless that was asked for.
-    captured : tuple of Captured
-        What the blocks' functions read from around them.
-    samplings : tuple of Node
-        What says how blocks are sampled: without signals, but with parameters.
-    watched : tuple of Watched
-        Functions of the run whose changes of sign are events.
-    overrides : mapping
-        Parameters that they get.
-    """
-
-    system: Any
-    nodes: tuple[Node, ...]
+    system: Any  # the diagram that was read
+    nodes: tuple[Node, ...]  # blocks in the order of the state vector
+    # indices of the blocks in the order of their evaluation.  A block comes more than once if some
+    # of its outputs are needed before all of its inputs are known
     order: tuple[int, ...]
+    # for every entry of `order` the inputs of the block that are not known yet
     unknown: tuple[frozenset[int], ...]
+    # linear combination of signals that makes each output of the diagram, and then of what arrives
+    # at each line
     outputs: tuple[Combination, ...]
+    # parts of the order that are solved for; empty unless that was asked for
     loops: tuple[AlgebraicLoop, ...]
-    captured: tuple[Captured, ...]
+    captured: tuple[Captured, ...]  # what the blocks' functions read from around them
+    # what says how blocks are sampled: without signals, but with parameters
     samplings: tuple[Node, ...] = ()
-    watched: tuple[Watched, ...] = ()
-    overrides: Mapping[str, Any] = field(default_factory=dict)
+    watched: tuple[Watched, ...] = ()  # functions of the run whose changes of sign are events
+    overrides: Mapping[str, Any] = field(default_factory=dict)  # parameters that they get
+    # outputs of transport delays.  A run gives them as further inputs
     lines: tuple[Signal, ...] = ()
 
     @property
@@ -114,10 +79,8 @@ class Schedule:
 
     @property
     def rates(self) -> int:
-        """Number of the diagram's inputs whose rates a run gives as further inputs.
-
-        Ideal relays ask for them.
-        """
+        """Number of the diagram's inputs whose rates a run gives as further inputs."""
+        # Ideal relays ask for them.
         has_relays = any(supplied_of(node.system) is SLIDING for node in self.nodes)
         return (self.system.ninputs or 0) if has_relays else 0
 
@@ -168,9 +131,9 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
 
 
 def _samplings(system: System) -> Iterator[Node]:
-    for path, made in samplings(system):
+    for path, sampling in samplings(system):
         none = np.zeros((0, 0), dtype=bool)
-        yield Node(path=path, system=made, state_offset=0, inputs=(), direct=none)
+        yield Node(path=path, system=sampling, state_offset=0, inputs=(), direct=none)
 
 
 def _ordered(read: Schedule, solve_loops: bool) -> Schedule:
@@ -259,13 +222,13 @@ class _Ordering:
             self.loops.append(AlgebraicLoop(start=start, stop=len(self.order), torn=torn))
             self._evaluate(every, ())
 
-    def _evaluate(self, wanted: set[Signal], guessed: Iterable[Signal]) -> None:
+    def _evaluate(self, needed_signals: set[Signal], guessed: Iterable[Signal]) -> None:
         """Order blocks until no more of the wanted signals can be had."""
         while True:
             given, offers = self.known.union(guessed), []
-            for i in sorted({s.block for s in wanted - self.known if s.block is not None}):
+            for i in sorted({s.block for s in needed_signals - self.known if s.block is not None}):
                 unknown, ready = _available(i, self.nodes[i], given)
-                if wanted & ready - self.known:
+                if needed_signals & ready - self.known:
                     offers.append((len(ready) < len(self.nodes[i].direct), i, unknown, ready))
             if not offers:
                 return
@@ -311,3 +274,36 @@ def _loop_text(nodes: tuple[Node, ...], before: Mapping[Signal, set[Signal]]) ->
         loop = error.args[1]
         return " -> ".join(signal_name(nodes, s) for s in loop)
     raise AssertionError("signals that cannot be ordered form a loop")
+
+
+_Item = TypeVar("_Item", bound=Hashable)
+
+
+def first_loop(before: Mapping[_Item, set[_Item]]) -> set[_Item]:
+    """Return the items of one loop that depends on no other loop."""
+    items = list(before)
+    number = {item: i for i, item in enumerate(items)}
+    edges = [(number[item], number[other]) for item in items for other in before[item]]
+    rows, columns = np.array(edges).T
+    graph = coo_array((np.ones(len(edges)), (rows, columns)), shape=(len(items),) * 2)
+    _, labels = connected_components(graph, connection="strong")
+    leaving = {labels[i] for i, j in edges if labels[i] != labels[j]}
+    inside = {labels[i] for i, j in edges if labels[i] == labels[j]}
+    chosen = min(inside - leaving)
+    return {item for item, label in zip(items, labels, strict=True) if label == chosen}
+
+
+def tear(before: Mapping[_Item, set[_Item]]) -> tuple[_Item, ...]:
+    """Choose few items of a loop without which there is no loop."""
+    # The item with the most connections first; then what is in no loop any more drops out. The
+    # result is small, not always the smallest.
+    left = {item: set(others) for item, others in before.items()}
+    torn = []
+    while True:
+        ends = {i for i in left if not left[i] or not any(i in others for others in left.values())}
+        if not ends and not left:
+            return tuple(torn)
+        if not ends:
+            ends = {max(left, key=lambda i: len(left[i]) * sum(i in o for o in left.values()))}
+            torn += ends
+        left = {i: others - ends for i, others in left.items() if i not in ends}

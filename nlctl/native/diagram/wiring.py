@@ -62,12 +62,12 @@ class Wiring:
                 for signal, weight in combination.items():
                     total[signal] = total.get(signal, 0.0) + gain * weight
             self._solved[key] = total
-        found = self._solved[key]
-        if found is None:
+        solution = self._solved[key]
+        if solution is None:
             raise AlgebraicLoopError(
                 f"algebraic loop: signal {i} of '{here.system.name}' is wired to itself"
             )
-        return found
+        return solution
 
     def _input_terms(self, here: Place, i: int) -> Iterator[tuple[float, dict[Signal, float]]]:
         if here.parent is None:

@@ -6,36 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..codegen.ir.text import Body, Value, constant, llvm_type
-from .rounding import (
-    downwards,
-    larger,
-    product_downwards,
-    product_upwards,
-    smaller,
-    upwards,
-)
+from .rounding import downwards, larger, product_downwards, product_upwards, smaller, upwards
 
 NAN = float("nan")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ends:
-    """An interval in every lane; or what is known of a truth value.
+    """An interval in every lane; or what is known of a truth value."""
 
-    Attributes
-    ----------
-    low, high : Value
-        Its ends.  Of a truth value: whether it surely holds, and whether it possibly does.
-    point : float or None
-        Of a constant, what it is.
-    not_negative : bool
-        Whether no lane has a lower end below 0, whatever the box is.
-    """
-
+    # its ends.  Of a truth value: whether it surely holds, and whether it possibly does
     low: Value
     high: Value
-    point: float | None = None
-    not_negative: bool = False
+    point: float | None = None  # of a constant, what it is
+    not_negative: bool = False  # whether no lane has a lower end below 0, whatever the box is
 
     @property
     def values(self) -> tuple[Value, Value]:
@@ -75,8 +59,8 @@ def routine(b: Body, name: str, make: Callable[..., Ends], *args: Ends) -> Ends:
             f"{signed}define internal {pair} {full}({taken}) {_how(b)} nounwind {{\n"
             f"entry:\n{inner.text()}}}\n"
         )
-    found = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
-    low, high = (b.new(f"extractvalue {pair} {found.text}, {i}", width) for i in (0, 1))
+    call = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
+    low, high = (b.new(f"extractvalue {pair} {call.text}, {i}", width) for i in (0, 1))
     signed = b.module.functions[full].startswith("; not negative")
     return Ends(low=low, high=high, not_negative=signed)
 
@@ -124,10 +108,9 @@ def neg(b: Body, x: Ends) -> Ends:
 
 
 def mul(b: Body, x: Ends, y: Ends) -> Ends:
-    """Return the product: of its ends two are enough where the sign of a factor is known.
-
-    0 times infinity is left out where another product of ends is known; the others hold all limits.
-    """
+    """Return the product: of its ends two are enough where the sign of a factor is known."""
+    # 0 times infinity is left out where another product of ends is known; the others hold all
+    # limits.
     if x is y:
         return square_of(b, finite(x))
     x, y = finite(x), finite(y)
@@ -141,8 +124,8 @@ def mul(b: Body, x: Ends, y: Ends) -> Ends:
     low, high = _ends_of_product(b, x, y)
     low, high = product_downwards(b, low), product_upwards(b, high)
     if x.not_negative and y.not_negative:
-        found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-        return found if x.point is not None else defined(b, b.compare("ord", low, high), found)
+        product = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+        return product if x.point is not None else defined(b, b.compare("ord", low, high), product)
     if x.point is not None:
         return Ends(low=low, high=high)
     if x.not_negative:
@@ -177,8 +160,8 @@ def absolute_of(b: Body, x: Ends) -> Ends:
     """Return the absolute value."""
     if x.not_negative:
         return x
-    turned = b.neg(x.high)
-    low = larger(b, 0.0, larger(b, x.low, turned))
+    mirrored = b.neg(x.high)
+    low = larger(b, 0.0, larger(b, x.low, mirrored))
     return Ends(low=low, high=larger(b, b.neg(x.low), x.high), not_negative=True)
 
 
@@ -193,10 +176,10 @@ def div(b: Body, x: Ends, y: Ends) -> Ends:
     """Return the quotient; not a number where the divisor may be 0."""
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     x, y = finite(x), finite(y)
-    turned = [neg(b, v) for v in (x, y)]
+    mirrored = [neg(b, v) for v in (x, y)]
     above, below = (
         [b.select(negative, t, o) for t, o in zip(t.values, o.values, strict=True)]
-        for t, o in zip(turned, (x, y), strict=True)
+        for t, o in zip(mirrored, (x, y), strict=True)
     )
     under = b.select(b.compare("oge", above[0], 0.0), below[1], below[0])
     over = b.select(b.compare("oge", above[1], 0.0), below[0], below[1])
@@ -218,29 +201,28 @@ def root_of(b: Body, x: Ends) -> Ends:
     low = downwards(b, b.intrinsic("sqrt", x.low))
     high = upwards(b, b.intrinsic("sqrt", x.high))
     low = b.select(b.compare("olt", low, 0.0), 0.0, low)
-    found = Ends(low=low, high=high, not_negative=True)
-    return defined(b, b.compare("oge", x.low, 0.0), found)
+    root = Ends(low=low, high=high, not_negative=True)
+    return defined(b, b.compare("oge", x.low, 0.0), root)
 
 
 # -- choices ---------------------------------------------------------------------------------------
 
 
 def minimum(b: Body, x: Ends, y: Ends) -> Ends:
-    for one, other in ((x, y), (y, x)):
-        if one.point == float("inf"):
-            return other
-    x, y = finite(x), finite(y)
-    low, high = (_extreme(b, "olt", v, w) for v, w in zip(x.values, y.values, strict=True))
-    return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
+    return _extreme_of(b, x, y, "olt", x.not_negative and y.not_negative, float("inf"))
 
 
 def maximum(b: Body, x: Ends, y: Ends) -> Ends:
+    return _extreme_of(b, x, y, "ogt", x.not_negative or y.not_negative, -float("inf"))
+
+
+def _extreme_of(b: Body, x: Ends, y: Ends, how: str, signed: bool, neutral: float) -> Ends:
     for one, other in ((x, y), (y, x)):
-        if one.point == -float("inf"):
+        if one.point == neutral:
             return other
     x, y = finite(x), finite(y)
-    low, high = (_extreme(b, "ogt", v, w) for v, w in zip(x.values, y.values, strict=True))
-    return Ends(low=low, high=high, not_negative=x.not_negative or y.not_negative)
+    low, high = (_extreme(b, how, v, w) for v, w in zip(x.values, y.values, strict=True))
+    return Ends(low=low, high=high, not_negative=signed)
 
 
 def _extreme(b: Body, how: str, x: Value, y: Value) -> Value:
@@ -278,10 +260,8 @@ def select_truth(b: Body, condition: Ends, x: Ends, y: Ends) -> Ends:
 
 
 def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
-    """Return whether a comparison surely holds, and whether it possibly does.
-
-    One with what is not a number is open.
-    """
+    """Return whether a comparison surely holds, and whether it possibly does."""
+    # One with what is not a number is open.
     if op in ("gt", "ge"):
         x, y, op = y, x, {"gt": "lt", "ge": "le"}[op]
     if op in ("lt", "le"):
@@ -289,8 +269,8 @@ def comparison_of(b: Body, op: str, x: Ends, y: Ends) -> Ends:
         return Ends(low=low, high=b.compare(f"u{op}", x.low, y.high))
     same = b.logic("and", b.compare("ole", x.high, y.low), b.compare("ole", y.high, x.low))
     meet = b.logic("and", b.compare("uge", x.high, y.low), b.compare("uge", y.high, x.low))
-    found = Ends(low=same, high=meet)
-    return found if op == "eq" else logic_not(b, found)
+    equal = Ends(low=same, high=meet)
+    return equal if op == "eq" else logic_not(b, equal)
 
 
 def logic_not(b: Body, x: Ends) -> Ends:

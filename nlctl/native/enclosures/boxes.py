@@ -18,36 +18,20 @@ from ...expressions.trace import trace
 from ..machine.finish import Loaded, finished
 from ..purity.check import check_pure
 from ..purity.values import FRESH, Impure
-from .scalars import scalar_expressions
-from .unrounded import UnroundedGraph
+from .scalars import UnroundedGraph, scalar_expressions
 from .writer import LANES, JudgedRows, enclosure_text
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoxCode:
-    """Machine code for functions of a box.
+    """Machine code for functions of a box."""
 
-    Attributes
-    ----------
-    sides : int
-        Of the box.
-    expressions : tuple of Expr
-        Numbers, each a function of the sides.
-    rows : JudgedRows
-        Of what `judge` writes.
-    loaded : Loaded
-    lanes : int
-        Boxes at a time.
-    fixed : int
-        So many of the last sides are numbers, and have no width.
-    """
-
-    sides: int
-    expressions: tuple[Expr, ...]
-    rows: JudgedRows
+    sides: int  # of the box
+    expressions: tuple[Expr, ...]  # numbers, each a function of the sides
+    rows: JudgedRows  # of what `judge` writes
     loaded: Loaded
-    lanes: int = LANES
-    fixed: int = 0
+    lanes: int = LANES  # boxes at a time
+    fixed: int = 0  # so many of the last sides are numbers, and have no width
 
     @property
     def judge(self) -> int:
@@ -60,10 +44,8 @@ class BoxCode:
         return kind(self.loaded.addresses["values"])
 
     def values(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds of the functions on boxes, by their natural extension.
-
-        Shapes: `low, high` (boxes, sides); returns (boxes, results).
-        """
+        """Return bounds of the functions on boxes, by their natural extension."""
+        # Shapes: `low, high` (boxes, sides); returns (boxes, results).
         count, lanes = len(low), self.lanes
         ends = np.stack([low, high], axis=2).astype(float)  # (boxes, sides, 2)
         missing = -count % lanes
@@ -71,10 +53,10 @@ class BoxCode:
             ends = np.concatenate([ends, np.repeat(ends[:1], missing, axis=0)])
         batches = ends.reshape(-1, lanes, self.sides, 2).transpose(0, 2, 3, 1)
         batches = np.ascontiguousarray(batches)
-        found = np.empty((len(batches), self.rows.results, 2, lanes))
-        for given, result in zip(batches, found, strict=True):
+        results = np.empty((len(batches), self.rows.results, 2, lanes))
+        for given, result in zip(batches, results, strict=True):
             self._values(given.ctypes.data, result.ctypes.data)
-        flat = found.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
+        flat = results.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
         return flat[..., 0], flat[..., 1]
 
 
@@ -104,10 +86,10 @@ def traced_numbers(
     """Return the numbers that a pure function computes."""
     try:
         with np.errstate(all="ignore"):
-            found = trace(graph, function, arguments)
+            numbers = trace(graph, function, arguments)
     except Ambiguous as error:
         raise Untraceable(str(error)) from None
-    return [found[i].only for i in range(found.size)]
+    return [numbers[i].only for i in range(numbers.size)]
 
 
 def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
@@ -134,7 +116,7 @@ def _gradient(graph: Graph, expr: Expr, sides: int, fixed: int) -> list[Expr]:
     zero, one = graph.const(0.0), graph.const(1.0)
 
     def along(i: int) -> Expr:
-        (found,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
-        return zero if found is None else found
+        (derivative,) = tangents(graph, [expr], lambda leaf: one if leaf.data[1] == i else None)
+        return zero if derivative is None else derivative
 
     return [along(i) if i < sides - fixed else zero for i in range(sides)]

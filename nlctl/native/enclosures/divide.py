@@ -1,4 +1,4 @@
-"""What becomes of a claim, or of a supremum, when boxes are divided in machine code."""
+"""Claims and suprema when boxes are divided in machine code."""
 
 from __future__ import annotations
 
@@ -17,44 +17,25 @@ _PARTS = 16  # into which it is divided, whatever their number
 
 @dataclass(frozen=True, kw_only=True)
 class BoxVerdict:
-    """What became of the claim that the least of some functions is at most a bound on a box.
+    """The verdict on the claim that the least of some functions is at most a bound on a box."""
 
-    Attributes
-    ----------
-    holds : bool or None
-        None: undecided.
-    boxes, undecided : int
-        Boxes judged, and those that stayed undecided.
-    point : ndarray
-        Where it is refuted, or the centre of an undecided box; not a number along sides without
-        an end.
-    value : float
-        The least of the functions at a point that refutes it, rounded down.
-    """
-
-    holds: bool | None
+    holds: bool | None  # none: undecided
+    # boxes judged, and those that stayed undecided
     boxes: int
     undecided: int
+    # where it is refuted, or the centre of an undecided box; not a number along sides without an
+    # end
     point: np.ndarray
-    value: float
+    value: float  # the least of the functions at a point that refutes it, rounded down
 
 
 @dataclass(frozen=True, kw_only=True)
 class Supremum:
-    """A supremum between two numbers.
+    """A supremum between two numbers."""
 
-    Attributes
-    ----------
-    high : float
-        No value is above it: infinite where that has no proof.
-    attained : float
-        A lower bound of a value at a point; see `supremum` for sides without an end.
-    boxes, unbounded : int
-        Boxes judged, and those left without a bound.
-    """
-
-    high: float
-    attained: float
+    high: float  # no value is above it: infinite where that has no proof
+    attained: float  # a lower bound of a value at a point; see `supremum` for sides without an end
+    # boxes judged, and those left without a bound
     boxes: int
     unbounded: int
 
@@ -68,10 +49,8 @@ def decide_claim(
     max_boxes: int,
     threads: int = 1,
 ) -> BoxVerdict:
-    """Prove or refute that the least of the functions is at most `bound` on a box.
-
-    Shapes: `low, high` (sides,).
-    """
+    """Prove or refute that the least of the functions is at most `bound` on a box."""
+    # Shapes: `low, high` (sides,).
     _check_fixed(code, low, high)
     begun = _Search(code, np.stack([low, high], axis=1).reshape(1, -1), bound)
     begun.run(min(max_boxes, _ALONE))
@@ -79,14 +58,14 @@ def decide_claim(
         return begun.verdict([])
     rest = begun.stack[: begun.counts[0]]
     begun.counts[0] = 0
-    each = -(-(max_boxes - begun.boxes) // _PARTS)
+    share = -(-(max_boxes - begun.boxes) // _PARTS)
     parts = [_Search(code, rest[k::_PARTS], bound, begun.whole) for k in range(_PARTS)]
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda part: part.run(each), parts))
+            list(pool.map(lambda part: part.run(share), parts))
     else:
         for part in parts:
-            if part.run(each) == REFUTED:
+            if part.run(share) == REFUTED:
                 break
     return begun.verdict(parts)
 
@@ -130,10 +109,8 @@ class _Search:
             self.stack = np.concatenate([self.stack, np.empty_like(self.stack)])
 
     def verdict(self, parts: list[_Search]) -> BoxVerdict:
-        """Return what was found, by this search and by others that went on with its boxes.
-
-        The first that is refuted counts, and those before it.
-        """
+        """Return what was found, by this search and by others that went on with its boxes."""
+        # The first that is refuted counts, and those before it.
         every = [self, *parts]
         refuted = [part.status == REFUTED for part in every]
         every = every[: refuted.index(True) + 1] if any(refuted) else every
@@ -164,21 +141,18 @@ def enclose_supremum(
     hopeless: int,
     relative: float = 1e-10,
 ) -> Supremum:
-    """Enclose the supremum of the least of the functions on a box.
-
-    Shapes: `low, high` (sides,).
-    """
+    """Enclose the supremum of the least of the functions on a box; shapes: `low, high` (sides,)."""
     _check_fixed(code, low, high)
     box = np.stack([low, high], axis=1).reshape(-1)
     nodes, index, keys = np.empty((_ROOM, box.size)), np.zeros((3, _ROOM), dtype=np.int64), None
     nodes[0], keys = box, np.empty(_ROOM)
-    counts, found = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
+    counts, bounds = np.array([1, 0, 1, 0, 0]), np.array([-np.inf, -np.inf])
     rows, room, whole = code.rows, _room(code), _widths(box)
     limits = (float(tol), float(relative), int(max_boxes), int(hopeless))
     while True:
         status = supremum(
             code.judge, (rows.centre, rows.weight), *room, nodes, index, keys, whole, limits,
-            counts, found,
+            counts, bounds,
         )  # fmt: skip
         if status == ALL_PROVED:
             break
@@ -186,7 +160,7 @@ def enclose_supremum(
         index = np.concatenate([index, np.zeros_like(index)], axis=1)
         keys = np.concatenate([keys, np.empty_like(keys)])
     return Supremum(
-        high=float(found[0]), attained=float(found[1]), boxes=int(counts[3]),
+        high=float(bounds[0]), attained=float(bounds[1]), boxes=int(counts[3]),
         unbounded=int(counts[4]),
     )  # fmt: skip
 

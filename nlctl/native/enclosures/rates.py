@@ -9,19 +9,16 @@ import control as ct
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from ..equations.relays import relay_places
 from ..reading import Reading
-from .scalars import scalar_expressions
-from .unrounded import UnroundedGraph
+from .scalars import UnroundedGraph, scalar_expressions
 
 
 def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> list[Expr]:
-    """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``.
-
-    Its external inputs are 0.
-    """
+    """Return x' of a diagram, a number per state, made of the leaves ``x[0], x[1], ...``."""
+    # Its external inputs are 0.
     _check(compiled)
     p = compiled.parameter_vector(params)
-    found = [expr for _, array in compiled.equations.results["dx"] for expr in _numbers(array)]
-    _, rates = scalar_expressions(found)
+    numbers = [expr for _, array in compiled.equations.results["dx"] for expr in _numbers(array)]
+    _, rates = scalar_expressions(numbers)
 
     def instead(graph: Graph, leaf: Expr) -> Expr:
         array, row, _ = leaf.data
@@ -58,13 +55,13 @@ def _check(compiled: Reading) -> None:
 def with_leaves(
     exprs: Sequence[Expr], instead: Callable[[Graph, Expr], Expr]
 ) -> tuple[Graph, list[Expr]]:
-    """Return expressions of numbers with something else in the place of what is read."""
-    graph, made = UnroundedGraph(), {}
+    """Return expressions of numbers with something else instead of what is read."""
+    graph, new = UnroundedGraph(), {}
     for node in needed(exprs):
         if node.op == "leaf":
-            made[node] = instead(graph, node)
+            new[node] = instead(graph, node)
         elif node.op == "const":
-            made[node] = graph.const(bool(node.data) if node.kind == "b" else float(node.data))
+            new[node] = graph.const(bool(node.data) if node.kind == "b" else float(node.data))
         else:
-            made[node] = graph.op(node.op, *(made[arg] for arg in node.args))
-    return graph, [made[expr] for expr in exprs]
+            new[node] = graph.op(node.op, *(new[arg] for arg in node.args))
+    return graph, [new[expr] for expr in exprs]

@@ -19,17 +19,15 @@ from ..codegen.ir.text import Body, Operand, Value
 UNIT = 2.0**-52
 TINY = 2.0**-1074
 LARGEST_FLOAT = float.fromhex("0x1.fffffffffffffp1023")
+# relative error of a function of one number, of this package or of the C library. It is 8 to 16
+# units in the last place. Those of `codegen.ir.functions` are within 2.1
+# (tests/expressions/test_ir_functions.py), which their argument reduction and polynomials explain:
+# a reduced argument with a relative error of 2^-52, a polynomial within 2^-53 of the function,
+# three roundings. For glibc the manual's table "Known Maximum Errors in Math Functions" has at most
+# 2 for all that are called here, 4 for cbrt and 5 for erfc; musl's and Apple's are of the same
+# origin or better. tests/native/enclosures/test_enclosed_functions.py compares all of them with
+# python-flint on the machine at hand, at dense and at hard arguments
 FUNCTION_ERROR = 2.0**-49
-"""Relative error of a function of one number, of this package or of the C library.
-
-It is 8 to 16 units in the last place.  Those of `codegen.ir.functions` are within 2.1
-(tests/expressions/test_ir_functions.py), which their argument reduction and polynomials explain: a
-reduced argument with a relative error of 2^-52, a polynomial within 2^-53 of the function, three
-roundings.  For glibc the manual's table "Known Maximum Errors in Math Functions" has at most 2 for
-all that are called here, 4 for cbrt and 5 for erfc; musl's and Apple's are of the same origin or
-better.  tests/native/enclosures/test_enclosed_functions.py compares all of them with python-flint
-on the machine at hand, at dense and at hard arguments.
-"""
 FUNCTION_FLOOR = 2.0**-1068  # the same where the result is not normal
 
 

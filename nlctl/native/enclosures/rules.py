@@ -39,21 +39,13 @@ _PI_UP = math.nextafter(math.pi, 4.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Monotone:
-    """A function that rises or falls.
-
-    Attributes
-    ----------
-    rises : bool
-    domain, values : tuple of float
-        Where it is defined, and bounds of what it gives.
-    odd : bool
-        Whether its value has the sign of its argument.
-    """
+    """A function that rises or falls."""
 
     rises: bool = True
+    # where it is defined, and bounds of what it gives
     domain: tuple[float, float] = (-_INF, _INF)
     values: tuple[float, float] = (-_INF, _INF)
-    odd: bool = False
+    odd: bool = False  # whether its value has the sign of its argument
 
 
 MONOTONE = {
@@ -106,37 +98,23 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     if known.values[1] < _INF:
         high = smaller(b, known.values[1], high)
     if known.odd:
-        low = b.select(b.logic("and", _at_least(b, x.low), _below(b, low)), 0.0, low)
+        low = b.select(
+            b.logic("and", b.compare("oge", x.low, 0.0), b.compare("olt", low, 0.0)), 0.0, low
+        )
         falls = b.logic("and", b.compare("ole", x.high, 0.0), b.compare("ogt", high, 0.0))
         high = b.select(falls, 0.0, high)
     signed = known.values[0] >= 0 or (known.odd and x.not_negative)
-    found = Ends(low=low, high=high, not_negative=signed)
+    ends = Ends(low=low, high=high, not_negative=signed)
     if known.domain == (-_INF, _INF):
-        return found
+        return ends
     inside = b.compare("oge", x.low, known.domain[0])
-    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), found)
-
-
-def _at_least(b: Body, v: Value) -> Value:
-    return b.compare("oge", v, 0.0)
-
-
-def _below(b: Body, v: Value) -> Value:
-    return b.compare("olt", v, 0.0)
+    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends)
 
 
 def _steps(b: Body, name: str, x: Ends) -> _Result:
     low, high = (applied(b, name, v) for v in x.values)
-    found = Ends(low=low, high=high, not_negative=x.not_negative)
-    return found, b.compare("one", low, high)
-
-
-def _absolute(b: Body, x: Ends) -> _Result:
-    return absolute_of(b, x), None
-
-
-def _sqrt(b: Body, x: Ends) -> _Result:
-    return root_of(b, x), None
+    ends = Ends(low=low, high=high, not_negative=x.not_negative)
+    return ends, b.compare("one", low, high)
 
 
 def _cosh(b: Body, x: Ends) -> _Result:
@@ -147,11 +125,9 @@ _TURN = 1 / (2 * math.pi)
 
 
 def _turns(b: Body, v: Value, per: float, shift: float, side: int) -> Value:
-    """Return v per + shift, rounded to one side: turns of a circle, for per = 1/pi or 1/(2 pi).
-
-    The factor is within 2^-53 of what it stands for, two roundings follow, |per| < 1/3 and
-    |shift| <= 1: their sum is below 2^-52 |v| + 2^-50.
-    """
+    """Return v per + shift, rounded to one side: turns of a circle, for per = 1/pi or 1/(2 pi)."""
+    # The factor is within 2^-53 of what it stands for, two roundings follow, |per| < 1/3 and
+    # |shift| <= 1: their sum is below 2^-52 |v| + 2^-50.
     room = b.fma(b.intrinsic("fabs", v), side * 2.0**-52, side * 2.0**-50)
     return b.add(b.fma(v, per, shift), room, exact=True)
 
@@ -194,18 +170,18 @@ def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
     low = function_downwards(b, applied(b, "hypot", x.low, y.low))
     high = function_upwards(b, applied(b, "hypot", x.high, y.high))
     is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
-    found = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-    return defined(b, is_number, found), None
+    size = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
+    return defined(b, is_number, size), None
 
 
 def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
     """Return the least and the greatest value at the corners of a rectangle."""
     ends = [(v, w) for v in set(x.values) for w in set(y.values)]
     ends = sorted(ends, key=lambda pair: (pair[0].text, pair[1].text))
-    found = [applied(b, name, v, w) for v, w in ends]
-    low = high = found[0]
+    values = [applied(b, name, v, w) for v, w in ends]
+    low = high = values[0]
     numbers = b.compare("ord", low, high)
-    for value in found[1:]:
+    for value in values[1:]:
         low, high = smaller(b, value, low), larger(b, value, high)
         numbers = b.logic("and", numbers, b.compare("ord", value, value))
     bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
@@ -214,19 +190,19 @@ def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
 
 def _power(b: Body, x: Ends, y: Ends) -> _Result:
     """x^y = e^(y ln x), which is largest and least at corners; it needs x >= 0."""
-    at_zero = b.logic("and", _at_least(b, x.low), b.compare("ogt", y.low, 0.0))
+    at_zero = b.logic("and", b.compare("oge", x.low, 0.0), b.compare("ogt", y.low, 0.0))
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
-    found = _corners(b, "power", x, y)
-    found = Ends(low=larger(b, 0.0, found.low), high=found.high, not_negative=True)
-    return defined(b, exists, found), None
+    result = _corners(b, "power", x, y)
+    result = Ends(low=larger(b, 0.0, result.low), high=result.high, not_negative=True)
+    return defined(b, exists, result), None
 
 
 def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
     """Off its cut the angle is largest and least at corners."""
     level = b.logic("and", b.compare("ole", y.low, 0.0), b.compare("oge", y.high, 0.0))
     cut = b.logic("and", level, b.compare("ole", x.low, 0.0))
-    found = _corners(b, "arctan2", y, x)
-    low, high = b.select(cut, -_PI_UP, found.low), b.select(cut, _PI_UP, found.high)
+    angle = _corners(b, "arctan2", y, x)
+    low, high = b.select(cut, -_PI_UP, angle.low), b.select(cut, _PI_UP, angle.high)
     return Ends(low=low, high=high), cut
 
 
@@ -265,10 +241,10 @@ def _rest(name: str) -> Callable[..., _Result]:
 
 def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
     a = absolute_of(b, x)
-    turned = neg(b, a)
+    mirrored = neg(b, a)
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
-    low = b.select(positive, a.low, turned.low)
-    high = b.select(negative, turned.high, a.high)
+    low = b.select(positive, a.low, mirrored.low)
+    high = b.select(negative, mirrored.high, a.high)
     open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
     return defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
@@ -283,8 +259,8 @@ def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
     known = b.logic("or", b.logic("or", after, before), here)
     jumps = b.logic("xor", known, constant(True, known.width, "b"))
-    found = Ends(low=ends[0], high=ends[1])
-    return defined(b, b.compare("ord", x.low, x.high), found), jumps
+    step = Ends(low=ends[0], high=ends[1])
+    return defined(b, b.compare("ord", x.low, x.high), step), jumps
 
 
 def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
@@ -301,8 +277,8 @@ def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
 
 
 RULES: dict[str, Callable[..., _Result]] = {
-    "absolute": _absolute,
-    "sqrt": _sqrt,
+    "absolute": lambda b, x: (absolute_of(b, x), None),
+    "sqrt": lambda b, x: (root_of(b, x), None),
     "cosh": _cosh,
     "sin": _circular("sin", 0.25),
     "cos": _circular("cos", 0.0),
@@ -316,5 +292,5 @@ RULES: dict[str, Callable[..., _Result]] = {
     "heaviside": _heaviside,
     "logaddexp": _logaddexp,
 }
+# those that never jump
 _SMOOTH = ("sqrt", "cosh", "sin", "cos", "tan", "hypot", "power", "logaddexp")
-"""Those that never jump."""

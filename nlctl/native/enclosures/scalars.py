@@ -1,32 +1,73 @@
-"""Expressions without vectors: what intervals are computed of, element by element."""
+"""Expressions without vectors: what intervals are computed of, element by element.
+
+A graph whose constants are numbers, not what floats round them to.
+
+A graph evaluates what is made of constants, rounded as any float.  Within a function that is what
+a run computes; but the derivative of 0.1 (0.3 x) is the product of both floats, and an enclosure of
+it has to hold that.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from functools import reduce
 
-from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .unrounded import UnroundedGraph
+from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+
+_EXACT = (*COMPARISONS, *LOGIC, "select", "neg", "absolute", "minimum", "maximum", "floor", "ceil",
+          "trunc", "rint", "sign", "copysign", "heaviside")  # fmt: skip
+_SUMS = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b if b else None,
+}
+
+
+class UnroundedGraph(Graph):
+    """A graph that evaluates operations on constants only where nothing is rounded."""
+
+    def op(self, name: str, *args: Expr) -> Expr:
+        """Return an operation on numbers, or on the elements of vectors."""
+        constant = bool(args) and all(a.op == "const" and a.kind == "f" for a in args)
+        if constant and name not in _EXACT and not _is_exact(name, args, super().op):
+            return self.node(name, *args)
+        return super().op(name, *args)
+
+
+def _is_exact(name: str, args: tuple[Expr, ...], fold: object) -> bool:
+    """Whether an operation on constants gives a float, or none at all."""
+    values = [a.data for a in args]
+    if not all(map(math.isfinite, values)):
+        return True
+    if name not in _SUMS:
+        return False
+    exact = _SUMS[name](*map(Fraction, values))
+    rounded = fold(name, *args).data  # type: ignore[operator]
+    return exact is None or (math.isfinite(rounded) and Fraction(rounded) == exact)
+
 
 MOST_NUMBERS = 3_000  # numbers, beyond which code would take too long to make
 
 
 def scalar_expressions(results: Sequence[Expr]) -> tuple[Graph, list[Expr]]:
     """Return expressions in a graph of their own, in which everything is a number."""
-    graph, made = UnroundedGraph(), {}
+    graph, new = UnroundedGraph(), {}
     for node in needed(results):
         if node.op in ("call", "solve"):
             raise Untraceable(f"{node.data[0]} is not an expression: it has no enclosure")
-        made[node] = _elements(graph, node, made)
+        new[node] = _elements(graph, node, new)
         if len(graph.nodes) > MOST_NUMBERS:
             raise Untraceable(f"more than {MOST_NUMBERS} numbers are computed")
-    return graph, [made[expr][0] for expr in results]
+    return graph, [new[expr][0] for expr in results]
 
 
-def _elements(graph: Graph, node: Expr, made: Mapping[Expr, list[Expr]]) -> list[Expr]:
+def _elements(graph: Graph, node: Expr, elements: Mapping[Expr, list[Expr]]) -> list[Expr]:
     """Return the elements of a vector, or a number as the only one."""
     size = node.size or 1
-    parts = [made[arg] for arg in node.args]
+    parts = [elements[arg] for arg in node.args]
     if node.op == "const":
         return [graph.const(bool(node.data) if node.kind == "b" else float(node.data))]
     if node.op == "table":

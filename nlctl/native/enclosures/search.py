@@ -34,10 +34,9 @@ def best_side(x, o, lane, weight, whole):
 
 @kept(nogil=True, error_model="numpy")
 def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
-    """Prove or refute that the least of some functions is at most a bound on boxes.
-
-    Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides + 1,).
-    """
+    """Prove or refute that the least of some functions is at most a bound on boxes."""
+    # Shapes: `x, o` (rows, lanes), `stack` (boxes, 2 sides), `whole` (sides,), `point` (sides +
+    # 1,).
     n, lanes, centre, weight = whole.size, x.shape[1], places[0], places[1]
     top = counts[0]
     while top > 0 and counts[1] < most:
@@ -79,26 +78,24 @@ def prove_below(judge, places, x, o, stack, whole, bound, most, counts, point):
 
 
 @kept(nogil=True, error_model="numpy")
-def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, found):
-    """Enclose the supremum of the least of some functions on a box.
-
-    Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
-    """
+def supremum(judge, places, x, o, nodes, index, keys, whole, limits, counts, bounds):
+    """Enclose the supremum of the least of some functions on a box."""
+    # Shapes: `nodes` (boxes, 2 sides), `index` (3, boxes), `keys` (boxes,).
     while True:
-        judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
+        judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds)
         if counts[2] + x.shape[1] > nodes.shape[0]:
             return FULL
-        divide_first(nodes, index, keys, x.shape[1], limits, counts, found)
+        divide_first(nodes, index, keys, x.shape[1], limits, counts, bounds)
         if counts[0] == 0:
             break
     for k in range(counts[1]):
-        found[0] = max(found[0], keys[k])
+        bounds[0] = max(bounds[0], keys[k])
         counts[4] += keys[k] == math.inf
     return ALL_PROVED
 
 
 @kept(**_INNER)
-def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found):
+def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, bounds):
     """Judge the boxes that wait, and put them into the heap."""
     n, lanes, waiting = whole.size, x.shape[1], counts[0]
     counts[0] = 0
@@ -115,27 +112,27 @@ def judge_waiting(judge, places, x, o, nodes, index, keys, whole, counts, found)
         for i in range(n):
             if math.isnan(o[places[0] + i, lane]):
                 value = o[2, lane]
-        if math.isfinite(value) and value > found[1]:
-            found[1] = value
+        if math.isfinite(value) and value > bounds[1]:
+            bounds[1] = value
         j = index[2, lane]
         index[0, j] = best_side(x, o, lane, places[1], whole)
         counts[1] = heap_enter(keys, index, counts[1], o[0, lane], j)
 
 
 @kept(**_INNER)
-def divide_first(nodes, index, keys, lanes, limits, counts, found):
+def divide_first(nodes, index, keys, lanes, limits, counts, bounds):
     """Divide the boxes with the largest bounds: their halves wait."""
     tol, relative, most, hopeless = limits
     while counts[0] + 2 <= lanes and counts[1] > 0:
         end, j, stored, waiting = keys[0], index[1, 0], counts[2], counts[0]
         limit = most if end < math.inf else min(most, hopeless)
         close = min(tol, max(relative * abs(end), FINEST * tol))
-        if end - found[1] <= close or counts[3] + waiting >= limit:
+        if end - bounds[1] <= close or counts[3] + waiting >= limit:
             break
         counts[1] = heap_leave(keys, index, counts[1])
         side = index[0, j]
         if side < 0:
-            found[0] = max(found[0], end)
+            bounds[0] = max(bounds[0], end)
             counts[4] += end == math.inf
             continue
         middle = 0.5 * nodes[j, 2 * side] + 0.5 * nodes[j, 2 * side + 1]

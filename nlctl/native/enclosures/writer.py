@@ -42,24 +42,18 @@ from .rounding import larger, smaller
 from .rules import interval_of
 
 LANES = 8
-INLINED = (
-    400  # operations up to which rules become part of what calls them: beyond, code of a third
-)
-# more speed would take three times as long to make
+# operations up to which rules become part of what calls them: beyond, code of a third more speed
+# would take three times as long to make
+INLINED = 400
 _ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
 _INF = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedRows:
-    """Where `judge` writes what it finds, in rows of one number per lane.
+    """Where `judge` writes what it finds, in rows of one number per lane."""
 
-    Attributes
-    ----------
-    sides, results : int
-        Of the box, and of the function.
-    """
-
+    # of the box, and of the function
     sides: int
     results: int
 
@@ -111,21 +105,12 @@ def values_text(results: Sequence[Expr], lanes: int = LANES) -> str:
 
 
 class EnclosureWriter:
-    """Writes enclosures of expressions; `names` says what each is called so far.
-
-    Attributes
-    ----------
-    b : Body
-    lanes : int
-    names : dict
-    jumps : dict
-        Where an expression may jump for a reason of its own.
-    """
+    """Writes enclosures of expressions; `names` says what each is called so far."""
 
     def __init__(self, b: Body, lanes: int) -> None:
         self.b, self.lanes = b, lanes
         self.names: dict[Expr, Ends] = {}
-        self.jumps: dict[Expr, Value] = {}
+        self.jumps: dict[Expr, Value] = {}  # where an expression may jump for a reason of its own
 
     def write(self, exprs: Sequence[Expr]) -> None:
         """Compute expressions, and all that they are made of."""
@@ -159,10 +144,10 @@ class EnclosureWriter:
             return logic(b, node.op, *args)
         if node.op == "select":
             return self._choice(node, *args)
-        found, jumps = interval_of(b, node.op, *args)
+        result, jumps = interval_of(b, node.op, *args)
         if jumps is not None:
             self.jumps[node] = jumps
-        return found
+        return result
 
     def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
         if node.kind == "b":
@@ -190,12 +175,12 @@ class EnclosureWriter:
 
     def may_jump(self, expr: Expr) -> Value | None:
         """Return where an expression may jump; None if nowhere."""
-        found: Value | None = None
+        jump: Value | None = None
         for node in needed([expr]):
             if node in self.jumps:
                 here = self.jumps[node]
-                found = here if found is None else self.b.logic("or", found, here)
-        return found
+                jump = here if jump is None else self.b.logic("or", jump, here)
+        return jump
 
 
 def _function(b: Body, name: str, *arguments: str) -> str:
@@ -226,14 +211,14 @@ def _judge(
     box = [w.side("x", i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
-    inner, found = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
-    b.write(f"call void @values(ptr {inner}, ptr {found})")
+    inner, written = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
+    b.write(f"call void @values(ptr {inner}, ptr {written})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
         value = _read(w, rows.values + 2 * k)
         at_centre.append(value)
         bounds.append(_bound(w, expr, value, slopes[k], steps))
-    _kept(w, rows, bounds, at_centre, [_weights(b, box, each) for each in slopes])
+    _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes])
     b.write("ret void")
     return _function(b, "judge", "x", "o")
 
@@ -247,11 +232,9 @@ _Step = tuple[Ends, Value]
 
 
 def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: Ends) -> _Step:
-    """Choose a point of a side, and write it down; return what the side is around it, and if it is.
-
-    It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an end
-    of the side where the function rises or falls.  A side without end stands for itself.
-    """
+    """Choose a point of a side, and write it; return what the side is around it, and if it is."""
+    # It is where the mean-value form has the least upper bound (E. Baumann, BIT 28:80, 1988): an
+    # end of the side where the function rises or falls. A side without end stands for itself.
     b, (low, high) = w.b, side.values
     ends = b.compare("one", b.intrinsic("fabs", b.sub(high, low, exact=True)), _INF)
     over = b.sub(b.mul(slope.high, high, exact=True), b.mul(slope.low, low, exact=True), exact=True)
@@ -269,16 +252,10 @@ def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: End
 
 
 def _bound(
-    w: EnclosureWriter,
-    expr: Expr,
-    at_centre: Ends,
-    slopes: Sequence[Ends],
-    steps: Sequence[_Step],
+    w: EnclosureWriter, expr: Expr, at_centre: Ends, slopes: Sequence[Ends], steps: Sequence[_Step]
 ) -> Value:
-    """Return the upper bound of a result: by its value and by the mean-value form.
-
-    The latter holds where nothing jumps; infinite where there is no value.
-    """
+    """Return the upper bound of a result: by its value and by the mean-value form."""
+    # The latter holds where nothing jumps; infinite where there is no value.
     b, value, mean = w.b, finite(w.names[expr]), at_centre
     for slope, (step, moves) in zip(slopes, steps, strict=True):
         if slope.point != 0:
@@ -296,11 +273,11 @@ def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value
     """Return how much a result changes along each side; not a number if one is not known."""
     widths = [b.sub(side.high, side.low, exact=True) for side in box]
     steep = [absolute_of(b, slope).high for slope in slopes]
-    found = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
+    weights = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
     known = b.wide(0.0, box[0].low.width)
     for s in steep:
         known = b.add(known, b.mul(s, 0.0, exact=True), exact=True)
-    return [b.add(v, known, exact=True) for v in found]
+    return [b.add(v, known, exact=True) for v in weights]
 
 
 def _kept(

@@ -27,31 +27,19 @@ from .watched import watched_conditions
 
 @dataclass(frozen=True, kw_only=True)
 class Equations:
-    """What a diagram computes.
-
-    Attributes
-    ----------
-    graph : Graph
-    results : dict
-        For ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be
-        written there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each
-        meeting, and for ``"reset"`` the states after jumps of all blocks with guards, if any.
-    calls : dict
-        Opaque functions by name.
-    solvers : dict
-        Searches for the signals of algebraic loops, by name.
-    fixed_points : dict
-        By the same names: what the blocks of a loop make of the signals found, in their
-        expressions; they are equal to these.
-    conditions : Conditions
-        What the equations switch at, and no block declares.
-    """
+    """What a diagram computes."""
 
     graph: Graph
+    # for ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be written
+    # there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting, and
+    # for ``"reset"`` the states after jumps of all blocks with guards, if any
     results: dict[str, list[tuple[int, Tracer]]]
-    calls: dict[str, Call]
-    solvers: dict[str, Solver]
+    calls: dict[str, Call]  # opaque functions by name
+    solvers: dict[str, Solver]  # searches for the signals of algebraic loops, by name
+    # by the same names: what the blocks of a loop make of the signals found, in their expressions;
+    # they are equal to these
     fixed_points: dict[str, list[Expr]]
+    # what the equations switch at, and no block declares
     conditions: Conditions = field(default_factory=Conditions)
 
     def pieces(self, name: str) -> list[tuple[Expr, int]]:
@@ -69,10 +57,7 @@ class _Events(NamedTuple):
 
 
 def equations(
-    schedule: Schedule,
-    layout: Any,
-    p: np.ndarray | None = None,
-    meetings: Sequence[Happening] = (),
+    schedule: Schedule, layout: Any, p: np.ndarray | None = None, meetings: Sequence[Happening] = ()
 ) -> Equations:
     """Write a schedule as expressions."""
     system = schedule.system
@@ -89,12 +74,12 @@ def equations(
         rates = [reader.derivatives(i) for i in range(len(schedule.nodes))]
         y = reader.wired(schedule.outputs)
         events = _events(reader, schedule)
-        found = _conditions(schedule.system, reader, rates, y, events)
-        found = replace(found, located=(*found.located, *events.watched))
-        falls = [(row + found.rows, guard) for row, guard in events.guards.values()]
+        switches = _conditions(schedule.system, reader, rates, y, events)
+        switches = replace(switches, located=(*switches.located, *events.watched))
+        falls = [(row + switches.rows, guard) for row, guard in events.guards.values()]
         results = {
             "dx": [(n.state_offset, rates[i]) for i, n in enumerate(schedule.nodes)],
-            "g": events.declared + _located(reader, found) + falls,
+            "g": events.declared + _located(reader, switches) + falls,
             "m": list(events.committed.values()),
             "y": [(0, y)],
         }
@@ -108,95 +93,93 @@ def equations(
             results |= then.all_known({f"sample{k}": _next(then)})
     return Equations(
         graph=reader.graph, results=results, calls=reader.calls, solvers=reader.solvers,
-        fixed_points=reader.fixed_points, conditions=found,
+        fixed_points=reader.fixed_points, conditions=switches,
     )  # fmt: skip
 
 
 def _behind_delays(graph: Graph, schedule: Schedule) -> dict[int, Tracer]:
     """Return what leaves transport delays, by block: inputs behind those of the diagram."""
-    first, found = schedule.system.ninputs or 0, {}
+    first, signals = schedule.system.ninputs or 0, {}
     for k, line in enumerate(schedule.lines):
         i = line.block or 0
         if line.index == 0:
             shape = (schedule.nodes[i].system.noutputs,)
-            found[i] = leaf_vector(graph, "u", first + k, shape)
-    return found
+            signals[i] = leaf_vector(graph, "u", first + k, shape)
+    return signals
 
 
 def _conditions(
     system: System, reader: Reader, rates: Sequence[Tracer], y: Tracer, events: _Events
 ) -> Conditions:
-    """Return what a diagram in continuous time switches at without saying so.
-
-    Also what moves nothing but an event function: a guard, a memory, a function of the run.
-    """
+    """Return what a diagram in continuous time switches at without saying so."""
+    # Also what moves nothing but an event function: a guard, a memory, a function of the run.
     if not ct.isctime(system):
         return Conditions()
     falls = {i: guard for i, (_, guard) in events.guards.items()}
     signs = [array for _, array in events.declared]
     kept = [array for _, array in events.committed.values()]
     others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
-    given = [each.function for each in events.watched if not watches_nan(each.what)]
+    given = [watch.function for watch in events.watched if not watches_nan(watch.what)]
     return found_conditions(reader, rates, signs, falls, others, given)
 
 
-def _located(reader: Reader, found: Conditions) -> list[tuple[int, Tracer]]:
+def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     """Return the switching functions of conditions with their rows, behind those declared."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    made = []
-    for function in (each.function for each in found.located):
+    functions = []
+    for function in (condition.function for condition in switches.located):
         size = function.size or 1
         array = (
             Tracer(reader.graph, as_array(function), 0, size)
             if function.size
             else scalar(reader.graph, function).reshape(1)
         )
-        made.append((row, array))
+        functions.append((row, array))
         row += size
-    return made
+    return functions
 
 
 def _guards(reader: Reader) -> dict[int, tuple[int, Tracer]]:
     """Return the guards of blocks, by their places, with their rows but for those of conditions."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    made = {}
+    guards = {}
     for i, node in enumerate(reader.blocks):
         if count_guards(node):
-            made[i] = (row, reader.guards(i))
+            guards[i] = (row, reader.guards(i))
             row += count_guards(node)
-    return made
+    return guards
 
 
 def _resets(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return the states after jumps of all blocks with guards, with their rows."""
-    found, row = [], 0
+    resets, row = [], 0
     for i, node in enumerate(reader.blocks):
         if count_guards(node):
-            found.append((row, reader.resets(i)))
+            resets.append((row, reader.resets(i)))
             row += node.size
-    return found
+    return resets
 
 
 def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return the next states of sampled blocks to which something happens, with their rows."""
-    found, row = [], 0
+    states, row = [], 0
     for i, node in enumerate(reader.blocks):
         if node.sampled:
             if node.sampled.acts(reader.what):
-                found.append((row, reader.next_states(i)))
+                states.append((row, reader.next_states(i)))
             row += node.size
-    return found
+    return states
 
 
 def _events(reader: Reader, schedule: Schedule) -> _Events:
     """Return what blocks and the run declare."""
     counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
     at, behind, declared, committed = 0, 0, [], {}
-    for i, (own, kept) in enumerate(counts):
-        if own or kept:
+    for i, (count, kept) in enumerate(counts):
+        if count or kept:
             events = reader.events(i)
-            declared.append((at, events[:own]))
-            committed[i] = (behind, events[own:])
-            at, behind = at + own, behind + kept
+            declared.append((at, events[:count]))
+            committed[i] = (behind, events[count:])
+            at, behind = at + count, behind + kept
     watched = watched_conditions(reader, schedule)
     return _Events(declared=declared, guards=_guards(reader), committed=committed, watched=watched)

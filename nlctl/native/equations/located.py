@@ -17,30 +17,18 @@ from ..diagram.program import count_switching_functions, memory
 if TYPE_CHECKING:
     from .reader import Reader
 
-_MOST = 256  # switching functions of one diagram; more cost more than they tell
+_MOST = 256  # switching functions of one diagram; more cost more than they are worth
 _BENDS = ("absolute", "minimum", "maximum")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Located:
-    """One condition of the equations that is located.
+    """One condition of the equations that is located."""
 
-    Attributes
-    ----------
-    function : Expr
-        Its switching function: a change of sign is an event.
-    block : str
-        The block in whose equations it stands.
-    what : str
-        The operation.
-    bends : bool
-        Whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`.
-    """
-
-    function: Expr
-    block: str
-    what: str
-    bends: bool
+    function: Expr  # its switching function: a change of sign is an event
+    block: str  # the block in whose equations it stands
+    what: str  # the operation
+    bends: bool  # whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`
 
     @property
     def rows(self) -> int:
@@ -50,37 +38,25 @@ class Located:
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
-    """What the right-hand side of a diagram switches at, beyond what its blocks declare.
+    """What the right-hand side of a diagram switches at, beyond what its blocks declare."""
 
-    Attributes
-    ----------
-    located : tuple of Located
-        First those that only bend, then those at which something may jump.
-    of_time : tuple of Expr
-        Conditions of t alone, which are solved before a run.
-    waves : tuple of tuple
-        Of products of sines of t the angular frequencies of the factors.
-    pulses : tuple of Expr
-        Other functions of t alone that drive the equations.
-    beyond : int
-        Conditions that are too many to be located.
-    """
-
+    # first those that only bend, then those at which something may jump
     located: tuple[Located, ...] = ()
-    of_time: tuple[Expr, ...] = ()
+    of_time: tuple[Expr, ...] = ()  # conditions of t alone, which are solved before a run
+    # of products of sines of t the angular frequencies of the factors
     waves: tuple[tuple[Expr, ...], ...] = ()
-    pulses: tuple[Expr, ...] = ()
-    beyond: int = 0
+    pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
+    beyond: int = 0  # conditions that are too many to be located
 
     @property
     def rows(self) -> int:
         """Numbers that the switching functions are."""
-        return sum(each.rows for each in self.located)
+        return sum(condition.rows for condition in self.located)
 
     @property
     def bending(self) -> int:
         """How many of these are of conditions that only bend."""
-        return sum(each.rows for each in self.located if each.bends)
+        return sum(condition.rows for condition in self.located if condition.bends)
 
 
 def found_conditions(
@@ -91,32 +67,31 @@ def found_conditions(
     others: Iterable[Expr],
     watched: Iterable[Expr] = (),
 ) -> Conditions:
-    """Return what switches in a diagram whose blocks have been read.
-
-    Where it moves rates, declared switching functions, guards, by the places of their blocks, what
-    arrives at delays and memories become (`others`), or an event function of the run (`watched`).
-    """
+    """Return what switches in a diagram whose blocks have been read."""
+    # Where it moves rates, declared switching functions, guards, by the places of their blocks,
+    # what arrives at delays and memories become (`others`), or an event function of the run
+    # (`watched`).
     declared, watched = tuple(declared), tuple(watched)
-    solved = [e for found in reader.fixed_points.values() for e in found]
+    solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
     moving = needed(roots)
     nodes = needed([*roots, *watched]) if watched else moving
-    timed, wanted = _of_time(nodes), set(nodes)
+    timed, inside = _of_time(nodes), set(nodes)
     known = {_key(e) for e in _pieces(declared)}
-    found: dict[object, Located] = {}
+    located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
     rows = beyond = 0
     for condition, node in _undeclared(reader, rates, guards, watched):
-        if condition not in wanted:
+        if condition not in inside:
             continue
         if condition in timed:
             of_time[condition] = None
             continue
         function = switching_function(reader.graph, condition)
         key, size, bends = _key(function), function.size or 1, condition.op in _BENDS
-        if key in found:
-            bends &= found[key].bends
-            found[key] = replace(found[key], bends=bends)
+        if key in located:
+            bends &= located[key].bends
+            located[key] = replace(located[key], bends=bends)
             continue
         if key in known or not function.varies or _remembers(function, node):
             continue
@@ -124,11 +99,11 @@ def found_conditions(
             beyond += size
             continue
         path = "" if node is None else node.path
-        found[key] = Located(function=function, block=path, what=condition.op, bends=bends)
+        located[key] = Located(function=function, block=path, what=condition.op, bends=bends)
         rows += size
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     return Conditions(
-        located=tuple(sorted(found.values(), key=lambda each: not each.bends)),
+        located=tuple(sorted(located.values(), key=lambda one: not one.bends)),
         of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
     )  # fmt: skip
 
@@ -139,33 +114,28 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 
 
 def _undeclared(
-    reader: Reader,
-    rates: Sequence[Tracer],
-    guards: Mapping[int, Tracer],
-    watched: Sequence[Expr],
+    reader: Reader, rates: Sequence[Tracer], guards: Mapping[int, Tracer], watched: Sequence[Expr]
 ) -> Iterable[tuple[Expr, Node | None]]:
-    """Yield the conditions of blocks that do not declare theirs, each with its block.
-
-    And those of the run's own event functions.
-    """
+    """Yield the conditions of blocks that do not declare theirs, each with its block."""
+    # And those of the run's own event functions.
     for i, node in enumerate(reader.blocks):
         if node.sampled or _declares(node):
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
-        made = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
-        for each in conditions(_pieces(made), given):
-            yield each, node
-    for each in conditions(list(watched), set(_pieces(reader.signals.values()))):
-        yield each, None
+        parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
+        for condition in conditions(_pieces(parts), given):
+            yield condition, node
+    for condition in conditions(list(watched), set(_pieces(reader.signals.values()))):
+        yield condition, None
 
 
 def _remembers(function: Expr, node: Node | None) -> bool:
     """Whether a condition asks for a memory of its own block, which stands aside within a step."""
-    own = set() if node is None else set(memory(node))
-    if not own:
+    memories = set() if node is None else set(memory(node))
+    if not memories:
         return False
     leaves = (e for e in needed([function]) if e.op == "leaf" and e.data[0] == "x")
-    return any(own & set(_places(leaf)) for leaf in leaves)
+    return any(memories & set(_places(leaf)) for leaf in leaves)
 
 
 def _places(leaf: Expr) -> range:
@@ -213,14 +183,14 @@ def _terms(nodes: Sequence[Expr], timed: set[Expr]) -> list[Expr]:
     inner = {arg for node in nodes if node in timed for arg in node.args}
     used = {arg for node in nodes if node not in timed for arg in node.args if arg in timed}
     outer = [node for node in nodes if node in timed and (node in used or node not in inner)]
-    found: dict[Expr, None] = {}
+    terms: dict[Expr, None] = {}
     while outer:
         node = outer.pop()
         if node.op in ("add", "sub", "neg", "concat") and node in timed:
             outer += [arg for arg in node.args if arg in timed]
         elif node.kind == "f" and node.op != "leaf":
-            found[node] = None
-    return list(found)
+            terms[node] = None
+    return list(terms)
 
 
 def _moving(
@@ -230,22 +200,20 @@ def _moving(
     waves: dict[tuple[Expr, ...], None] = {}
     pulses = []
     for term in terms:
-        own = _frequencies(graph, term, timed, {})
-        if own is None:
+        frequencies = _frequencies(graph, term, timed, {})
+        if frequencies is None:
             pulses.append(term)
-        elif own:
-            waves[own] = None
+        elif frequencies:
+            waves[frequencies] = None
     return tuple(waves), tuple(pulses)
 
 
 def _frequencies(
     graph: Graph, node: Expr, timed: set[Expr], known: dict[Expr, tuple[Expr, ...] | None]
 ) -> tuple[Expr, ...] | None:
-    """Return the angular frequencies in a function of t; None if it has no highest one.
-
-    Of pieces that are put together at conditions those of the pieces: where one switches, a step
-    ends anyway.
-    """
+    """Return the angular frequencies in a function of t; None if it has no highest one."""
+    # Of pieces that are put together at conditions those of the pieces: where one switches, a step
+    # ends anyway.
     if node not in timed or node.op == "leaf" or node.kind == "b":
         return ()
     if node not in known:

@@ -21,11 +21,10 @@ from ...sampling.system import Happening, Sampled, oldest, rounded
 from ...wording import counted
 from ..codegen.newton import inside, solver
 from ..codegen.solver import Solver
-from ..diagram.feedthrough import feedthrough
 from ..diagram.nodes import Node
 from ..diagram.program import check_continuous, count_guards, count_switching_functions, memory
 from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, signal_name
-from ..diagram.trace import time, traced_parameters
+from ..diagram.trace import feedthrough, time, traced_parameters
 from ..opaque.called import call_of
 from ..opaque.calls import Call
 
@@ -39,47 +38,29 @@ def _labels(blocks: Sequence[Node]) -> list[str]:
 
 @dataclass(kw_only=True)
 class Reader:
-    """Reads blocks one after the other.
-
-    Attributes
-    ----------
-    graph : Graph
-    layout : mapping
-    blocks : sequence of Node
-    p : ndarray or None
-        Values of integer parameters; None for those that the blocks have now.
-    signals : dict
-        Outputs of the blocks that have been read.
-    guesses : dict
-        What stands for signals that are being solved for.
-    solved : list of Tracer
-        Signals that have been.
-    calls, solvers, fixed_points : dict
-        By name.
-    what : frozenset of Moment
-        What happens to sampled blocks.
-    samplings : mapping
-        Where in the layout the parameters of a sampling are, by its identity.
-    supplied : mapping
-        Outputs of blocks that these alone cannot compute: of transport delays, further inputs of
-        the program; of ideal relays, what follows from the rates of the diagram.
-    moving : mapping
-        a and b of the rates u' = a + b v of the inputs of ideal relays.
-    """
+    """Reads blocks one after the other."""
 
     graph: Graph
     layout: Any
     blocks: Sequence[Node]
+    # values of integer parameters; None for those that the blocks have now
     p: np.ndarray | None = None
+    # outputs of the blocks that have been read
     signals: dict[int, Tracer] = field(default_factory=dict)
+    # what stands for signals that are being solved for
     guesses: dict[Signal, Tracer] = field(default_factory=dict)
-    solved: list[Tracer] = field(default_factory=list)
+    solved: list[Tracer] = field(default_factory=list)  # signals that have been
+    # by name
     calls: dict[str, Call] = field(default_factory=dict)
     solvers: dict[str, Solver] = field(default_factory=dict)
     fixed_points: dict[str, list[Expr]] = field(default_factory=dict)
-    what: Happening = frozenset()
+    what: Happening = frozenset()  # what happens to sampled blocks
+    # where in the layout the parameters of a sampling are, by its identity
     samplings: Mapping[int, int] = field(default_factory=dict)
+    # outputs of blocks that these alone cannot compute: of transport delays, further inputs of the
+    # program; of ideal relays, what follows from the rates of the diagram
     supplied: Mapping[int, Tracer] = field(default_factory=dict)
+    # a and b of the rates u' = a + b v of the inputs of ideal relays
     moving: Mapping[int, Tracer] = field(default_factory=dict)
 
     def read(self, schedule: Schedule) -> None:
@@ -108,21 +89,21 @@ class Reader:
         name, places = f"loop{len(self.solvers)}", range(loop.start, loop.stop)
         leaves = [self.graph.leaf(name, k, None) for k in range(len(loop.torn))]
         self._guessed(schedule, places, loop.torn, [scalar(self.graph, leaf) for leaf in leaves])
-        found = self._made(loop.torn)
+        values = self._made(loop.torn)
         try:
-            made, given = solver(name, leaves, found)
+            search, given = solver(name, leaves, values)
         except Untraceable as error:
             names = ", ".join(signal_name(self.blocks, signal) for signal in loop.torn)
-            why = _opaque(leaves, found, self.calls) or str(error)
+            why = _opaque(leaves, values, self.calls) or str(error)
             raise CompileError(
                 f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
             ) from error
-        self.solvers[name] = made
+        self.solvers[name] = search
         pieces = [Tracer(self.graph, as_array(e), 0, e.size) if e.size else
                   scalar(self.graph, e).reshape(1) for e in given]  # fmt: skip
-        results = _results(self.graph, "solve", name, pieces, made.count)
+        results = _results(self.graph, "solve", name, pieces, search.count)
         self.solved.append(results)
-        self._guessed(schedule, places, loop.torn, [results[k] for k in range(made.count)])
+        self._guessed(schedule, places, loop.torn, [results[k] for k in range(search.count)])
         self.fixed_points[name] = self._made(loop.torn)
 
     def _made(self, torn: Sequence[Signal]) -> list[Expr]:
@@ -138,18 +119,18 @@ class Reader:
 
     def known(self, array: Tracer) -> Tracer:
         """Return an array, NaN where a loop was not solved: blocks may turn NaN into numbers."""
-        pairs = [elementwise(self.graph, "eq", z, z) for found in self.solved for z in found]
+        pairs = [elementwise(self.graph, "eq", z, z) for signals in self.solved for z in signals]
         is_known = reduce(lambda a, b: elementwise(self.graph, "and", a, b), pairs)
         return elementwise(self.graph, "select", is_known, array, np.nan) if array.size else array
 
     def taken(self, signal: Signal, count: int) -> Tracer:
         """Return a block's output, or several from that on; of those that are guessed the guess."""
-        own = [Signal(signal.block, signal.index + k) for k in range(count)]
-        if not any(s in self.guesses for s in own):
+        signals = [Signal(signal.block, signal.index + k) for k in range(count)]
+        if not any(s in self.guesses for s in signals):
             return self.signals[signal.block or 0][signal.index : signal.index + count]
         parts = [
             self.guesses[s] if s in self.guesses else self.signals[s.block or 0][s.index]
-            for s in own
+            for s in signals
         ]
         return concatenated(self.graph, [part.reshape(1) for part in parts])
 
@@ -203,8 +184,8 @@ class Reader:
             reader = replace(self, blocks=[*self.blocks[:i], direct, *self.blocks[i + 1 :]])
             following = self._own_states(i)
             if sampled.euler:
-                own, _, _ = sampled.parts(self._every_state(i))
-                following = own + self._sampling(sampled).dt * following
+                state, _, _ = sampled.parts(self._every_state(i))
+                following = state + self._sampling(sampled).dt * following
             return following, self._converted(sampled, reader._own_outputs(i, ()), 1)
 
         parts = sampled.after(self.what, self._every_state(i), self._due(i), computed)
@@ -249,10 +230,10 @@ class Reader:
         inputs = self.wired(node.inputs)
         if i in self.moving:
             inputs = concatenated(self.graph, [inputs, self.moving[i]])
-        found = self._function(i, "events", functions, inputs, sum(count for _, count in used))
+        values = self._function(i, "events", functions, inputs, sum(count for _, count in used))
         if not used[0][1]:
-            check_continuous(node, found, inputs)
-        return found
+            check_continuous(node, values, inputs)
+        return values
 
     def guards(self, i: int) -> Tracer:
         """Return the guards of a block."""
@@ -319,9 +300,9 @@ class Reader:
 
         try:
             parts = [trace(self.graph, function, arguments) for function in functions]
-            found = concatenated(self.graph, parts)
-            if found.size != count:
-                raise Untraceable(f"it returns {counted(found.size, 'value')}, not {count}")
+            result = concatenated(self.graph, parts)
+            if result.size != count:
+                raise Untraceable(f"it returns {counted(result.size, 'value')}, not {count}")
         except Untraceable as error:
             return self._called(i, kind, functions, inputs, count, str(error))
         except Ambiguous as error:
@@ -329,7 +310,7 @@ class Reader:
                 f"block '{node.path}' cannot be compiled: its {kind} function {error}; "
                 "the diagram still runs in python-control"
             ) from None
-        return found
+        return result
 
     def _called(
         self, i: int, kind: str, functions: list[Any], inputs: Tracer, count: int, reason: str
@@ -350,13 +331,13 @@ class Reader:
         return _results(self.graph, "call", name, given, count)
 
 
-def _opaque(guesses: Sequence[Expr], found: Sequence[Expr], calls: Mapping[str, Call]) -> str:
+def _opaque(guesses: Sequence[Expr], results: Sequence[Expr], calls: Mapping[str, Call]) -> str:
     """Return which opaque functions are in a loop, in words; nothing if there are none."""
-    nodes = inside(needed(found), guesses)
+    nodes = inside(needed(results), guesses)
     names = [n.data[0] for n in sorted(nodes, key=lambda n: n.index) if n.op == "call"]
     used = [calls[name] for name in dict.fromkeys(names)]
     return ", ".join(
-        f"the {call.kind} function of block '{call.block}' is called as it stands ({call.reason}) "
+        f"the {call.kind} function of block '{call.block}' is called unchanged ({call.reason}) "
         "and has no derivatives"
         for call in used
     )

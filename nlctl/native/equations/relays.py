@@ -24,19 +24,17 @@ def relay_places(blocks: Sequence[Node]) -> list[int]:
 
 
 def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
-    """Return a reader that knows outputs and rates of ideal relays, if there are any.
-
-    The diagram is read once more for that, with their outputs as if they came from outside.
-    """
+    """Return a reader that knows outputs and rates of ideal relays, if there are any."""
+    # The diagram is read once more for that, with their outputs as if they came from outside.
     graph, blocks = reader.graph, reader.blocks
     places = relay_places(blocks)
     if not places:
         return reader
     leaves = [graph.leaf(OUTPUTS, k, None) for k in range(len(places))]
-    own = {i: _array(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
+    relay_outputs = {i: _array(graph, [leaf]) for i, leaf in zip(places, leaves, strict=True)}
     first = replace(
         reader,
-        supplied={**reader.supplied, **own},
+        supplied={**reader.supplied, **relay_outputs},
         signals={},
         solved=[],
         solvers={},
@@ -61,12 +59,12 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
         rates=_rates(first), solutions=first.fixed_points, inputs=schedule.system.ninputs or 0,
         behind=schedule.ninputs - schedule.rates,
     )  # fmt: skip
-    found = sliding_rates(graph, relays, motion, output)
-    outputs = {i: _array(graph, [f.output]) for i, f in zip(places, found, strict=True)}
+    derived = sliding_rates(graph, relays, motion, output)
+    outputs = {i: _array(graph, [f.output]) for i, f in zip(places, derived, strict=True)}
     return replace(
         reader,
         supplied={**reader.supplied, **outputs},
-        moving={i: _array(graph, [f.drift, f.gain]) for i, f in zip(places, found, strict=True)},
+        moving={i: _array(graph, [f.drift, f.gain]) for i, f in zip(places, derived, strict=True)},
     )
 
 
@@ -84,8 +82,8 @@ def _limits(reader: Reader, i: int) -> Limits:
 def _rates(reader: Reader) -> list[Expr]:
     """Return the derivatives of all states within a step, in which memories stand still."""
     arrays = [reader.derivatives(i) for i in range(len(reader.blocks))]
-    found = [array[k].only for array in arrays for k in range(array.size)]
+    numbers = [array[k].only for array in arrays for k in range(array.size)]
     for node in reader.blocks:
         for m in memory(node):
-            found[m] = reader.graph.const(0.0)
-    return found
+            numbers[m] = reader.graph.const(0.0)
+    return numbers

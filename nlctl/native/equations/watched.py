@@ -22,22 +22,22 @@ def watched_conditions(reader: Reader, schedule: Schedule) -> list[Located]:
     """Return the functions of a run as conditions."""
     graph, system = reader.graph, schedule.system
     sizes = (system.nstates or 0, system.ninputs or 0)
-    found = []
-    for each in schedule.watched:
+    rows = []
+    for watch in schedule.watched:
 
         def arguments() -> tuple:
             x, u = (leaf_vector(graph, k, 0, (n,)) for k, n in zip("xu", sizes, strict=True))
             return time(graph), x, u, dict(schedule.overrides)
 
         try:
-            value = trace(graph, partial(each.function), arguments)
+            value = trace(graph, partial(watch.function), arguments)
             if value.size != 1:
                 raise Untraceable(f"it returns {counted(value.size, 'number')}, not one")
         except (Untraceable, Ambiguous) as error:
             raise CompileError(
-                f"event function '{each.name}' cannot be compiled: {error}; "
-                "engine='python-control' calls it as it stands"
+                f"event function '{watch.name}' cannot be compiled: {error}; "
+                "engine='python-control' calls it unchanged"
             ) from None
         function = graph.number(value.reshape(-1)[0].only)
-        found.append(Located(function=function, block="", what=each.name, bends=False))
-    return found
+        rows.append(Located(function=function, block="", what=watch.name, bends=False))
+    return rows

@@ -3,13 +3,16 @@
 A call has its arguments in memory, in rows of `c`; its results follow.  Machine code calls a C
 function: one that numba makes, or, where numba refuses, one that calls back into Python, which is
 slow and right.  An exception cannot pass through machine code: it is noted in the row behind the
-results, with the arguments behind it, and raised by whoever ends the evaluation.  Until then the
+results, with the arguments behind it, and raised by what ends the evaluation.  Until then the
 function is not called again for that member.
 """
 
 from __future__ import annotations
 
 import ctypes
+import linecache
+import sys
+import types
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,9 +24,8 @@ import numpy as np
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
 from ..opaque.calls import Call, Source
-from .fingerprint import module_key
+from .fingerprint import Sourced, module_key, program_key
 from .machine_code import Wanted, machine_code_if_taken
-from .module import loaded
 
 _ADDRESS = numba.void(numba.types.CPointer(numba.float64), numba.int64, numba.int64)
 CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64)
@@ -33,23 +35,12 @@ CALL_FAILED = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Native:
-    """C functions of opaque functions.
+    """C functions of opaque functions."""
 
-    Attributes
-    ----------
-    symbols : mapping
-        Addresses by name.
-    owners : tuple
-        What these belong to.
-    called_back : tuple of str
-        Names of those that call back into Python.
-    raised : dict
-        What functions in Python have raised, by the place of their rows and the member.
-    """
-
-    symbols: Mapping[str, int] = field(default_factory=dict)
-    owners: tuple[Any, ...] = ()
-    called_back: tuple[str, ...] = ()
+    symbols: Mapping[str, int] = field(default_factory=dict)  # addresses by name
+    owners: tuple[Any, ...] = ()  # what these belong to
+    called_back: tuple[str, ...] = ()  # names of those that call back into Python
+    # what functions in Python have raised, by the place of their rows and the member
     raised: dict[tuple[int, int], BaseException] = field(default_factory=dict)
 
     def error(self, call: Call, c: np.ndarray, row: int, lane: int) -> BaseException:
@@ -129,18 +120,18 @@ def _by_numba(call: Call, lanes: int) -> Any:
         known = call.source()
     except (UsageError, TypeError, ValueError):
         return None
-    own = Source(
+    source = Source(
         source="\n".join(["@equation", known.source, "", *_of_member(call, lanes), ""]),
         names=known.names,
         taught=known.taught,
     )
-    module = loaded(own, {})
-    wanted = Wanted(
+    module = loaded(source, {})
+    request = Wanted(
         function=getattr(module, f"at_{call.name}"), signature=_ADDRESS, options=OPTIONS
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaWarning)  # of what the user need not know
-        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", wanted)
+        return machine_code_if_taken(f"{module.__name__} {module_key(*known.taught)}", request)
 
 
 def _of_member(call: Call, lanes: int) -> list[str]:
@@ -165,3 +156,19 @@ def at_{call.name}(c, at, lane):
             table[at + {failed + 1} + i, lane] = given[i]
     for i in range({count}):
         table[at + {given} + i, lane] = y[i]""".splitlines()
+
+
+def loaded(program: Sourced, functions: Mapping[str, Any]) -> types.ModuleType:
+    """Return the program as a module, made of its own source."""
+    # It is registered under the program's key, by which machine code that was kept finds it, and
+    # its lines are known to tracebacks.
+    name = f"nlctl_program_{program_key(program)}"
+    file = f"<{name}>"
+    lines = program.source.splitlines(keepends=True)
+    linecache.cache[file] = (len(program.source), None, lines, file)
+    module = types.ModuleType(name)
+    module.__file__ = file
+    module.__dict__.update(program.namespace(native=True) | dict(functions))
+    exec(compile(program.source, file, "exec"), module.__dict__)
+    sys.modules[name] = module  # machine code looks its globals up there
+    return module

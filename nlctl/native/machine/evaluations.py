@@ -21,33 +21,20 @@ ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
-    """Functions over `width` members, with the member as the last index of every array.
-
-    Attributes
-    ----------
-    width : int
-    lowered : Lowered
-        The plan that they are made from.
-    prepare : callable
-        ``prepare(p, c)`` fills these from the program's parameter vectors.
-    rhs, out : callable
-        ``rhs(t, x, u, c, dx, g, m)`` and ``out(t, x, u, c, y)``.
-    samples : tuple of callable
-        ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks.
-    resets : callable or None
-        ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump.
-    meetings : tuple of frozenset
-        What happens to them there.
-    """
+    """Functions over `width` members, with the member as the last index of every array."""
 
     width: int
-    lowered: Lowered
+    lowered: Lowered  # the plan that they are made from
+    # ``prepare(p, c)`` fills these from the program's parameter vectors
     prepare: Callable[[np.ndarray, np.ndarray], None]
+    # ``rhs(t, x, u, c, dx, g, m)`` and ``out(t, x, u, c, y)``
     rhs: Any
     out: Any
+    # ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks
     samples: tuple[Any, ...] = ()
+    # ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump
     resets: Any = None
-    meetings: tuple[Happening, ...] = ()
+    meetings: tuple[Happening, ...] = ()  # what happens to them there
 
     @property
     def rows(self) -> int:
@@ -90,33 +77,30 @@ class Machine:
 
 
 def _entries(functions: tuple[Any, ...]) -> np.ndarray:
-    found = [entry(function) for function in functions]
-    plain = any(callable(each) for each in found)
-    return np.array(found, dtype=object if plain else np.int64)
+    entries = [entry(function) for function in functions]
+    plain = any(callable(address) for address in entries)
+    return np.array(entries, dtype=object if plain else np.int64)
 
 
 def machine(
     reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> Machine:
-    """Return machine code that holds for parameter vectors `p` of shape (parameters, members).
-
-    It has functions for all that happens to sampled blocks; where clocks with other parameters
-    meet as they do not in the diagram as it stands, these are made.
-
-    Where an integer that steers an equation has another value, the blocks' functions are read
-    once more.  The first member's values decide: `fitting` says for which members they hold.
-    """
+    """Return machine code that holds for parameter vectors `p` of shape (parameters, members)."""
+    # It has functions for all that happens to sampled blocks; where clocks with other parameters
+    # meet as they do not in the unchanged diagram, these are made.
+    # Where an integer that steers an equation has another value, the blocks' functions are read
+    # once more. The first member's values decide: `fitting` says for which members they hold.
     known = reading.cache.of(Machine)
     asked = set(happening)
-    for made in known:
-        if made.width == width and asked <= set(made.meetings) and made.lowered.holds_for(p):
-            return made
-    found, schedule, program = reading.equations, reading.schedule, reading.program
+    for code in known:
+        if code.width == width and asked <= set(code.meetings) and code.lowered.holds_for(p):
+            return code
+    traced, schedule, program = reading.equations, reading.schedule, reading.program
     extra = [what for what in happening if what not in program.meetings]
     meetings = (*program.meetings, *dict.fromkeys(extra))
-    if extra or not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(schedule, program.layout, p[:, 0], meetings)
-    lowered = lower(schedule, program, width, found)
+    if extra or not all(p[i, 0] == value for i, value in traced.graph.assumptions.items()):
+        traced = equations(schedule, program.layout, p[:, 0], meetings)
+    lowered = lower(schedule, program, width, traced)
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
@@ -138,9 +122,9 @@ def machine(
     return known[-1]
 
 
-def _hint(reading: Reading, made: Machine) -> None:
+def _hint(reading: Reading, code: Machine) -> None:
     """Say which functions take the time of Python, and at which line that is decided."""
-    for name in made.called_back:
+    for name in code.called_back:
         call = reading.equations.calls[name]
         _LOG.warning(
             "hint: the %s function of block '%s' is called back in Python, so runs are no faster "
@@ -151,8 +135,8 @@ def _hint(reading: Reading, made: Machine) -> None:
 
 def fitting(reading: Reading, p: np.ndarray, width: int) -> np.ndarray:
     """Return for which members the machine code of the first one holds."""
-    made = machine(reading, np.repeat(p[:, :1], width, axis=1), width)
-    return np.array([made.lowered.holds_for(column) for column in p.T], dtype=bool)
+    code = machine(reading, np.repeat(p[:, :1], width, axis=1), width)
+    return np.array([code.lowered.holds_for(column) for column in p.T], dtype=bool)
 
 
 def evaluations(reading: Reading) -> tuple[Callable[..., None], Callable[..., None]]:
@@ -176,10 +160,10 @@ def prepared_parameters(
     reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> tuple[Machine, np.ndarray]:
     """Return machine code for a parameter vector, and what its functions take of that."""
-    each = np.repeat(p[:, None], width, axis=1)
-    code = machine(reading, each, width, happening)
+    members = np.repeat(p[:, None], width, axis=1)
+    code = machine(reading, members, width, happening)
     c = np.zeros((code.rows, width))
-    code.prepare(each, c)
+    code.prepare(members, c)
     return code, c
 
 

@@ -56,20 +56,20 @@ define void @NRT_MemInfo_call_dtor(ptr %info) {
 """
 
 
-def exported(wanted: Sequence[Wanted]) -> bytes:
+def exported(requests: Sequence[Wanted]) -> bytes:
     """Return compressed bitcode of functions, each with its Python name."""
     names, libraries = {}, []
     with own_ir() as texts:
-        for each in wanted:
-            code: Any = numba.njit(each.signature, **each.options)(each.function)
+        for request in requests:
+            code: Any = numba.njit(request.signature, **request.options)(request.function)
             name, library = name_and_library(code)
-            names[name] = each.function.__name__
+            names[name] = request.function.__name__
             libraries.append(library)
-    found: dict[int, Any] = {}
+    reached: dict[int, Any] = {}
     for library in libraries:
-        _reach(library, found)
+        _reach(library, reached)
     linked = llvm.parse_assembly(_MEMORY)
-    for key, library in found.items():
+    for key, library in reached.items():
         for text in texts.get(key) or [library.get_llvm_str()]:  # what was compiled before has none
             linked.link_in(llvm.parse_assembly(text))
     module = _named(linked, names)
@@ -77,41 +77,39 @@ def exported(wanted: Sequence[Wanted]) -> bytes:
     return lzma.compress(_apart(module, names.values()).as_bitcode(), preset=9)
 
 
-def _reach(library: Any, found: dict[int, Any]) -> None:
+def _reach(library: Any, reached: dict[int, Any]) -> None:
     """Add a library and all that it calls."""
-    if id(library) not in found:
-        found[id(library)] = library
+    if id(library) not in reached:
+        reached[id(library)] = library
         for other in called_libraries(library):
-            _reach(other, found)
+            _reach(other, reached)
 
 
 def _named(module: Any, names: dict[str, str]) -> Any:
-    """Return a module in which only functions of these names can be called from outside.
-
-    What an exception says is left out: only its number is read, and it has the paths of the machine
-    that makes the module.
-    """
+    """Return a module in which only functions of these names can be called from outside."""
+    # What an exception says is left out: only its number is read, and it has the paths of the
+    # machine that makes the module.
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name in names else "internal"
     text = re.sub(r"store ptr @\.const\.picklebuf[\w.]+", "store ptr null", str(module))
     for mangled, name in names.items():
         text = re.sub(rf'@"?{re.escape(mangled)}"?(?![\w.$"])', f"@{name}", text)
-    made = llvm.parse_assembly(text)
-    made.verify()
-    return made
+    renamed = llvm.parse_assembly(text)
+    renamed.verify()
+    return renamed
 
 
 def _simplify(module: Any) -> None:
     """Simplify each function; reference counts that cancel go."""
     target = llvm.Target.from_triple(llvm.get_process_triple())
     machine = target.create_target_machine(cpu="", features="", opt=3)
-    each = _builder(machine, 3)
-    passes = each.getFunctionPassManager()
+    builder = _builder(machine, 3)
+    passes = builder.getFunctionPassManager()
     passes.add_refprune_pass()
     for function in module.functions:
         if not function.is_declaration:
-            passes.run(function, each)
+            passes.run(function, builder)
     all_of_it = _builder(machine, 0)
     passes = all_of_it.getModulePassManager()
     passes.add_loop_rotate_pass()
@@ -124,10 +122,8 @@ def _simplify(module: Any) -> None:
 
 
 def _apart(module: Any, entries: Iterable[str]) -> Any:
-    """Return a module whose long functions are not inlined.
-
-    As text: some versions of llvmlite give the attribute to the result.
-    """
+    """Return a module whose long functions are not inlined."""
+    # As text: some versions of llvmlite give the attribute to the result.
     text = str(module)
     for function in module.functions:
         short = str(function).count("\n") < _LONG

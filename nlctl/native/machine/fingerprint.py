@@ -27,6 +27,7 @@ import numpy as np
 from ...annotations import unreported
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
+from ..purity.source import codes_in
 
 _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
     *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and
@@ -41,11 +42,7 @@ _MACHINERY = (
     types.MemberDescriptorType,
     types.GetSetDescriptorType,
     types.WrapperDescriptorType,
-) + (
-    types.ClassMethodDescriptorType,
-    types.MethodDescriptorType,
-    property,
-)
+) + (types.ClassMethodDescriptorType, types.MethodDescriptorType, property)
 RUNNERS = {"eval", "exec", "__import__"}
 FINDERS = {"globals", "vars", *RUNNERS}
 READERS = {"open", "loadtxt", "genfromtxt", "fromfile", "memmap", "loadmat", "read_csv"} | {
@@ -58,7 +55,7 @@ STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 class _Seen(dict[int, Any]):
     """Things that have been gone through, kept so that no other one takes their places.
 
-    `deep` says whether objects of libraries are looked into.
+    `deep` says whether objects of libraries are read.
     """
 
     def __init__(self, *, deep: bool) -> None:
@@ -95,10 +92,8 @@ def function_key(*things: Any) -> str:
 
 
 def content_key(*things: Any) -> str:
-    """Return a key of what functions compute: the same wherever their files are.
-
-    Unlike `function_key` it does not tell functions of the same content in different modules.
-    """
+    """Return a key of what functions compute: the same wherever their files are."""
+    # Unlike `function_key` it is the same for functions of the same content in different modules.
     return content_of(*things)[0]
 
 
@@ -233,20 +228,20 @@ def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> I
     """Yield text for what a function finds by texts, ``globals()["K"]``, and what it reads then."""
     where = f" in '{function.__qualname__}'"
     calls = _globals_of(function.__code__) - set(function.__globals__)
-    texts, found = _all_texts(function.__code__), list[str]()
+    texts, named = _all_texts(function.__code__), list[str]()
     if calls & FINDERS:
-        found = [text for text in texts if text in function.__globals__ and text not in names]
-        for text in found:
+        named = [text for text in texts if text in function.__globals__ and text not in names]
+        for text in named:
             yield text
             yield from _fingerprint(function.__globals__[text], seen, names)
     if {"environ", "getenv"} & set(names):
         yield from (f"environment {text} {os.environ.get(text)}" for text in texts)
-    unknown = calls & RUNNERS | (set() if found else calls & {"globals", "vars"})
+    unknown = calls & RUNNERS | (set() if named else calls & {"globals", "vars"})
     unknown |= {"import_module"} & set(names)
     for name in sorted(unknown):
         yield f"{OPAQUE}what '{name}' finds{where}"
-    for told in dict.fromkeys(asked_outside(function)):
-        yield f"{OPAQUE}{told}{where})"
+    for answer in dict.fromkeys(asked_outside(function)):
+        yield f"{OPAQUE}{answer}{where})"
     for name in imports_in(function, _is_named):
         yield f"{OPAQUE}what it imports when it is called ('{name}'{where})"
     for name in sorted((set(names) - {"open"}) & READERS | calls & {"open"}):
@@ -256,19 +251,14 @@ def _looked_up(function: types.FunctionType, names: list[str], seen: _Seen) -> I
 @functools.lru_cache(maxsize=4096)
 def _all_texts(code: types.CodeType) -> list[str]:
     """Return the texts that stand in a code object and in those nested in it."""
-    texts = {part for part in code.co_consts if isinstance(part, str)}
-    for part in code.co_consts:
-        if isinstance(part, types.CodeType):
-            texts.update(_all_texts(part))
-    return sorted(texts)
+    return sorted({c for part in codes_in(code) for c in part.co_consts if isinstance(c, str)})
 
 
 @functools.lru_cache(maxsize=4096)  # code never changes, what names refer to may
 def _globals_of(code: types.CodeType) -> set[str]:
     """Return the names that a code object, and those nested in it, read by themselves."""
-    inner = [part for part in code.co_consts if isinstance(part, types.CodeType)]
-    found = {i.argval for i in dis.get_instructions(code) if "GLOBAL" in i.opname}
-    return found.union(*map(_globals_of, inner))
+    steps = (step for part in codes_in(code) for step in dis.get_instructions(part))
+    return {step.argval for step in steps if "GLOBAL" in step.opname}
 
 
 def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
@@ -300,7 +290,7 @@ def _is_note(name: str) -> bool:
 
 
 def _is_controls(thing: object) -> bool:
-    """Whether a function or a class is python-control's, whose version stands beside every key."""
+    """Whether a function or a class is python-control's, whose version stands next to every key."""
     return str(thing.__module__).partition(".")[0] == "control"
 
 
@@ -371,10 +361,8 @@ def _in_cell(cell: types.CellType) -> Any:
 
 
 def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> Iterator[str]:
-    """Yield text for what is read of a module, ``module.name``; a library's version stands for it.
-
-    Every name that the reader uses may be one.
-    """
+    """Yield text for what is read of a module, ``module.name``; a library has its version."""
+    # Every name that the reader uses may be one.
     yield f"module {module.__name__} {getattr(module, '__version__', '')}"
     if _is_library(module.__name__) or not seen.add(module):
         return
@@ -396,10 +384,8 @@ def _of_numba_type(kind: numba.types.Type, seen: _Seen) -> Iterator[str]:
 
 
 def _defined(module: types.ModuleType) -> Iterator[str]:
-    """Yield a module's source, and its functions and methods as they are in memory.
-
-    What these refer to is in the source, and may change while they are used.
-    """
+    """Yield a module's source, and its functions and methods as they are in memory."""
+    # What these refer to is in the source, and may change while they are used.
     with contextlib.suppress(OSError, TypeError):  # there is none
         yield inspect.getsource(module)
     for name, thing in vars(module).items():
@@ -412,7 +398,7 @@ def _defined(module: types.ModuleType) -> Iterator[str]:
 
 
 def _is_named(module: str) -> bool:
-    """Whether the version of a module stands beside every key."""
+    """Whether the version of a module stands next to every key."""
     return module.partition(".")[0] in ("nlctl", "control") or _is_library(module)
 
 
@@ -446,11 +432,7 @@ def _code_parts(code: types.CodeType) -> Iterator[str]:
 @functools.lru_cache(maxsize=4096)
 def _all_names(code: types.CodeType) -> list[str]:
     """Return the global names of a code object and of those nested in it, in a fixed order."""
-    names = set(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            names.update(_all_names(constant))
-    return sorted(names)
+    return sorted({name for part in codes_in(code) for name in part.co_names})
 
 
 def _constant(value: object) -> str:

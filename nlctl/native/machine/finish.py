@@ -40,18 +40,10 @@ _ONE_AT_A_TIME = threading.Lock()  # symbols are the process's
 
 @dataclass(frozen=True, kw_only=True)
 class Loaded:
-    """Code in memory.
+    """Code in memory."""
 
-    Attributes
-    ----------
-    addresses : mapping
-        Of its functions, by name.
-    owners : tuple
-        What must not be forgotten while these are used.
-    """
-
-    addresses: Mapping[str, int]
-    owners: tuple[Any, ...]
+    addresses: Mapping[str, int]  # of its functions, by name
+    owners: tuple[Any, ...]  # what must not be forgotten while these are used
 
 
 def finished(

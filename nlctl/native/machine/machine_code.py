@@ -35,46 +35,35 @@ from .fingerprint import function_key
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A function that is to be machine code.
+    """A function that is to be machine code."""
 
-    Attributes
-    ----------
-    function : callable
-        Plain Python.
-    signature : numba signature
-    options : mapping
-        Of `numba.njit`.
-    """
-
-    function: Callable[..., Any]
+    function: Callable[..., Any]  # plain Python
     signature: Any
-    options: Mapping[str, Any]
+    options: Mapping[str, Any]  # of `numba.njit`
 
 
-def machine_code(key: str, wanted: Sequence[Wanted]) -> list[Any]:
-    """Return functions as machine code, from the store, or compiled and kept there as one entry.
-
-    With NUMBA_DISABLE_JIT=1 they are returned as they stand.
-    """
+def machine_code(key: str, requests: Sequence[Wanted]) -> list[Any]:
+    """Return functions as machine code, from the store, or compiled and kept there as one entry."""
+    # With NUMBA_DISABLE_JIT=1 they are returned unchanged.
     if is_jit_disabled():
-        return [each.function for each in wanted]
-    key = store_key(key, *((str(each.signature), each.options) for each in wanted))
+        return [request.function for request in requests]
+    key = store_key(key, *((str(request.signature), request.options) for request in requests))
     with global_compiler_lock:  # types are made, as by a compilation
         known = _read(key)
-    caches = [_Given(data) for data in known or [None] * len(wanted)]
-    made = [_compiled(*pair) for pair in zip(wanted, caches, strict=True)]
+    caches = [_Given(data) for data in known or [None] * len(requests)]
+    functions = [_compiled(*pair) for pair in zip(requests, caches, strict=True)]
     if any(cache.is_new for cache in caches):
         _write(key, [cache.data for cache in caches])
-    return made
+    return functions
 
 
-def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
+def machine_code_if_taken(key: str, request: Wanted) -> Any:
     """Return a function as machine code, None if numba refuses it; that is kept as well."""
-    refused = store_key(key, "refused", str(wanted.signature), wanted.options)
+    refused = store_key(key, "refused", str(request.signature), request.options)
     if store.read(refused) is not None:
         return None
     try:
-        return machine_code(key, [wanted])[0]
+        return machine_code(key, [request])[0]
     except NumbaError:
         store.write(refused, b"refused")
     except Exception:  # numba passes on whatever typing raises
@@ -82,10 +71,10 @@ def machine_code_if_taken(key: str, wanted: Wanted) -> Any:
     return None
 
 
-def _compiled(wanted: Wanted, cache: CodeCache) -> Any:
-    code: Any = numba.njit(**wanted.options)(wanted.function)
+def _compiled(request: Wanted, cache: CodeCache) -> Any:
+    code: Any = numba.njit(**request.options)(request.function)
     give_cache(code, cache)
-    code.compile(wanted.signature)
+    code.compile(request.signature)
     code.disable_compile()
     return code
 

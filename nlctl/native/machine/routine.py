@@ -21,18 +21,10 @@ from .finish import Loaded, finished
 
 @dataclass(frozen=True, kw_only=True)
 class Opaque:
-    """A call of an opaque function within a program.
-
-    Attributes
-    ----------
-    call : Call
-    row : int
-        Where it begins in `c`.
-    native : Native
-    """
+    """A call of an opaque function within a program."""
 
     call: Call
-    row: int
+    row: int  # where it begins in `c`
     native: Native
 
     def check(self, c: np.ndarray) -> None:
@@ -44,29 +36,18 @@ class Opaque:
 
 @dataclass(frozen=True, kw_only=True)
 class Routine:
-    """A C function of arrays of floats.
-
-    Attributes
-    ----------
-    address : int
-    shapes : tuple
-        Shapes of its arrays: nothing else may be given to it.
-    loaded : Loaded
-        What the address belongs to.
-    opaque : tuple of Opaque
-        What it calls.
-    """
+    """A C function of arrays of floats."""
 
     address: int
-    shapes: tuple[tuple[int, ...], ...]
-    loaded: Loaded
-    opaque: tuple[Opaque, ...]
+    shapes: tuple[tuple[int, ...], ...]  # shapes of its arrays: nothing else may be given to it
+    loaded: Loaded  # what the address belongs to
+    opaque: tuple[Opaque, ...]  # what it calls
 
     def __call__(self, *arrays: np.ndarray) -> None:
         self.bound(*arrays)()
 
     def bound(self, *arrays: np.ndarray) -> Callable[[], None]:
-        """Return a call with these arrays, which are looked at once; their values may change."""
+        """Return a call with these arrays, which are checked once; their values may change."""
         for array, shape in zip(arrays, self.shapes, strict=True):
             fits = array.shape == shape and array.dtype == float and array.flags.c_contiguous
             if not fits:
@@ -86,8 +67,8 @@ class Routine:
 
     def check(self, c: np.ndarray) -> None:
         """Raise what a function that it has called has raised."""
-        for each in self.opaque:
-            each.check(c)
+        for call in self.opaque:
+            call.check(c)
 
 
 Runnable = Callable[..., None]
@@ -101,10 +82,8 @@ def plain_functions(lowered: Lowered) -> tuple[Runnable, ...]:
 
 
 def lowered_code(lowered: Lowered) -> tuple[Runnable, ...]:
-    """Return the functions of a program as machine code, from the cache if it is there.
-
-    With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
-    """
+    """Return the functions of a program as machine code, from the cache if it is there."""
+    # With NUMBA_DISABLE_JIT=1 the same plan is carried out in plain Python.
     if is_jit_disabled():
         return plain_functions(lowered)
     native = native_calls(lowered.calls, lowered.lanes)
@@ -141,6 +120,6 @@ def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
 
 def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
     """Return the names of opaque functions that these call back in Python."""
-    found = [each for f in functions if isinstance(f, Routine) for each in f.opaque]
-    names = [each.call.name for each in found if each.call.name in each.native.called_back]
+    calls = [call for f in functions if isinstance(f, Routine) for call in f.opaque]
+    names = [call.call.name for call in calls if call.call.name in call.native.called_back]
     return tuple(dict.fromkeys(names))

@@ -3,7 +3,7 @@
 An entry is one file: a mark, the SHA-256 of key and content, the content.  It is written in one
 step.  One that is damaged, cut short, or another key's is as good as none.
 
-The digest tells damage and not intent, so the files must be this user's alone: entries are machine
+The digest shows damage and not intent, so the files must be this user's alone: entries are machine
 code.  The file that was opened is asked who owns it and who may write to it, and so is the folder.
 What stands above the folder needs no such question: who can rename it can put another folder in
 its place, but its files belong to somebody else.
@@ -51,8 +51,8 @@ def read(key: str) -> bytes | None:
 def _content(descriptor: int, path: Path) -> bytes:
     """Return what is in an open file, nothing if it is not safe; close it."""
     try:
-        found = os.fstat(descriptor)
-        if not stat.S_ISREG(found.st_mode) or not _is_safe(found, path):
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode) or not _is_safe(status, path):
             return b""
         with open(descriptor, "rb", closefd=False) as file:
             return file.read()
@@ -79,13 +79,13 @@ def _entry(key: str, body: bytes) -> bytes:
     return MARK + hashlib.sha256(key.encode() + b"\0" + body).digest() + body
 
 
-def _is_safe(found: os.stat_result, path: Path) -> bool:
+def _is_safe(status: os.stat_result, path: Path) -> bool:
     """Whether a file or folder is this user's and nobody else may write to it; warn if not."""
     if sys.platform == "win32":  # no such owners and modes; a profile's folders are the user's own
         return True
-    if found.st_uid != os.geteuid():
+    if status.st_uid != os.geteuid():
         why, remedy = "belongs to another user", ""
-    elif found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    elif status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         why, remedy = "can be written to by others", f"run chmod go-w '{path}', or "
     else:
         return True

@@ -1,1 +1,1 @@
-"""Functions of blocks that are called as they stand, since no expressions were found of them."""
+"""Functions of blocks that are called unchanged, since no expressions were found of them."""

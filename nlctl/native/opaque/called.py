@@ -1,4 +1,4 @@
-"""Functions that are called as they stand: what they are given, and what they return.
+"""Functions that are called unchanged: what they are given, and what they return.
 
 In Python they get what python-control gives them.  numba, where it takes them, gets the same
 through a few lines of source: parameters as a record that is read as a dict is, and a tuple for an
@@ -84,11 +84,11 @@ class _AsItStands:
         _, x, u, p, count = self.lengths
         places = np.cumsum((1, x, u, p))
         parts = [given[a:b].copy() for a, b in pairwise(places)]
-        found = [
+        results = [
             np.asarray(f(float(given[0]), parts[0], parts[1], self._params(parts[2]))).reshape(-1)
             for f in self.functions
         ]
-        values = np.concatenate([np.empty(0), *found])
+        values = np.concatenate([np.empty(0), *results])
         if values.size != count:
             raise BlockError(
                 f"block '{self.path}' returns {counted(values.size, 'value')} from its {self.kind} "
@@ -137,11 +137,11 @@ def _source(name: str, stands: _AsItStands, system: System) -> Source:
     is_block = isinstance(system, Block)
     record = stands.record or params_record(stands.path, list(stands.template))
     filler = [] if values or is_block else ["0.0"]
-    made = f"record({', '.join(values or filler)})"
+    of_parameters = f"record({', '.join(values or filler)})"
     lines = [
         f"def {name}(given, y):",
         f"    t, p = given[0], given[{third}:{third + p}]",
-        f"    params = {made if is_block else f'read_by_keys({made})'}",
+        f"    params = {of_parameters if is_block else f'read_by_keys({of_parameters})'}",
     ]
     counts = _counts(stands, count)
     at = 0

@@ -1,4 +1,4 @@
-"""Functions of blocks that are called as they stand: what a program knows of each."""
+"""Functions of blocks that are called unchanged: what a program knows of each."""
 
 from __future__ import annotations
 
@@ -27,30 +27,18 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class Call:
-    """A function that is called for one member at a time.
-
-    Attributes
-    ----------
-    name : str
-    block, kind : str
-        Whose function it is, and which one.
-    lengths : tuple of int
-        Sizes of t, x, u, p and y.
-    reason : str
-        Why it could not be traced.
-    function : callable
-        It in Python: takes t, x, u and p in one array, returns y.
-    source : callable or None
-        Makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it
-        in another way.
-    """
+    """A function that is called for one member at a time."""
 
     name: str
+    # whose function it is, and which one
     block: str
     kind: str
-    lengths: tuple[int, ...]
-    reason: str
+    lengths: tuple[int, ...]  # sizes of t, x, u, p and y
+    reason: str  # why it could not be traced
+    # it in Python: takes t, x, u and p in one array, returns y
     function: Callable[[np.ndarray], np.ndarray]
+    # makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it in
+    # another way
     source: Callable[[], Source] | None
 
     @property

@@ -1,6 +1,6 @@
 """Values that functions read from around them, as they were when a diagram was compiled.
 
-They are constants of machine code, and python-control reads them anew at every call.  So each run
+They are constants of machine code, and python-control reads them again at every call.  So each run
 looks whether they are still what they were.
 """
 
@@ -25,21 +25,11 @@ _OF_PARTIALS = ("func", "args", "keywords")
 
 @dataclass(frozen=True)
 class Captured:
-    """One value.
+    """One value."""
 
-    Attributes
-    ----------
-    holder : cell, dict or object
-        What it is read from: a closure's cell, a module's names, an object.
-    name : str
-        Name in the holder.
-    then : object
-        What it was: a copy, where it can change in place.
-    """
-
-    holder: Any
-    name: str
-    then: Any
+    holder: Any  # what it is read from: a closure's cell, a module's names, an object
+    name: str  # name in the holder
+    then: Any  # what it was: a copy, where it can change in place
 
     @property
     def now(self) -> Any:
@@ -82,10 +72,10 @@ def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
 
 def changed(values: Iterable[Captured]) -> Captured | None:
     """Return the first value that is not what it was."""
-    for each in values:
-        now = each.now
-        if now is not each.then and not same(now, each.then):
-            return each
+    for note in values:
+        now = note.now
+        if now is not note.then and not same(now, note.then):
+            return note
     return None
 
 
@@ -127,7 +117,7 @@ def same(now: Any, then: Any) -> bool:
         alike = alike and (not masks or np.array_equal(masks[0], masks[1]))
         # bit by bit: NaN is itself, 0 is not -0, an object is not its equal
         return alike and np.asarray(now).tobytes() == np.asarray(then).tobytes()
-    if isinstance(now, MethodType):  # made anew each time it is read
+    if isinstance(now, MethodType):  # a new one each time it is read
         return now.__func__ is then.__func__ and now.__self__ is then.__self__
     if now is then:
         return True

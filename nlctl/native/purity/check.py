@@ -46,18 +46,12 @@ _BUDGET = 400  # bodies that are walked for one function, before it is too much 
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionReading:
-    """What was found in a function and in all that it calls.
+    """What was found in a function and in all that it calls."""
 
-    Attributes
-    ----------
-    captured : tuple of Captured
-        What it reads from around it: constants, as long as they stay what they are.
-    unbound : tuple of str
-        Names that it reads and that have no value on one of the ways there: Python raises an
-        error then, numba takes 0.
-    """
-
+    # what it reads from around it: constants, as long as they stay what they are
     captured: tuple[Captured, ...]
+    # names that it reads and that have no value on one of the ways there: Python raises an error
+    # then, numba takes 0
     unbound: tuple[str, ...]
 
 
@@ -159,16 +153,16 @@ def _bound(
     """Return the names of a call's arguments with their values."""
     places = [a.arg for a in arguments.posonlyargs + arguments.args]
     names = [*places, *(a.arg for a in arguments.kwonlyargs)]
-    found = dict.fromkeys(names, OUTSIDE)
+    bound = dict.fromkeys(names, OUTSIDE)
     if parent is None:  # a function's own defaults are objects that outlive the call
         defaults = function.__defaults__ or ()
         ends = places[len(places) - len(defaults) :]
-        found |= {k: captured(v) for k, v in zip(ends, defaults, strict=True)}
-        found |= {k: captured(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    found |= dict(zip(places, given, strict=False))
-    found |= {k: v for k, v in named.items() if k in names}
+        bound |= {k: captured(v) for k, v in zip(ends, defaults, strict=True)}
+        bound |= {k: captured(v) for k, v in (function.__kwdefaults__ or {}).items()}
+    bound |= dict(zip(places, given, strict=False))
+    bound |= {k: v for k, v in named.items() if k in names}
     if arguments.vararg:
-        found[arguments.vararg.arg] = holder(given[len(places) :])
+        bound[arguments.vararg.arg] = holder(given[len(places) :])
     if arguments.kwarg:
-        found[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
-    return found
+        bound[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
+    return bound

@@ -1,4 +1,4 @@
-"""Other people's functions, as they stand: dict parameters and unpacked arguments.
+"""Other people's functions, unchanged: dict parameters and unpacked arguments.
 
 A function of python-control takes ``params``, a dict, and ``x`` and ``u``, arrays of a size that
 is only known when it runs.  In machine code the parameters become a type of their own, made of a
@@ -76,12 +76,9 @@ _KNOWN: weakref.WeakSet[FunctionType] = weakref.WeakSet()  # a function may call
 
 
 def make_callable(function: FunctionType) -> None:
-    """Let machine code call the plain functions that a function refers to, and theirs.
-
-    numba knows them from then on; the functions themselves stay as they are.
-    """
-    closure = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
-    used = [cell.cell_contents for cell in closure.values()]
+    """Let machine code call the plain functions that a function refers to, and theirs."""
+    # numba knows them from then on; the functions themselves stay as they are.
+    used = [cell.cell_contents for cell in function.__closure__ or ()]
     used += [function.__globals__.get(name) for name in function.__code__.co_names]
     for other in used:
         library = getattr(other, "__module__", None) or ""
@@ -112,7 +109,7 @@ class Params(types.Type):
 
     @property
     def key(self) -> Any:
-        """What tells it from other types: names may be alike."""
+        """What distinguishes it from other types: names may be alike."""
         return self.values
 
     def field(self, key: object) -> int | None:
@@ -133,10 +130,10 @@ def read_by_keys(typing_context, values):
     """Return a named tuple as a parameter dict."""
 
     def generate(context, builder, sig, args):
-        made = context.make_helper(builder, sig.return_type)
-        made.values = args[0]
+        params = context.make_helper(builder, sig.return_type)
+        params.values = args[0]
         context.nrt.incref(builder, sig.args[0], args[0])
-        return made._getvalue()
+        return params._getvalue()
 
     return Params(values)(values), generate
 
@@ -163,8 +160,8 @@ def _getitem(params, key):
 def _contains(params, key):
     if not (isinstance(params, Params) and isinstance(key, types.StringLiteral)):
         return None
-    found = params.field(key) is not None
-    return lambda params, key: found
+    is_there = params.field(key) is not None
+    return lambda params, key: is_there
 
 
 @overload_method(Params, "get", prefer_literal=True)

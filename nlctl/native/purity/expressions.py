@@ -15,7 +15,7 @@ import numpy as np
 
 from . import known_calls, made
 from .known_calls import MEMORY
-from .source import source_file
+from .source import cells_of, source_file
 from .values import (
     FRESH,
     OUTSIDE,
@@ -92,7 +92,7 @@ class Expressions(ast.NodeVisitor):
                 return frame.names[name]
             frame = frame.parent
         function = self.frame.function
-        cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+        cells = cells_of(function)
         try:
             if name in cells:
                 return self.walk.captured(cells[name], name, cells[name].cell_contents)
@@ -152,15 +152,15 @@ class Expressions(ast.NodeVisitor):
     ) -> None:
         """Note what is written into an object that the call has made."""
         if isinstance(target, ast.Subscript):
-            found = made.operator_of(self.walk, base, "__setitem__")
-            if found is None:
+            setter = made.operator_of(self.walk, base, "__setitem__")
+            if setter is None:
                 raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
-            self.walk.function(found, [base, OUTSIDE, value], {})
+            self.walk.function(setter, [base, OUTSIDE, value], {})
             return
-        found = inspect.getattr_static(base.known.cls, target.attr, None)
-        if isinstance(found, property):
-            if found.fset is not None:
-                self.walk.call(captured(found.fset), [base, value], {})
+        setter = inspect.getattr_static(base.known.cls, target.attr, None)
+        if isinstance(setter, property):
+            if setter.fset is not None:
+                self.walk.call(captured(setter.fset), [base, value], {})
             return
         base.known.learn(target.attr, value)
         self.kept(base, [value])
@@ -192,22 +192,22 @@ class Expressions(ast.NodeVisitor):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> KnownValue:
         value = self.visit(node.operand)
-        found = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
-        if found is not None:
-            return self.walk.function(found, [value], {})
+        operator = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
+        if operator is not None:
+            return self.walk.function(operator, [value], {})
         self.operands([value])
         return FRESH
 
     def operated(self, kind: type, left: KnownValue, right: KnownValue) -> KnownValue:
         """Return what is known of the result of an operator, which an object's class may have."""
         name, results, plain = OPERATORS.get(kind, ""), [], []
-        turned = _TURNED.get(name, f"r{name}")
-        for one, other, own in ((left, right, name), (right, left, turned)):
-            found = made.operator_of(self.walk, one, f"__{own}__") if name else None
-            if found is None:
+        mirrored = _TURNED.get(name, f"r{name}")
+        for one, other, special in ((left, right, name), (right, left, mirrored)):
+            operator = made.operator_of(self.walk, one, f"__{special}__") if name else None
+            if operator is None:
                 plain.append(one)
             else:
-                results.append(self.walk.function(found, [one, other], {}))
+                results.append(self.walk.function(operator, [one, other], {}))
         if results:
             return least_upper_bound(results)
         self.operands(plain)
@@ -279,9 +279,9 @@ class Expressions(ast.NodeVisitor):
             return base if slices else element(base)
         if isinstance(base.known, OneOf):
             return element(base) if _are_containers(base.known) else base
-        found = made.operator_of(self.walk, base, "__getitem__")
-        if found is not None:
-            return self.walk.function(found, [base, *values[:1]], {})
+        getter = made.operator_of(self.walk, base, "__getitem__")
+        if getter is not None:
+            return self.walk.function(getter, [base, *values[:1]], {})
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
             return replace(element(base), known=function_choice(map(captured, parts)))
@@ -319,10 +319,10 @@ class Expressions(ast.NodeVisitor):
             return least_upper_bound([self.attribute(choice, name) for choice in thing.choices])
         if isinstance(thing, np.ndarray):
             return forgotten(base)
-        found = inspect.getattr_static(type(thing), name, None)
-        if isinstance(found, property | functools.cached_property) and library(type(thing)) is None:
-            self.walk.captured(type(thing), name, found)
-            getter = found.fget if isinstance(found, property) else found.func
+        entry = inspect.getattr_static(type(thing), name, None)
+        if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
+            self.walk.captured(type(thing), name, entry)
+            getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), [base], {})
             return result if not result.own else FRESH
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
@@ -330,7 +330,7 @@ class Expressions(ast.NodeVisitor):
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
-                return captured(value)  # a method, made anew each time it is read
+                return captured(value)  # a method, a new one each time it is read
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
@@ -368,12 +368,12 @@ class Expressions(ast.NodeVisitor):
 
     def parent_class(self) -> KnownValue:
         """Return what ``super()`` stands for."""
-        own, cls = next(iter(self.frame.names.values()), OUTSIDE), self.lookup("__class__")
-        if isinstance(own.known, Instance) and isinstance(cls.known, type):
-            return KnownValue(True, True, known=Parent(own, cls.known))
-        if isinstance(own.known, Unknown) or not isinstance(cls.known, type):
+        owner, cls = next(iter(self.frame.names.values()), OUTSIDE), self.lookup("__class__")
+        if isinstance(owner.known, Instance) and isinstance(cls.known, type):
+            return KnownValue(True, True, known=Parent(owner, cls.known))
+        if isinstance(owner.known, Unknown) or not isinstance(cls.known, type):
             raise Impure("calls super() of what is only known when it runs", "name the class")
-        return captured(super(cls.known, own.known))
+        return captured(super(cls.known, owner.known))
 
     def visit_ListComp(self, node: ast.ListComp | ast.SetComp | ast.GeneratorExp) -> KnownValue:
         return self.comprehended(node.generators, [node.elt])
@@ -393,9 +393,9 @@ class Expressions(ast.NodeVisitor):
             self.bind(loop.target, element(over))
             for condition in loop.ifs:
                 self.condition(condition)
-        made = holder([self.visit(part) for part in parts])
+        held = holder([self.visit(part) for part in parts])
         self.frame.names = before
-        return made
+        return held
 
     def iterated(self, value: KnownValue) -> None:
         if not isinstance(value.known, ListOf):  # whatever is in it is only handed on
@@ -423,12 +423,12 @@ def _is_plain_attribute(thing: object, name: str) -> bool:
     if library(type(thing)) is not None or isinstance(thing, type | super):
         return True
     missing = object()
-    found = inspect.getattr_static(thing, name, missing)
-    if found is missing:
+    member = inspect.getattr_static(thing, name, missing)
+    if member is missing:
         return not any(hasattr(type(thing), special) for special in ("__getattr__",))
     simple = (FunctionType, staticmethod, classmethod)
     return (
-        isinstance(found, simple)
-        or not hasattr(type(found), "__get__")
-        or (type(found).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
+        isinstance(member, simple)
+        or not hasattr(type(member), "__get__")
+        or (type(member).__name__ in ("member_descriptor", "_tuplegetter", "getset_descriptor"))
     )

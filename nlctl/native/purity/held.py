@@ -18,14 +18,10 @@ import numpy as np
 
 from .outside import outside_of
 
-__all__ = ["NAMED", "OPAQUE", "held_by", "inherited"]
-
-OPAQUE = "\2"
-"""Begins a text that names what nobody can see into."""
-NAMED = "\3"
-"""Begins a text that tells all of an object."""
+OPAQUE = "\2"  # begins a text that names what nobody can see into
+NAMED = "\3"  # begins a text that says all of an object
+# where pandas keeps content: how it is laid out in memory may change
 LAID_OUT = ("_mgr", "_item_cache", "_flags", "_cache")
-"""Where pandas keeps content: how it is laid out in memory may change."""
 _TOLD_BY_TEXT = {"numba", "llvmlite", "pydantic", "pydantic_core", "annotated_types"} | {
     *("typing", "typing_extensions", "matplotlib", "jinja2", "rich", "abc", "inspect", "ast"),
     "enum",  # machinery: what it is made of computes nothing, or is gone through
@@ -43,7 +39,7 @@ def held_by(thing: object, is_library: Callable[[str], bool]) -> Any:
     top = (getattr(kind, "__module__", None) or "").partition(".")[0]  # arrays of ctypes have none
     if isinstance(thing, _TOLD) or (top == "_thread" and kind.__name__ in _LOCKS):
         return None
-    if isinstance(thing, contextvars.ContextVar):  # NumPy's says how errors are told
+    if isinstance(thing, contextvars.ContextVar):  # NumPy's says how errors are reported
         is_numpys = thing.name.startswith("numpy")
         return None if is_numpys else ("variable", thing.name, *_value_of(thing))
     if isinstance(thing, threading.local):
@@ -69,10 +65,10 @@ def held_by(thing: object, is_library: Callable[[str], bool]) -> Any:
         return ("reference", thing())
     if isinstance(thing, _LIKE_LISTS):
         return (kind.__name__, list(thing))
-    if top == "pandas" and (told := _of_pandas(thing)) is not None:
-        return told
-    if top == "scipy" and (told := _of_scipy(thing)) is not None:
-        return told
+    if top == "pandas" and (content := _of_pandas(thing)) is not None:
+        return content
+    if top == "scipy" and (content := _of_scipy(thing)) is not None:
+        return content
     return None if top in _TOLD_BY_TEXT else reduced(thing)
 
 
@@ -88,8 +84,8 @@ def _of_scipy(thing: Any) -> Any:
     kind = type(thing)
     room = kind.__module__.split(".")[1]
     if room == "sparse" and hasattr(thing, "tocoo"):
-        found = thing.tocoo()
-        return ("sparse", kind.__name__, found.shape, *found.coords, found.data)
+        coordinates = thing.tocoo()
+        return ("sparse", kind.__name__, coordinates.shape, *coordinates.coords, coordinates.data)
     if room == "stats" and hasattr(thing, "dist"):
         return ("law", type(thing.dist), thing.dist.name, thing.args, thing.kwds)
     if room == "interpolate" and hasattr(thing, "_eval_args"):
@@ -112,15 +108,15 @@ def reduced(thing: object) -> Any:
     name = f"{getattr(type(thing), '__module__', None) or 'ctypes'}.{type(thing).__qualname__}"
     try:
         taken_apart = copyreg.dispatch_table.get(type(thing))  # of texts to look for, and others
-        made = taken_apart(thing) if taken_apart else thing.__reduce_ex__(4)
+        pieces = taken_apart(thing) if taken_apart else thing.__reduce_ex__(4)
     except Exception:  # whatever an object raises that is not to be taken apart
         return f"{OPAQUE}an object of {name}"
-    if isinstance(made, str):
-        return f"{NAMED}{getattr(thing, '__module__', '')}.{made}"
-    parts = list(made[:3])
+    if isinstance(pieces, str):
+        return f"{NAMED}{getattr(thing, '__module__', '')}.{pieces}"
+    parts = list(pieces[:3])
     if len(parts) > 2 and isinstance(parts[2], dict):  # of laws, which draw from it
         parts[2] = {k: v for k, v in parts[2].items() if k != "_random_state"}
-    parts += [list(part) for part in made[3:5] if part is not None]
+    parts += [list(part) for part in pieces[3:5] if part is not None]
     return ("object", name, *parts)
 
 
@@ -144,13 +140,13 @@ def _of_ufunc(thing: np.ufunc) -> Any:
 
 
 def _of_bound(thing: Any, is_library: Callable[[str], bool]) -> Any:
-    """Return what a function of C is bound to; one of a module is told by its name."""
+    """Return what a function of C is bound to; one of a module is known by its name."""
     held = getattr(thing, "__self__", None)
     if held is not None and not isinstance(held, types.ModuleType | type):
         return ("bound", thing.__name__, held)
     top = str(getattr(thing, "__module__", None) or "builtins").partition(".")[0]
-    if told := outside_of(top, thing.__name__):
-        return f"{OPAQUE}{told} when it is called ('{thing.__name__}')"
+    if asked := outside_of(top, thing.__name__):
+        return f"{OPAQUE}{asked} when it is called ('{thing.__name__}')"
     if is_library(top) or top == "builtins":
         return None
     return f"{OPAQUE}a compiled function of '{top}' ('{thing.__name__}')"

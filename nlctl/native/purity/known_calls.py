@@ -133,7 +133,7 @@ def _of_python(
     if thing is dataclasses.replace and given:
         return made.replaced_fields(walk, given[0], named)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
-    return OUTSIDE if any(thing is each for each in reading) else None
+    return OUTSIDE if any(thing is reader for reader in reading) else None
 
 
 def _made(
@@ -191,8 +191,8 @@ def method(
             _written(base, f"{name}()")
         return None
     if type(thing).__module__ not in ("builtins", "numpy", Unknown.__module__):
-        found = getattr(type(thing), name, None)  # a class of somebody, or a named tuple's field
-        if isinstance(found, FunctionType) or not callable(found):
+        member = getattr(type(thing), name, None)  # a class of somebody, or a named tuple's field
+        if isinstance(member, FunctionType) or not callable(member):
             return None
     if name == "at" and isinstance(thing, np.ufunc):
         _written(given[0], "an array with .at()")
@@ -314,11 +314,11 @@ def _check_parts(value: KnownValue, name: str) -> None:
 
 
 def _functions_in(given: list[KnownValue]) -> Any:
-    """Return the choice between the functions in what is gone through, for whoever calls one."""
+    """Return the choice between the functions in what is gone through, for what calls one."""
     parts = [element(v) for v in given]
     kinds = OneOf | Instance | Bound | Local | FunctionType
-    found = [v for v in parts if isinstance(v.known, kinds)]
-    return ListOf(tuple(found)) if found else UNKNOWN_VALUE
+    functions = [v for v in parts if isinstance(v.known, kinds)]
+    return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 
 
 def _library(

@@ -35,11 +35,11 @@ def instance(
 ) -> KnownValue:
     """Return what is known of a new object of somebody's class."""
     _check_plain(cls)
-    own = Instance(cls)
-    value = KnownValue(True, True, True, known=own)
+    new = Instance(cls)
+    value = KnownValue(True, True, True, known=new)
     start = inspect.getattr_static(cls, "__init__", None)
     if dataclasses.is_dataclass(cls) and _is_generated(start):
-        _of_fields(walk, own, given, dict(named))
+        _of_fields(walk, new, given, dict(named))
         after = inspect.getattr_static(cls, "__post_init__", None)
         if isinstance(after, FunctionType):
             walk.function(after, [value], {})
@@ -48,7 +48,7 @@ def instance(
         walk.function(start, [value, *given], named)
     elif given or named:
         raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
-    return KnownValue(True, all(v.own and v.inside for v in own.attributes.values()), True, own)
+    return KnownValue(True, all(v.own and v.inside for v in new.attributes.values()), True, new)
 
 
 def _check_plain(cls: type) -> None:
@@ -59,8 +59,8 @@ def _check_plain(cls: type) -> None:
         ruling = [name for name in ruling if name not in ("__setattr__", "__delattr__")]
     foreign = [c for c in cls.__mro__ if c not in _NEUTRAL and library(c) is not None]
     plain = type(cls) in (type, abc.ABCMeta, type(Protocol)) and not issubclass(cls, enum.Enum)
-    made = inspect.getattr_static(cls, "__new__", None)
-    if ruling or foreign or not plain or made is not object.__dict__["__new__"]:
+    constructor = inspect.getattr_static(cls, "__new__", None)
+    if ruling or foreign or not plain or constructor is not object.__dict__["__new__"]:
         raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
 
 
@@ -69,36 +69,36 @@ def _is_generated(start: Any) -> bool:
 
 
 def _of_fields(
-    walk: Walk, own: Instance, given: list[KnownValue], named: dict[str, KnownValue]
+    walk: Walk, new: Instance, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> None:
     """Note the attributes that a dataclass's generated ``__init__`` writes."""
     waiting = list(given)
-    for each in dataclasses.fields(own.cls):  # type: ignore[arg-type]
-        if not each.init:
+    for field in dataclasses.fields(new.cls):  # type: ignore[arg-type]
+        if not field.init:
             value = OUTSIDE
-        elif waiting and not each.kw_only:
+        elif waiting and not field.kw_only:
             value = waiting.pop(0)
-        elif each.name in named:
-            value = named.pop(each.name)
-        elif each.default is not dataclasses.MISSING:
-            value = captured(each.default)
-        elif each.default_factory is not dataclasses.MISSING:
-            value = walk.call(captured(each.default_factory), [], {})
+        elif field.name in named:
+            value = named.pop(field.name)
+        elif field.default is not dataclasses.MISSING:
+            value = captured(field.default)
+        elif field.default_factory is not dataclasses.MISSING:
+            value = walk.call(captured(field.default_factory), [], {})
         else:  # among *args or **kwargs, or an error where it runs
             value = named.get("**", OUTSIDE)
-        own.learn(each.name, value)
+        new.learn(field.name, value)
 
 
 def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     """Return what is known of an attribute of an object that the call has made."""
-    own: Instance = base.known
-    if name in own.attributes:
-        return own.attributes[name]
-    found = inspect.getattr_static(own.cls, name, None)
-    if found is None:
+    new: Instance = base.known
+    if name in new.attributes:
+        return new.attributes[name]
+    member = inspect.getattr_static(new.cls, name, None)
+    if member is None:
         return OUTSIDE  # it raises where it runs
-    walk.captured(own.cls, name, getattr(own.cls, name))
-    return of_class(walk, base, found)
+    walk.captured(new.cls, name, getattr(new.cls, name))
+    return of_class(walk, base, member)
 
 
 def replaced_fields(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
@@ -109,10 +109,10 @@ def replaced_fields(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) 
     if isinstance(thing, Unknown) or not dataclasses.is_dataclass(cls):
         raise Impure("replaces fields of what is only known when it runs", "name the class")
     before = {
-        each.name: attribute(walk, base, each.name)
+        field.name: attribute(walk, base, field.name)
         if known
-        else captured(getattr(thing, each.name))
-        for each in dataclasses.fields(cls)
+        else captured(getattr(thing, field.name))
+        for field in dataclasses.fields(cls)
     }
     return instance(walk, cls, [], before | named)
 
@@ -129,20 +129,20 @@ def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
     return OUTSIDE
 
 
-def of_class(walk: Walk, base: KnownValue, found: Any) -> KnownValue:
+def of_class(walk: Walk, base: KnownValue, member: Any) -> KnownValue:
     """Return what is known of what an object finds in its class."""
-    if isinstance(found, property):
-        return walk.call(captured(found.fget), [base], {})
-    if hasattr(found, "func") and hasattr(found, "attrname"):  # a cached property
-        return walk.call(captured(found.func), [base], {})
-    if isinstance(found, staticmethod):
-        return captured(found.__func__)
-    if isinstance(found, classmethod):
+    if isinstance(member, property):
+        return walk.call(captured(member.fget), [base], {})
+    if hasattr(member, "func") and hasattr(member, "attrname"):  # a cached property
+        return walk.call(captured(member.func), [base], {})
+    if isinstance(member, staticmethod):
+        return captured(member.__func__)
+    if isinstance(member, classmethod):
         cls = captured(base.known.cls)
-        return KnownValue(True, True, known=Bound(captured(found.__func__), (cls,)))
-    if isinstance(found, FunctionType):
-        return KnownValue(True, True, known=Bound(captured(found), (base,)))
-    return captured(found)
+        return KnownValue(True, True, known=Bound(captured(member.__func__), (cls,)))
+    if isinstance(member, FunctionType):
+        return KnownValue(True, True, known=Bound(captured(member), (base,)))
+    return captured(member)
 
 
 def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None:
@@ -152,8 +152,8 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
     plain = isinstance(thing, Unknown | type) or library(cls) is not None
     if plain and not isinstance(thing, Instance):
         return None
-    found = inspect.getattr_static(cls, name, None)
-    if not isinstance(found, FunctionType) or _is_generated(found):
+    function = inspect.getattr_static(cls, name, None)
+    if not isinstance(function, FunctionType) or _is_generated(function):
         return None
-    walk.captured(cls, name, found)
-    return found
+    walk.captured(cls, name, function)
+    return function

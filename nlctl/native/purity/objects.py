@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...upstream.numba_internals import CPUDispatcher
-from .source import Definition, Unreadable, definition
+from .source import Definition, Unreadable, cells_of, definition
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (
@@ -28,11 +28,9 @@ UNDERSTOOD = (
 
 
 def frozen(function: Any) -> Any:
-    """Return a function with constants in the place of the objects that it reads.
-
-    Methods, `functools.partial` and objects that can be called become functions as well.  What
-    cannot be replaced stays as it is, and numba will say so.
-    """
+    """Return a function with constants instead of the objects that it reads."""
+    # Methods, `functools.partial` and objects that can be called become functions as well. What
+    # cannot be replaced stays as it is, and numba will say so.
     if isinstance(function, functools.partial):
         inner = frozen(function.func)
         plain = isinstance(inner, FunctionType | CPUDispatcher)
@@ -49,7 +47,7 @@ def frozen(function: Any) -> Any:
         node = definition(function)
     except Unreadable:
         return function
-    old_cells = list(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    old_cells = cells_of(function).items()
     new_cells = [_cell(name, cell, node) for name, cell in old_cells]
     new_globals = {
         name: record
@@ -64,12 +62,12 @@ def frozen(function: Any) -> Any:
 
 
 def _with(function: FunctionType, names: dict[str, Any], cells: list[CellType]) -> FunctionType:
-    made = FunctionType(
+    copied = FunctionType(
         function.__code__, names, function.__name__, function.__defaults__, tuple(cells)
     )
-    made.__kwdefaults__ = function.__kwdefaults__
-    made.__module__, made.__qualname__ = function.__module__, function.__qualname__
-    return made
+    copied.__kwdefaults__ = function.__kwdefaults__
+    copied.__module__, copied.__qualname__ = function.__module__, function.__qualname__
+    return copied
 
 
 def _cell(name: str, cell: CellType, node: Definition) -> CellType:
@@ -154,27 +152,25 @@ def _is_constant(value: object) -> bool:
 
 
 def without_imports(function: FunctionType) -> FunctionType:
-    """Return a function whose imports have become globals of its own.
-
-    One whose source cannot be read stays as it is.
-    """
+    """Return a function whose imports have become globals of its own."""
+    # One whose source cannot be read stays as it is.
     try:
-        found = definition(function)
+        tree = definition(function)
     except Unreadable:
         return function
-    if not any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(found)):
+    if not any(isinstance(node, ast.Import | ast.ImportFrom) for node in ast.walk(tree)):
         return function
     hoisted = _Hoist()
-    body = hoisted.visit(copy.deepcopy(found))
+    body = hoisted.visit(copy.deepcopy(tree))
     if not isinstance(body, ast.FunctionDef):
         return function
     body.decorator_list = []
     names = dict(function.__globals__)
     exec(compile(ast.Module(hoisted.found, []), "imports", "exec"), names)
-    made = _moved(body, function)
+    code = _moved(body, function)
     result = FunctionType(
-        made, names, function.__name__, function.__defaults__,
-        tuple(_cells_of(function)[name] for name in made.co_freevars),
+        code, names, function.__name__, function.__defaults__,
+        tuple(cells_of(function)[name] for name in code.co_freevars),
     )  # fmt: skip
     result.__module__, result.__qualname__ = function.__module__, function.__qualname__
     return result
@@ -192,10 +188,6 @@ class _Hoist(ast.NodeTransformer):
 
     visit_Import = _take
     visit_ImportFrom = _take
-
-
-def _cells_of(function: FunctionType) -> dict[str, Any]:
-    return dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
 
 
 def _moved(node: ast.FunctionDef, function: FunctionType) -> CodeType:

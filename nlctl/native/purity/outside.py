@@ -1,6 +1,6 @@
 """What a function asks of the world outside when it is called: files, clocks, chance, its frame.
 
-No key of the function changes with the answer, so that whoever keeps results by a key names it.
+No key of the function changes with the answer, so that what keeps results by a key names it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
-__all__ = ["asked_outside", "imports_in", "outside_of"]
+from .source import cells_of, codes_in
 
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named
@@ -37,13 +37,13 @@ _FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__bui
 def asked_outside(function: types.FunctionType) -> Iterator[str]:
     """Yield what a function asks, with the words that ask, ``time.time``."""
     cells, names = _cells(function), function.__globals__
-    for code in _codes(function.__code__):
+    for code in codes_in(function.__code__):
         for word, follower in _pairs(code):
             thing = cells[word] if word in cells else names.get(word)
             if not isinstance(thing, types.ModuleType):
                 continue
-            if told := outside_of(thing.__name__, follower):
-                yield f"{told} when it is called ('{word}.{follower}'"
+            if answer := outside_of(thing.__name__, follower):
+                yield f"{answer} when it is called ('{word}.{follower}'"
         for name in sorted(_FRAMES.intersection(code.co_names)):
             yield f"what '{name}' finds ('{name}'"
 
@@ -51,30 +51,28 @@ def asked_outside(function: types.FunctionType) -> Iterator[str]:
 def outside_of(module: str, name: str) -> str:
     """Return what a function of a module asks of the world; nothing if it asks nothing."""
     for place in (module, f"{module}.{name}", module.partition(".")[0]):
-        told, names = _MODULES.get(place, ("", _EVERYTHING))
-        if told and (not names or name in names):
-            return told
+        answer, names = _MODULES.get(place, ("", _EVERYTHING))
+        if answer and (not names or name in names):
+            return answer
     return ""
 
 
 def imports_in(function: types.FunctionType, is_library: Callable[[str], bool]) -> list[str]:
-    """Return the modules that a function imports when it is called, other than libraries.
-
-    Whether one is imported already, and under which name, changes while a loop is used.
-    """
-    found = {
+    """Return the modules that a function imports when it is called, other than libraries."""
+    # Whether one is imported already, and under which name, changes while a loop is used.
+    modules = {
         word
-        for code in _codes(function.__code__)
+        for code in codes_in(function.__code__)
         for what, word in _words(code)
         if what == "IMPORT_NAME" and not is_library(word)
     }
-    return sorted(found)
+    return sorted(modules)
 
 
 @functools.lru_cache(maxsize=4096)  # code never changes
 def _words(code: types.CodeType) -> tuple[tuple[str, Any], ...]:
     """Return the instructions of a code object, each with what it is about."""
-    return tuple((each.opname, each.argval) for each in dis.get_instructions(code))
+    return tuple((step.opname, step.argval) for step in dis.get_instructions(code))
 
 
 @functools.lru_cache(maxsize=4096)
@@ -85,19 +83,12 @@ def _pairs(code: types.CodeType) -> tuple[tuple[str, str], ...]:
     return tuple((a, b) for a, b in near if isinstance(b, str))
 
 
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
-    yield code
-    for part in code.co_consts:
-        if isinstance(part, types.CodeType):
-            yield from _codes(part)
-
-
 def _cells(function: types.FunctionType) -> dict[str, Any]:
     """Return what a function closes over, by name."""
-    found = {}
-    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+    contents = {}
+    for name, cell in cells_of(function).items():
         try:
-            found[name] = cell.cell_contents
+            contents[name] = cell.cell_contents
         except ValueError:  # not yet filled
             continue
-    return found
+    return contents

@@ -14,7 +14,7 @@ import functools
 import linecache
 import warnings
 from collections.abc import Iterator
-from types import CodeType, FunctionType
+from types import CellType, CodeType, FunctionType
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
@@ -26,18 +26,25 @@ _FUTURES = functools.reduce(
 )
 
 
-class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
-    """The source of a function cannot be had.
+def codes_in(code: CodeType) -> Iterator[CodeType]:
+    """Yield a code object, and those nested in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from codes_in(constant)
 
-    Attributes
-    ----------
-    advice : str
-        What to do, beside the message, which says why.
-    """
+
+def cells_of(function: FunctionType) -> dict[str, CellType]:
+    """Return the cells of what a function closes over, by name."""
+    return dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+
+
+class Unreadable(Exception):  # noqa: N818 (it says what is the matter with a source)
+    """The source of a function cannot be had."""
 
     def __init__(self, reason: str, advice: str) -> None:
         super().__init__(reason)
-        self.advice = advice
+        self.advice = advice  # what to do; the message says why
 
 
 def definition(function: FunctionType) -> Definition:
@@ -54,11 +61,11 @@ def definition(function: FunctionType) -> Definition:
     if code not in codes and code not in _by_cells(*module, code.co_firstlineno):
         advice = "import its module again: was the file edited since?"
         raise Unreadable("its source is not what it was made of", advice)
-    found = [node for node in _candidates(places, code) if _contains(node, code)]
-    if not found or len({ast.dump(node) for node in found}) > 1:
+    nodes = [node for node in _candidates(places, code) if _contains(node, code)]
+    if not nodes or len({ast.dump(node) for node in nodes}) > 1:
         advice = "give each function a line of its own"
-        raise Unreadable("its source cannot be told from others on the same line", advice)
-    return found[0]
+        raise Unreadable("its source cannot be distinguished from others on the same line", advice)
+    return nodes[0]
 
 
 def source_file(function: FunctionType) -> str:
@@ -67,10 +74,8 @@ def source_file(function: FunctionType) -> str:
 
 
 def _file_and_text(function: FunctionType) -> tuple[str, str]:
-    """Return where a function stands, and what stands there: "" where nothing is found.
-
-    Functions that cloudpickle has made again do not know their file; their globals do.
-    """
+    """Return where a function stands, and what stands there: "" where nothing is found."""
+    # Functions that cloudpickle has made again do not know their file; their globals do.
     named = function.__code__.co_filename
     for file in (named, str(function.__globals__.get("__file__", named))):
         linecache.checkcache(file)
@@ -90,28 +95,26 @@ def _compiled(text: str, file: str, flags: int) -> tuple[Places, frozenset[CodeT
     for node in ast.walk(tree):
         if isinstance(node, Definition):
             places.setdefault((_name(node), _first_line(node)), []).append(node)
-    return places, frozenset(_inside(module))
+    return places, frozenset(codes_in(module))
 
 
 @functools.lru_cache(maxsize=128)
 def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType]:
-    """Return all code of the statements on a line, however the text was divided into cells.
-
-    The code of a statement depends on its neighbours in one thing: attributes of names that the
-    same cell imports are read by another instruction.  So it is compiled with each run of imports
-    that could stand in its cell.
-    """
+    """Return all code of the statements on a line, however the text was divided into cells."""
+    # The code of a statement depends on its neighbours in one thing: attributes of names that the
+    # same cell imports are read by another instruction. So it is compiled with each run of imports
+    # that could stand in its cell.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         body = ast.parse(text, file).body
-        found: set[CodeType] = set()
+        codes: set[CodeType] = set()
         for place, statement in enumerate(body):
             if _first_line(statement) <= line <= (statement.end_lineno or line):
                 for neighbours in _runs(body[:place], body[place + 1 :]):
                     cell = ast.Module([*neighbours, statement], type_ignores=[])
-                    made = compile(cell, file, "exec", flags=flags, dont_inherit=True)
-                    found |= set(_inside(made))
-    return frozenset(found)
+                    code = compile(cell, file, "exec", flags=flags, dont_inherit=True)
+                    codes |= set(codes_in(code))
+    return frozenset(codes)
 
 
 def _runs(before: list[ast.stmt], after: list[ast.stmt]) -> Iterator[list[ast.stmt]]:
@@ -133,16 +136,9 @@ def _first_line(node: ast.stmt | ast.expr) -> int:
     return min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", []))])
 
 
-def _inside(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _inside(constant)
-
-
 def _candidates(places: Places, code: CodeType) -> Iterator[Definition]:
     """Yield the functions that begin on this line, with this name and these functions inside."""
-    inside = sorted(c.co_name for c in list(_inside(code))[1:] if c.co_name not in _LOOPS)
+    inside = sorted(c.co_name for c in list(codes_in(code))[1:] if c.co_name not in _LOOPS)
     arguments = code.co_varnames[: code.co_argcount]
     for node in places.get((code.co_name, code.co_firstlineno), ()):
         if tuple(a.arg for a in node.args.posonlyargs + node.args.args) == arguments:

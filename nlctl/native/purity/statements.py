@@ -78,8 +78,8 @@ class CallWalker(Expressions):
         for target in node.targets:
             pairs = _pairs(target, parts)
             values = [self.visit(part) for _, part in pairs]  # a, b = c, d
-            for (part, _), each in zip(pairs, values, strict=True):
-                self.bind(part, each)
+            for (part, _), part_value in zip(pairs, values, strict=True):
+                self.bind(part, part_value)
             if not pairs:
                 self.bind(target, value)
 
@@ -114,9 +114,9 @@ class CallWalker(Expressions):
     ) -> KnownValue:
         """Return what an object becomes by ``+=`` and its kind."""
         name = OPERATORS.get(type(node.op), "")
-        found = made.operator_of(self.walk, value, f"__i{name}__")
-        if found is not None:
-            return self.walk.function(found, [value, added], {})
+        operator = made.operator_of(self.walk, value, f"__i{name}__")
+        if operator is not None:
+            return self.walk.function(operator, [value, added], {})
         return self.operated(type(node.op), value, added)
 
     def visit_Delete(self, node: ast.Delete) -> None:
@@ -188,7 +188,7 @@ class CallWalker(Expressions):
             self.visit(node.exc)
 
     def visit_Try(self, node: ast.Try) -> None:
-        """Walk a look-up that may fail; other errors may be those of whoever reads the function."""
+        """Walk a look-up that may fail; other errors may be those of what reads the function."""
         caught = [handler.type for handler in node.handlers]
         if node.finalbody or not all(
             isinstance(c, ast.Name) and c.id == "KeyError" for c in caught
@@ -205,8 +205,8 @@ class CallWalker(Expressions):
     def visit_With(self, node: ast.With) -> None:
         for item in node.items:
             call = item.context_expr
-            made = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            if made is not np.errstate or item.optional_vars is not None:
+            entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
+            if entered is not np.errstate or item.optional_vars is not None:
                 raise Impure("has a with statement", "do without it")
         self.statements(node.body)
 

@@ -26,18 +26,12 @@ _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator"
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
-    """A function is not one of its arguments alone.
-
-    Attributes
-    ----------
-    reason, advice : str
-        What it does, and what to do instead.
-    place : str
-        File and line.
-    """
+    """A function is not one of its arguments alone."""
 
     def __init__(self, reason: str, advice: str) -> None:
         super().__init__(reason)
+        # file and line
+        # what it does, and what to do instead
         self.reason, self.advice, self.place = reason, advice, ""
 
 
@@ -74,30 +68,18 @@ class Bound:
 
 @dataclass(frozen=True)
 class Pure:
-    """An object of a library that the call has made, such as a spline.
+    """An object of a library that the call has made, such as a spline."""
 
-    Attributes
-    ----------
-    gives_parts : bool
-        Whether what it is called with may come back, as from `operator.itemgetter`.
-    """
-
+    # whether what it is called with may come back, as from `operator.itemgetter`
     gives_parts: bool = False
 
 
 class Instance:
-    """An object of somebody's class that the call has made.
-
-    Attributes
-    ----------
-    cls : type
-    attributes : dict
-        What is known of each, whenever it was written.
-    version : int
-        How often something new was learnt.
-    """
+    """An object of somebody's class that the call has made."""
 
     def __init__(self, cls: type) -> None:
+        # how often something new was learnt
+        # what is known of each, whenever it was written
         self.cls, self.attributes, self.version = cls, {}, 0
 
     def learn(self, name: str, value: KnownValue) -> None:
@@ -124,24 +106,13 @@ class Parent:
 
 @dataclass(frozen=True, eq=False)
 class KnownValue:
-    """What is known of a value.
+    """What is known of a value."""
 
-    Attributes
-    ----------
-    own : bool
-        Whether this call has made it (or it can never change): it may be written to.
-    inside : bool
-        Whether the same holds for what it holds.
-    holds : bool
-        Whether it keeps what is put into it (lists, tuples, dicts), instead of copying numbers.
-    known : object
-        The object itself, if it was there before the call.
-    """
-
-    own: bool
-    inside: bool
+    own: bool  # whether this call has made it (or it can never change): it may be written to
+    inside: bool  # whether the same holds for what it holds
+    # whether it keeps what is put into it (lists, tuples, dicts), instead of copying numbers
     holds: bool = False
-    known: Any = UNKNOWN_VALUE
+    known: Any = UNKNOWN_VALUE  # the object itself, if it was there before the call
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, KnownValue) and self.marks == other.marks
@@ -156,7 +127,7 @@ class KnownValue:
 
 
 def _marks(known: Any) -> Any:
-    """Return what tells one object that is known from another."""
+    """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)
     if isinstance(known, Local):

@@ -15,7 +15,76 @@ import numpy as np
 
 from ...expressions.evaluate import value_of
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
-from .shaken import Shaken, unit
+
+_PLACES = 16  # units in the last place by which an operation is nudged; libraries differ by four
+
+
+def unit() -> float:
+    """Return the relative change of a nudge."""
+    return _PLACES * float(np.finfo(float).eps)
+
+
+class Shaken(np.ndarray):
+    """An array of which NumPy's functions make arrays with other last digits."""
+
+    drawn: np.random.Generator | None  # where the directions are from; None for no change
+
+    @classmethod
+    def of(cls, values: Any, drawn: np.random.Generator | None) -> Shaken:
+        """Return values as such an array."""
+        shaken = np.array(values, dtype=float).view(cls)
+        shaken.drawn = drawn
+        return shaken
+
+    def __array_finalize__(self, other: object) -> None:
+        self.drawn = getattr(other, "drawn", None)
+
+    def __getitem__(self, key: Any) -> Any:
+        item = super().__getitem__(key)
+        return item if isinstance(item, np.ndarray) else self._like(item)
+
+    def __iter__(self) -> Any:
+        return (self[i] for i in range(len(self)))
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        out = kwargs.pop("out", None)
+        result = getattr(ufunc, method)(*_plain(inputs), **_plain(kwargs))
+        shaken = self._rounded(result)
+        if out is None:
+            return shaken
+        np.copyto(out[0].view(np.ndarray), np.asarray(shaken))
+        return out[0]
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        return self._rounded(function(*_plain(args), **_plain(kwargs)))
+
+    def _rounded(self, value: object) -> Any:
+        """Return a result with other last digits; anything else as it is."""
+        if isinstance(value, tuple | list):
+            return type(value)(map(self._rounded, value)) if type(value) in (tuple, list) else value
+        if not (isinstance(value, np.ndarray | np.floating) and value.dtype == float):
+            return value
+        if self.drawn is None:
+            return self._like(value)
+        ways = self.drawn.choice((-1.0, 1.0), size=np.shape(value))
+        return self._like(value * (1.0 + unit() * ways))
+
+    def _like(self, values: Any) -> Any:
+        if not (isinstance(values, np.ndarray | np.floating) and values.dtype == float):
+            return values
+        return Shaken.of(values, self.drawn)
+
+
+def _plain(given: Any) -> Any:
+    """Return arguments with plain arrays in them."""
+    if isinstance(given, Shaken):
+        return given.view(np.ndarray)[()] if given.ndim == 0 else given.view(np.ndarray)
+    if type(given) in (tuple, list):
+        return type(given)(map(_plain, given))
+    if type(given) is dict:
+        return {name: _plain(value) for name, value in given.items()}
+    return given
+
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none
 _EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
@@ -36,25 +105,25 @@ def nudged_values(
     reader = _Reader(given, searches, calls)
     if fixed_points:  # a search is as exact as what it compares
         again = [expr for exprs in fixed_points.values() for expr in exprs]
-        made = iter(reader.read(again))
-        ends = {name: [next(made) for _ in exprs] for name, exprs in fixed_points.items()}
+        values = iter(reader.read(again))
+        ends = {name: [next(values) for _ in exprs] for name, exprs in fixed_points.items()}
         reader = _Reader(given, {k: _moved(v, ends.get(k, ())) for k, v in searches.items()}, calls)
     return reader.read(results)
 
 
-def _moved(search: Any, made: Iterable[np.ndarray]) -> Any:
+def _moved(search: Any, values: Iterable[np.ndarray]) -> Any:
     """Return a search whose results are moved as far as their fixed points were."""
-    far = [np.broadcast_to(v, (ROUNDINGS,)) - np.broadcast_to(v, (ROUNDINGS,))[0] for v in made]
+    far = [np.broadcast_to(v, (ROUNDINGS,)) - np.broadcast_to(v, (ROUNDINGS,))[0] for v in values]
 
     def search_with_rounding(given: np.ndarray) -> np.ndarray:
-        found = np.broadcast_to(search(given), (len(far), ROUNDINGS)).copy()
-        return found + np.nan_to_num(np.array(far))
+        results = np.broadcast_to(search(given), (len(far), ROUNDINGS)).copy()
+        return results + np.nan_to_num(np.array(far))
 
     return search_with_rounding
 
 
 class _Reader:
-    """Goes through expressions; a value is rounded anew by each that uses it.
+    """Goes through expressions; a value is rounded again by each that uses it.
 
     Of two that use it one may have been computed in another way, as powers are by products.
     """
@@ -87,28 +156,26 @@ class _Reader:
     def ways(self, size: int | None) -> np.ndarray:
         """Return relative changes."""
         shape = (size, ROUNDINGS) if size else (ROUNDINGS,)
-        found = unit() * self.drawn.choice((-1.0, 1.0), size=shape)
-        found[..., 0] = 0.0
-        return found
+        directions = unit() * self.drawn.choice((-1.0, 1.0), size=shape)
+        directions[..., 0] = 0.0
+        return directions
 
 
 def _columns(
     function: Callable[[np.ndarray], np.ndarray], drawn: np.random.Generator
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return an opaque function of columns: what it computes inside is rounded in other ways.
-
-    Where it does not take arrays that round otherwise, it is called with plain ones.
-    """
+    """Return an opaque function of columns: what it computes inside is rounded in other ways."""
+    # Where it does not take arrays that round otherwise, it is called with plain ones.
 
     def called(given: np.ndarray) -> np.ndarray:
         given = np.broadcast_to(given, (given.shape[0], ROUNDINGS))
         plain = np.asarray(function(given[:, 0].copy()))
         follows = _same(function, Shaken.of(given[:, 0], None), plain)
-        found = [plain]
+        columns = [plain]
         for column in given.T[1:]:
             way = Shaken.of(column, drawn) if follows else column.copy()
-            found.append(np.asarray(function(way)))
-        return np.stack([np.asarray(values, dtype=float) for values in found], axis=1)
+            columns.append(np.asarray(function(way)))
+        return np.stack([np.asarray(values, dtype=float) for values in columns], axis=1)
 
     return called
 

@@ -39,10 +39,7 @@ def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, E
         if node in instead:
             new[node] = instead[node]
         elif args != node.args:
-            new[node] = graph.node(
-                node.op, *args, data=node.data, size=node.size, kind=node.kind,
-                varies=node.varies, value=node.value,
-            )  # fmt: skip
+            new[node] = graph.like(node, *args)
     return [new.get(e, e) for e in exprs]
 
 

@@ -1,4 +1,4 @@
-"""Runs that are made step by step, by whoever chooses the inputs."""
+"""Runs that are made step by step, by what chooses the inputs."""
 
 from .stepper import Stepper, StepperState, stepper
 

@@ -36,7 +36,7 @@ class Kept:
 
 
 class HeldRun:
-    """A run that goes on whenever it is given inputs for another step."""
+    """A run that continues whenever it is given inputs for another step."""
 
     def __init__(self, compiled: Compiled, dt: float, settings: Settings) -> None:
         self.compiled, self.dt, self.settings = compiled, dt, settings
@@ -183,9 +183,9 @@ class HeldRun:
         """Return the step in which the run has ended, as a run."""
         run, begin = self.window.run, self.time
         outputs = np.full((run.task.times.size, run.task.outputs, 1), np.nan)
-        found = replace(made(run, outputs, 0), happened=self.events())
+        result = replace(made(run, outputs, 0), happened=self.events())
         return replace(
-            found, time=np.array([begin, begin + self.dt]),
+            result, time=np.array([begin, begin + self.dt]),
             states=np.column_stack([self.states, run.work.x[:, 0]]),
-            inputs=np.repeat(found.inputs[:, -1:], 2, axis=1),
+            inputs=np.repeat(result.inputs[:, -1:], 2, axis=1),
         )  # fmt: skip

@@ -18,18 +18,103 @@ from ...responses.arguments import checked_params, state_array
 from ...responses.event_log import NO_EVENTS
 from ...upstream.systems import System
 from ...wording import counted
+from ..audit import Audit, Trial
+from ..audit import audit as compare
 from ..compiled import Compiled, as_compiled
 from ..integrate.methods.tableau import Tableau
+from ..integrate.state import Status
+from ..machine.evaluations import prepared_parameters
 from ..own_errors import own_error
 from ..response import failure
+from ..results import Statistics, Trajectory
 from ..settings import Settings
 from .held import HeldRun
-from .sampled import SampledRun
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KeptSample:
+    """What a run in discrete time was before a step."""
+
+    k: int
+    states: np.ndarray
+
+
+class SampledRun:
+    """x[k+1] = f(t[k], x[k], u[k]), and y = h(t[k+1], x[k+1], u[k]) while u[k] still holds."""
+
+    def __init__(self, compiled: Compiled, dt: float) -> None:
+        self.compiled, self.dt = compiled, dt
+        self.k, self.start = 0, 0.0
+        self.states, self.inputs = np.zeros(0), np.zeros(0)
+        self.p = np.zeros(0)
+
+    @property
+    def time(self) -> float:
+        """Time that is reached (s)."""
+        return float(self.start + self.dt * self.k)
+
+    def begin(self, x0: np.ndarray, p: np.ndarray, start: float) -> None:
+        """Stand at the initial state."""
+        self.p, self.k, self.start, self.states = p, 0, start, x0.copy()
+        self.inputs = np.zeros(self.compiled.system.ninputs or 0)
+        self.code, self.c = prepared_parameters(self.compiled, p)
+        rows = self.code.lowered.rows
+        self._given = np.zeros(1), np.zeros((x0.size, 1)), np.zeros((self.inputs.size, 1))
+        self._made = np.zeros((x0.size, 1)), *(np.zeros((rows[name], 1)) for name in "gm")
+        self._y = np.zeros((self.compiled.system.noutputs or 0, 1))
+
+    def shown(self, u: np.ndarray) -> np.ndarray:
+        """Return the outputs where the run stands, with inputs `u`."""
+        self._give(u)
+        self.code.out(*self._given, self.c, self._y)
+        self.code.check(self.c)
+        return self._y[:, 0].copy()
+
+    def advance(self, u: np.ndarray) -> np.ndarray | None:
+        """Go on for a step; return the outputs at its end, None if they are not finite."""
+        self._give(u)
+        with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
+            self.code.rhs(*self._given, self.c, *self._made)
+            self.code.check(self.c)
+            states = self._made[0][:, 0].copy()
+            if not np.isfinite(states).all():
+                return None
+            self.states, self.inputs, self.k = states, u, self.k + 1
+            outputs = self.shown(u)
+        return outputs if np.isfinite(outputs).all() else None
+
+    def _give(self, u: np.ndarray) -> None:
+        t, x, given = self._given
+        t[0], x[:, 0], given[:, 0] = self.time, self.states, u
+
+    def keep(self) -> KeptSample:
+        """Return all that the run knows."""
+        return KeptSample(k=self.k, states=self.states)
+
+    def go_back(self, kept: KeptSample) -> None:
+        """Stand where the run once stood."""
+        self.k, self.states = kept.k, kept.states
+
+    def compared(self, x0: np.ndarray, params: Any, audit: Audit) -> None:
+        """Compare the program with python-control at both ends of the step that was made."""
+        u = np.repeat(self.inputs[:, None], 2, axis=1)
+        trial = Trial(
+            time=np.array([self.time - self.dt, self.time]), p=self.p, params=params, width=1,
+            states=np.column_stack([x0, self.states]), inputs=u,
+        )  # fmt: skip
+        compare(self.compiled, trial, audit)
+
+    def ended(self) -> Trajectory:
+        """Return the step in which the run has ended, as a run."""
+        statistics = Statistics(status=Status.DIVERGED, time=self.time, accepted=0, rejected=0)
+        return Trajectory(
+            time=np.array([self.time]), outputs=np.zeros((0, 1)), states=self.states[:, None],
+            statistics=statistics, inputs=self.inputs[:, None],
+        )  # fmt: skip
+
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["Stepper", "StepperState", "stepper"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,7 +153,7 @@ class StepperState:
 
 
 class Stepper:
-    """A run that goes on whenever it is given inputs for another step; made by `stepper`.
+    """A run that continues whenever it is given inputs for another step; made by `stepper`.
 
     Attributes
     ----------
@@ -235,14 +320,14 @@ class Stepper:
                 f"{'no numbers' if given is None else given.shape}"
             )
         here = self.snapshot()
-        found = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
+        rows = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
         for k, u in enumerate(np.ascontiguousarray(given.T, dtype=float)):
             outputs = None if self._failed is not None else self._run.advance(u)
             if outputs is None:
                 break
-            found[:, k] = outputs
+            rows[:, k] = outputs
         self.restore(here)
-        return found
+        return rows
 
     def snapshot(self) -> StepperState:
         """Return all that the stepper knows, to come back to.
@@ -250,7 +335,7 @@ class Stepper:
         Returns
         -------
         StepperState
-            It does not change when the run goes on.
+            It does not change when the run continues.
         """
         run, states = self._run, self._run.states.copy()
         states.flags.writeable = False
@@ -305,19 +390,19 @@ class Stepper:
 
     def _fail(self) -> np.ndarray:
         """Note why the run has ended; raise it, or return NaN."""
-        made, p = self._run.ended(), self._run.p
+        result, p = self._run.ended(), self._run.p
         name, t = self.compiled.system.name, self._run.time
-        self._failed = failure(self.compiled, made, p, self._params) or DivergedError(
+        self._failed = failure(self.compiled, result, p, self._params) or DivergedError(
             f"'{name}' diverged: no finite outputs at t = {t:.6g} s", t
         )
         if self._ignores:
             return self._ended()
-        raise own_error(self.compiled, made, self._params) or self._failed
+        raise own_error(self.compiled, result, self._params) or self._failed
 
     def _ended(self) -> np.ndarray:
         """Return the outputs of a run that has ended."""
         if not self._ignores:
-            raise UsageError(f"{self.message}: call reset() or restore(state) to go on")
+            raise UsageError(f"{self.message}: call reset() or restore(state) to continue")
         return np.full(self.compiled.system.noutputs or 0, np.nan)
 
 
@@ -373,7 +458,7 @@ def stepper(
     Notes
     -----
     n steps are one run over n `dt` with ``hold="zoh"``, with the same numbers: memories, clocks,
-    delays, events and the steps of the integrator go on as if nobody had looked.  Where it matters
+    delays, events and the steps of the integrator continue unchanged.  Where it matters
     to the integrator how long the whole run is, they are the same to the tolerances: with functions
     of t alone, with event functions in steps below 1e-7 of the run, and without any input.
 
@@ -394,11 +479,11 @@ def stepper(
         rtol=rtol, atol=atol, method="auto" if method is None else method,
         **{name: value for name, value in given.items() if value is not None},
     )  # fmt: skip
-    made = as_compiled(system)
-    own = made.system.dt
-    if not ct.isctime(made.system) and own is not True and not np.isclose(own, dt):
+    compiled = as_compiled(system)
+    period = compiled.system.dt
+    if not ct.isctime(compiled.system) and period is not True and not np.isclose(period, dt):
         raise ParameterError(
-            f"stepper needs dt={own:g} for '{made.system.name}', which is in discrete time, got "
-            f"{dt:g}"
+            f"stepper needs dt={period:g} for '{compiled.system.name}', which is in discrete time, "
+            f"got {dt:g}"
         )
-    return Stepper(made, dt, settings, (audit, ignore_errors))
+    return Stepper(compiled, dt, settings, (audit, ignore_errors))

@@ -1,7 +1,7 @@
 """The times of a run with held inputs that is not over: a window of steps, laid out like a run.
 
 A run with held inputs has each value until the float before the next time.  A step ends there,
-before anything that is due at the next time; with the next inputs it goes on, as the run does.
+before anything that is due at the next time; with the next inputs it continues, as the run does.
 """
 
 from __future__ import annotations
@@ -16,11 +16,10 @@ from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
 from ..driver import prepared
 from ..histories import variations
-from ..integrate.memory import type_of, with_fields
+from ..integrate.memory import data_address, type_of, with_fields
 from ..integrate.workspace import Task
 from ..run import Run
 from ..settings import Settings
-from .memory import in_one_piece
 
 HELD_STEPS = 500  # of a window
 _TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
@@ -28,28 +27,14 @@ _TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
 
 @dataclass(frozen=True, kw_only=True)
 class Window:
-    """Steps that are laid out, and the run that makes them.
-
-    Attributes
-    ----------
-    run : Run
-    memory : ndarray of uint8
-        All that the run knows but for its inputs.
-    ending : tuple of Task and Work
-        For the outputs at the end of a step.
-    first : int
-        Number of the first of these steps.
-    times : ndarray of shape (2 HELD_STEPS,) or (2 HELD_STEPS + 1,)
-        What the task's times are in full (s).
-    reach : ndarray of shape (cells,)
-        What the task has of the cells of these times: until when a step may lead (s).
-    """
+    """Steps that are laid out, and the run that makes them."""
 
     run: Run
-    memory: np.ndarray
-    ending: tuple[Any, Any]
-    first: int
-    times: np.ndarray
+    memory: np.ndarray  # all that the run knows but for its inputs
+    ending: tuple[Any, Any]  # for the outputs at the end of a step
+    first: int  # number of the first of these steps
+    times: np.ndarray  # shape (2 HELD_STEPS,); what the task's times are in full (s)
+    # shape (cells,); what the task has of the cells of these times: until when a step may lead (s)
     reach: np.ndarray
 
     def place(self, k: int) -> int:
@@ -67,11 +52,7 @@ def held_grid(start: float, dt: float, first: int) -> np.ndarray:
 
 
 def first_window(
-    compiled: Compiled,
-    span: tuple[float, float],
-    x0: np.ndarray,
-    p: np.ndarray,
-    settings: Settings,
+    compiled: Compiled, span: tuple[float, float], x0: np.ndarray, p: np.ndarray, settings: Settings
 ) -> Window:
     """Return the window in which a run begins at ``span[0]`` with steps of ``span[1]``."""
     times = held_grid(*span, 0)
@@ -115,7 +96,14 @@ def until(window: Window, k: int) -> Run:
     """Return the run of a window that ends where step `k` does."""
     run = _ending_at(window, window.place(k) + 2)
     if window.reach.size:
-        _move_cells(window, run.task.timed.reach[0], window.place(k) + 2)
+        reach = run.task.timed.reach[0]
+        last = window.place(k) + 2
+        times, count = window.times, reach.size
+        part = (times[last - 1] - times[0]) / (times[-1] - times[0])
+        begin = (times[last - 2] - times[0]) / (times[last - 1] - times[0])
+        cells = np.arange(int(begin * count), count)
+        old = ((cells + 1) * part).astype(np.int64)  # at their ends, where a step leads farthest
+        reach[cells] = window.reach[np.minimum(old, count - 1)]
     return run
 
 
@@ -133,16 +121,6 @@ def _ending_at(window: Window, last: int) -> Run:
     if not is_jit_disabled():
         return window.run
     return replace(window.run, task=task._replace(times=window.times[:last]))
-
-
-def _move_cells(window: Window, reach: np.ndarray, last: int) -> None:
-    """Have the cells that a step begins in be those of the times up to where it ends."""
-    times, count = window.times, reach.size
-    part = (times[last - 1] - times[0]) / (times[-1] - times[0])
-    begin = (times[last - 2] - times[0]) / (times[last - 1] - times[0])
-    cells = np.arange(int(begin * count), count)
-    old = ((cells + 1) * part).astype(np.int64)  # at their ends, where a step leads farthest
-    reach[cells] = window.reach[np.minimum(old, count - 1)]
 
 
 def following(
@@ -163,9 +141,9 @@ def following(
         y=np.full((times.size, *work.y.shape[1:]), np.nan),
     )  # fmt: skip
     run = replace(window.run, machine=fresh.machine, task=task, work=work)
-    made = packed_window(run, first, times)
-    _begin(made.run)
-    return made
+    moved = packed_window(run, first, times)
+    _begin(moved.run)
+    return moved
 
 
 def _begin(run: Run) -> None:
@@ -179,3 +157,51 @@ def _begin(run: Run) -> None:
         lane["jump"] = np.searchsorted(timed.jumps[0], lane["t"] + rounding, "right")
         left = timed.jumps[0, lane["jump"] :][:1]
         lane["left"] = np.nextafter(left[0], -np.inf) if left.size else np.inf
+
+
+_LINE = 64  # bytes of a line of the cache
+_SHOWN = {  # what a step fills and nothing reads later
+    ("samples",),
+    ("y",),
+    ("log", "t"),
+    ("log", "row"),
+}
+
+
+def in_one_piece(work: Any) -> tuple[Any, np.ndarray]:
+    """Return a workspace with its arrays in one piece of memory, and that memory."""
+    arrays = {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
+    places: dict[int, int] = {}  # arrays that are the same memory stay so
+    size = 0
+    for array in arrays.values():
+        if data_address(array) not in places:
+            places[data_address(array)] = size
+            size += -(-array.nbytes // _LINE) * _LINE
+    whole = np.zeros(size + _LINE, np.uint8)
+    first = -whole.ctypes.data % _LINE
+    memory = whole[first : first + size]
+    views = {}
+    for path, array in arrays.items():
+        begin = places[data_address(array)]
+        views[path] = memory[begin : begin + array.nbytes].view(array.dtype).reshape(array.shape)
+        views[path][:] = array
+    return _with_arrays(work, views), memory
+
+
+def _arrays(record: Any, path: tuple[str, ...] = ()) -> Any:
+    """Yield the arrays of a record, and of those inside, by their names."""
+    for name in record._fields[:-1]:
+        value = getattr(record, name)
+        if hasattr(value, "_fields"):
+            yield from _arrays(value, (*path, name))
+        elif isinstance(value, np.ndarray):
+            yield (*path, name), value
+
+
+def _with_arrays(record: Any, views: dict[tuple[str, ...], np.ndarray]) -> Any:
+    """Return a record with other arrays."""
+    whole = {path[0]: view for path, view in views.items() if len(path) == 1}
+    for name in {path[0] for path in views if len(path) > 1}:
+        inside = {path[1:]: view for path, view in views.items() if path[0] == name}
+        whole[name] = _with_arrays(getattr(record, name), inside)
+    return with_fields(record, **whole)

@@ -29,32 +29,18 @@ _CHOICES = {*COMPARISONS, *LOGIC, "select", "minimum", "maximum", "absolute"}
 
 @dataclass(frozen=True, kw_only=True)
 class SeriesCode:
-    """Machine code of enclosed coefficients.
+    """Machine code of enclosed coefficients."""
 
-    Attributes
-    ----------
-    order : int
-        Number n of states.
-    rows : int
-        Of the coefficients of an order: the first 4 n are those of x, d, e and q.
-    at : mapping
-        Where what an order reads begins: ``"b"`` the order before, ``"a"`` and ``"q"`` sums,
-        ``"o"`` values at order 0, ``"w"`` weights, ``"x"`` the box.
-    folds : ndarray of shape (sums, 3)
-        Rows of both factors, and where the sum is read.
-    first, following : Loaded
-        ``values(x, v)`` at order 0, of the box, and at an order, of what it reads.
-    kept : int
-        Rows that are written at order 0 behind the coefficients, for ``"o"``.
-    """
-
-    order: int
-    rows: int
+    order: int  # number n of states
+    rows: int  # of the coefficients of an order: the first 4 n are those of x, d, e and q
+    # where what an order reads begins: ``"b"`` the order before, ``"a"`` and ``"q"`` sums, ``"o"``
+    # values at order 0, ``"w"`` weights, ``"x"`` the box
     at: Mapping[str, int]
-    folds: np.ndarray
+    folds: np.ndarray  # shape (sums, 3); rows of both factors, and where the sum is read
+    # ``values(x, v)`` at order 0, of the box, and at an order, of what it reads
     first: Loaded
     following: Loaded
-    kept: int
+    kept: int  # rows that are written at order 0 behind the coefficients, for ``"o"``
 
     @property
     def addresses(self) -> tuple[int, int]:
@@ -71,32 +57,33 @@ class SeriesCode:
 def series_code(rates: Sequence[Expr]) -> SeriesCode:
     """Make the code for rates of the leaves ``x[0], x[1], ...``."""
     n = len(rates)
-    graph, own = with_leaves(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
-    every = _with_derivatives(graph, own)
+    graph, motion = with_leaves(rates, lambda g, leaf: g.leaf("x", leaf.data[1], None))
+    every = _with_derivatives(graph, motion)
     stores = [Store(array="dx", row=i, expr=graph.number(e), size=1) for i, e in enumerate(every)]
     try:
-        found = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
+        series = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
     except NoSeriesError as error:
         raise Untraceable(str(error)) from None
-    _refuse_cases(graph)
-    rows = found.rows
+    for node in graph.nodes:
+        row = FUNCTIONS.get(node.op)
+        if node.op in _CHOICES or (row is not None and row.series == "steady"):
+            raise Untraceable("they have cases, kinks or jumps")
+    rows = series.rows
     sizes = {"b": rows["k"], **{name: rows[name] for name in ("a", "q", "o", "w")}, "x": 4 * n}
     at, end = {}, 0
     for name in _READ:
         at[name], end = end, end + sizes[name]
-    first = _code(graph, found.first, {"k": (0, rows["k"]), "o": (rows["k"], rows["o"])}, {"x": 0})
-    following = _code(graph, found.following, {"k": (0, rows["k"])}, at)
+    first = _code(graph, series.first, {"k": (0, rows["k"]), "o": (rows["k"], rows["o"])}, {"x": 0})
+    following = _code(graph, series.following, {"k": (0, rows["k"])}, at)
     return SeriesCode(
         order=n, rows=rows["k"], at={**at, "end": end}, first=first, following=following,
-        folds=np.array([*_sums(found.folds, at)], dtype=np.int64).reshape(-1, 3), kept=rows["o"],
+        folds=np.array([*_sums(series.folds, at)], dtype=np.int64).reshape(-1, 3), kept=rows["o"],
     )  # fmt: skip
 
 
 def _with_derivatives(graph: Graph, rates: Sequence[Expr]) -> list[Expr]:
-    """Return rates of x, of directions d and e, and of what both together change, q.
-
-    q' = Df(x) q + D^2 f(x) (d, e).
-    """
+    """Return rates of x, of directions d and e, and of what both together change, q."""
+    # q' = Df(x) q + D^2 f(x) (d, e).
     n, zero = len(rates), graph.const(0.0)
 
     def along(exprs: Sequence[Expr], block: Callable[[int], int | None]) -> list[Expr]:
@@ -110,14 +97,6 @@ def _with_derivatives(graph: Graph, rates: Sequence[Expr]) -> list[Expr]:
 
     first = along(rates, {0: 1}.get)
     return [*rates, *first, *along(rates, {0: 2}.get), *along(first, {0: 2, 1: 3}.get)]
-
-
-def _refuse_cases(graph: Graph) -> None:
-    """Refuse what has no derivatives of every order somewhere."""
-    for node in graph.nodes:
-        row = FUNCTIONS.get(node.op)
-        if node.op in _CHOICES or (row is not None and row.series == "steady"):
-            raise Untraceable("they have cases, kinks or jumps")
 
 
 def _code(

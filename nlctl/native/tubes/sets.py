@@ -48,22 +48,20 @@ def sizes(P, degrees, by_degree, whole):
 
 @kept(**AS_NUMPY)
 def next_polynomials(J, H, P, table, error):
-    """Carry polynomials on, in place, and add what that leaves out to errors.
-
-    Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
-    """
+    """Carry polynomials on, in place, and add what that leaves out to errors."""
+    # Shapes: `J` (n, n, 2), `H` (n, n, n, 2), `P` (n, monomials), `error` (n, 2).
     degrees, _, products, _ = table
     n, degree = P.shape[0], degrees.max()
     by_degree, whole = np.zeros((n, degree + 1)), np.zeros(n)
     sizes(P, degrees, by_degree, whole)
-    found, left = np.zeros_like(P), np.zeros(n)
+    carried, left = np.zeros_like(P), np.zeros(n)
     for k in range(n):
         for i in range(n):
             middle = 0.5 * J[k, i, 0] + 0.5 * J[k, i, 1]
             around = max(up(J[k, i, 1] - middle), up(middle - J[k, i, 0]))
             left[k] += whole[i] * (around + _ROUNDED * abs(middle))
             for a in range(P.shape[1]):
-                found[k, a] += middle * P[i, a]
+                carried[k, a] += middle * P[i, a]
     square = np.empty(P.shape[1])
     for i in range(n):
         for j in range(i + 1):
@@ -75,19 +73,19 @@ def next_polynomials(J, H, P, table, error):
                 left[k] += all_of_it * (max(high, low) + _ROUNDED * abs(middle))
                 left[k] += beyond * abs(middle)
                 for a in range(P.shape[1]):
-                    found[k, a] += middle * square[a]
-    P[:] = found
+                    carried[k, a] += middle * square[a]
+    P[:] = carried
     for k in range(n):
         around = left[k] * _UP + 1e-300
         error[k, 0], error[k, 1] = down(error[k, 0] - around), up(error[k, 1] + around)
 
 
 @kept(**AS_NUMPY)
-def polynomial_product(p, q, products, p_sizes, q_sizes, found):
+def polynomial_product(p, q, products, p_sizes, q_sizes, product):
     """Multiply polynomials, and return how large the product is beyond their degree at most."""
-    found[:] = 0.0
+    product[:] = 0.0
     for f in range(products.shape[0]):
-        found[products[f, 2]] += p[products[f, 0]] * q[products[f, 1]]
+        product[products[f, 2]] += p[products[f, 0]] * q[products[f, 1]]
     beyond, degree = 0.0, p_sizes.size - 1
     for a in range(1, degree + 1):
         for b in range(degree + 1 - a, degree + 1):
@@ -97,10 +95,9 @@ def polynomial_product(p, q, products, p_sizes, q_sizes, found):
 
 @kept(**AS_NUMPY)
 def slopes_within(J, H, box, middle, K):
-    """Write J + H d for all d between the middle and a box.
-
-    With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of them.
-    """
+    """Write J + H d for all d between the middle and a box."""
+    # With d = p + e, H (d, d) / 2 is H (p, p) / 2 and H (p + e / 2) e, and p + e / 2 is one of
+    # them.
     n = middle.size
     for k in range(n):
         for i in range(n):
@@ -112,12 +109,10 @@ def slopes_within(J, H, box, middle, K):
 
 @kept(**AS_NUMPY)
 def next_errors(K, error, at, c, B, r):
-    """Carry errors on, in place: those of `r`, with `error` added; `c` becomes what is around `at`.
-
-    Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
-    """
+    """Move errors, in place: those of `r`, with `error` added; `c` becomes what is around `at`."""
+    # Shapes: `K, B` (n, n, 2), `error, c, r` (n, 2), `at` (n,).
     n = at.size
-    KB, turned = np.empty_like(B), np.empty_like(B)
+    KB, rotated = np.empty_like(B), np.empty_like(B)
     matrix_product(K, B, KB)
     columns = np.empty((n, n))
     for j in range(n):
@@ -125,10 +120,10 @@ def next_errors(K, error, at, c, B, r):
             columns[i, j] = (0.5 * KB[i, j, 0] + 0.5 * KB[i, j, 1]) * (r[j, 1] - r[j, 0])
     orthogonal(columns, B)
     transposed = np.ascontiguousarray(B.transpose(1, 0, 2))
-    matrix_product(transposed, KB, turned)
+    matrix_product(transposed, KB, rotated)
     whole, errors = error.copy(), np.zeros((n, 2))
     add_image(KB, r, whole)
-    add_image(turned, r, errors)
+    add_image(rotated, r, errors)
     add_image(transposed, error, errors)
     for i in range(n):  # 0 stays among them, so that m + P(s) is in the set
         r[i, 0], r[i, 1] = min(errors[i, 0], 0.0), max(errors[i, 1], 0.0)
@@ -143,22 +138,20 @@ def next_errors(K, error, at, c, B, r):
 def add_left_out(B, transposed, x, c):
     """Add x - B B^T x, which is 0 but for rounding, to c."""
     n = x.shape[0]
-    found = np.empty_like(B)
-    matrix_product(B, transposed, found)
+    errors = np.empty_like(B)
+    matrix_product(B, transposed, errors)
     for i in range(n):
         for j in range(n):
-            low, high, one = found[i, j, 0], found[i, j, 1], 1.0 if i == j else 0.0
-            found[i, j, 0], found[i, j, 1] = down(one - high), up(one - low)
-    add_image(found, x, c)
+            low, high, one = errors[i, j, 0], errors[i, j, 1], 1.0 if i == j else 0.0
+            errors[i, j, 0], errors[i, j, 1] = down(one - high), up(one - low)
+    add_image(errors, x, c)
 
 
 @kept(**AS_NUMPY)
 def renewed(c, P, even, B, r, most):
-    """Begin with new numbers s where errors have become larger than a part of the polynomials.
-
-    Return whether.  What was there lies in a box along orthogonal directions, with a number for
-    each of them.
-    """
+    """Begin with new numbers s where errors have become larger than a part of the polynomials."""
+    # Return whether. What was there lies in a box along orthogonal directions, with a number for
+    # each of them.
     n = r.shape[0]
     errors, numbers = 0.0, 0.0
     for k in range(n):
@@ -167,16 +160,16 @@ def renewed(c, P, even, B, r, most):
         numbers += np.abs(P[k]).sum()
     if not errors > most * numbers or errors == 0.0:
         return False
-    columns, Q, turned = np.empty((n, 2 * n)), np.empty_like(B), np.empty_like(B)
+    columns, Q, rotated = np.empty((n, 2 * n)), np.empty_like(B), np.empty_like(B)
     for j in range(n):
         columns[:, j] = P[:, j]
         columns[:, n + j] = B[:, j, 0] * (r[j, 1] - r[j, 0]) * 0.5
     orthogonal(columns, Q)
     transposed = np.ascontiguousarray(Q.transpose(1, 0, 2))
-    matrix_product(transposed, B, turned)
+    matrix_product(transposed, B, rotated)
     box, whole = np.zeros((n, 2)), np.empty((n, 2))
     box_of_set(np.zeros((n, 2)), P, even, B, r, whole)
-    box_of_set(box, np.ascontiguousarray(transposed[:, :, 0]) @ P, even, turned, r, box)
+    box_of_set(box, np.ascontiguousarray(transposed[:, :, 0]) @ P, even, rotated, r, box)
     for i in range(n):
         rounded = 0.0
         for k in range(n):

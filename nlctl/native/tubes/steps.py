@@ -14,23 +14,15 @@ import numpy as np
 
 from ..enclosures.address import call_enclosure
 from ..machine.machine_code import kept
-from .intervals import (
-    AS_NUMPY,
-    down,
-    interval_product,
-    power_of_time,
-    up,
-)
+from .intervals import AS_NUMPY, down, interval_product, power_of_time, up
 
 _TRIES = 2  # of what the rest may be, for one step size
 
 
 @kept(**AS_NUMPY)
 def coefficients(code, places, folds, box, orders, k, read, first):
-    """Enclose the coefficients up to an order on a box in every lane.
-
-    Shapes: `box` (4n, 2, lanes), `k` (orders + 1, rows, 2, lanes).
-    """
+    """Enclose the coefficients up to an order on a box in every lane."""
+    # Shapes: `box` (4n, 2, lanes), `k` (orders + 1, rows, 2, lanes).
     rows, kept_rows, _, o, w, x, _ = places
     call_enclosure(code[0], box, first)
     k[0] = first[:rows]
@@ -62,10 +54,8 @@ def _sum_products(folds, order, k, read):
 
 @kept(**AS_NUMPY)
 def fill_lanes(box, middle, lanes):
-    """Give each pair of directions a lane with the box, and each direction one with the middle.
-
-    Shapes: `lanes` (groups, 4n, 2, lanes).
-    """
+    """Give each pair of directions a lane with the box, and each direction one with the middle."""
+    # Shapes: `lanes` (groups, 4n, 2, lanes).
     n, lane, width = middle.size, 0, lanes.shape[3]
     pairs = n * (n + 1) // 2
     lanes[:] = 0.0
@@ -86,10 +76,8 @@ def fill_lanes(box, middle, lanes):
 
 @kept(**AS_NUMPY)
 def flow_derivatives(lanes, at, J, H):
-    """Read where the middle comes to, and both derivatives.
-
-    Shapes: `at` (n, 2), `J` (n, n, 2), `H` (n, n, n, 2).
-    """
+    """Read where the middle comes to, and both derivatives."""
+    # Shapes: `at` (n, 2), `J` (n, n, 2), `H` (n, n, n, 2).
     n, width, lane = at.shape[0], lanes.shape[3], 0
     for i in range(n):
         for j in range(i + 1):
@@ -106,28 +94,24 @@ def flow_derivatives(lanes, at, J, H):
 
 
 @kept(**AS_NUMPY)
-def add_up(k, orders, time, rest, found):
-    """Write the polynomial at a time, an interval of shape (2,), with a rest of one more order.
-
-    Shapes: `k` (orders + 2, rows, 2, lanes), `rest, found` (4n, 2, lanes).
-    """
-    for i in range(found.shape[0]):
-        for lane in range(found.shape[2]):
+def add_up(k, orders, time, rest, sums):
+    """Write the polynomial at a time, an interval of shape (2,), with a rest of one more order."""
+    # Shapes: `k` (orders + 2, rows, 2, lanes), `rest, sums` (4n, 2, lanes).
+    for i in range(sums.shape[0]):
+        for lane in range(sums.shape[2]):
             low, high = rest[i, 0, lane], rest[i, 1, lane]
             for order in range(orders, -1, -1):
                 low, high = interval_product(low, high, time[0], time[1])
                 low = down(low + k[order, i, 0, lane])
                 high = up(high + k[order, i, 1, lane])
-            found[i, 0, lane], found[i, 1, lane] = low, high
+            sums[i, 0, lane], sums[i, 1, lane] = low, high
 
 
 @kept(**AS_NUMPY)
 def rest_of_step(code, places, folds, order, h, k, ky, lanes, rest, pad, read, first):
-    """Find the rest of a step of size h; return whether there is one.
-
-    Shapes: `k, ky` (groups, order + 2, rows, 2, lanes), `lanes, rest` (groups, 4n, 2, lanes), `pad`
-    as these: how far around the polynomial solutions are looked for.
-    """
+    """Find the rest of a step of size h; return whether there is one."""
+    # Shapes: `k, ky` (groups, order + 2, rows, 2, lanes), `lanes, rest` (groups, 4n, 2, lanes),
+    # `pad` as these: how far around the polynomial solutions are looked for.
     span, power = np.array([0.0, h]), np.empty(2)
     power_of_time(h, order + 1, power)
     rows = lanes.shape[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -10,10 +12,48 @@ import numpy as np
 from ..enclosures.writer import LANES
 from ..machine.machine_code import kept
 from .intervals import AS_NUMPY, add_image, add_product, down, interval_product, power_of_time, up
-from .monomials import monomials
 from .series import SeriesCode
 from .sets import box_of_set, next_errors, next_polynomials, renewed, slopes_within
 from .steps import add_up, coefficients, fill_lanes, flow_derivatives, rest_of_step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonomialTable:
+    """The monomials of degree 1 to some degree."""
+
+    degrees: np.ndarray  # shape (monomials,); the first ones are the variables themselves
+    even: np.ndarray  # shape (monomials,); whether it is never negative
+    # shape (pairs, 3); numbers of two monomials and of their product, as far as that is one
+    products: np.ndarray
+    has: np.ndarray  # shape (monomials, variables); whether a variable is in it
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """All of it."""
+        return self.degrees, self.even, self.products, self.has
+
+
+@functools.lru_cache(maxsize=16)
+def monomials(variables: int, degree: int) -> MonomialTable:
+    """Return all monomials of so many variables."""
+    powers = [
+        tuple(chosen.count(v) for v in range(variables))
+        for total in range(1, degree + 1)
+        for chosen in itertools.combinations_with_replacement(range(variables), total)
+    ]
+    numbers = {power: i for i, power in enumerate(powers)}
+    sums = (
+        (i, j, numbers.get(tuple(a + b for a, b in zip(p, q, strict=True))))
+        for (p, i), (q, j) in itertools.product(numbers.items(), repeat=2)
+        if sum(p) + sum(q) <= degree
+    )
+    return MonomialTable(
+        degrees=np.array([sum(p) for p in powers], dtype=np.int64),
+        even=np.array([all(a % 2 == 0 for a in p) for p in powers]),
+        products=np.array([*sums], dtype=np.int64).reshape(-1, 3),
+        has=np.array(powers) > 0,
+    )
+
 
 REACHED, LEAVES, MUST_LEAVE, STUCK = range(4)
 FIRST_ORDER, SET_DEGREE, TOLERANCE = 6, 4, 1e-8
@@ -25,29 +65,17 @@ _MOST = 100_000  # steps
 
 @dataclass(frozen=True, kw_only=True)
 class Tube:
-    """What encloses all solutions from a box.
+    """What encloses all solutions from a box."""
 
-    Attributes
-    ----------
-    status : int
-        `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are
-        outside of them at one time; `STUCK`: no step is found.
-    time : float
-        Up to which it is known.
-    low, high : ndarray of shape (cells, n)
-        Over each of as many parts of the time.
-    end : ndarray of shape (n, 2)
-        At the end.
-    weight : ndarray of shape (n,)
-        How much each side of the box has to do with what is not linear in it.
-    steps : int
-    """
-
+    # `REACHED` the end; `LEAVES`: not known to stay within the limits; `MUST_LEAVE`: all are
+    # outside of them at one time; `STUCK`: no step is found
     status: int
-    time: float
+    time: float  # up to which it is known
+    # shape (cells, n); over each of as many parts of the time
     low: np.ndarray
     high: np.ndarray
-    end: np.ndarray
+    end: np.ndarray  # shape (n, 2); at the end
+    # shape (n,); how much each side of the box has to do with what is not linear in it
     weight: np.ndarray
     steps: int
 
@@ -200,10 +228,9 @@ def span(k, ky, order, h, boxes, over):
 
 @kept(**AS_NUMPY)
 def range_over_step(ky, h, begin, end, over):
-    """Narrow where the states are during a step, by where they are before and after it.
-
-    A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second coefficient.
-    """
+    """Narrow where the states are during a step, by where they are before and after it."""
+    # A solution is off its chord by h^2 x'' / 8 at most, and x'' is two times its second
+    # coefficient.
     square = up(0.25 * up(h * h))
     for i in range(over.shape[0]):
         below, above = up(square * max(ky[2, i, 1, 0], 0.0)), up(square * max(-ky[2, i, 0, 0], 0.0))

@@ -11,8 +11,11 @@ from planted_loops import actuator, again, exchanged
 
 import nlctl
 from nlctl.analysis.lyapunov import DecompositionError, certify
-from nlctl.analysis.lyapunov.model_reference.audit import check_decrease
-from nlctl.analysis.lyapunov.model_reference.closing import matching, read_model_reference
+from nlctl.analysis.lyapunov.model_reference.closing import (
+    check_decrease,
+    matching,
+    read_model_reference,
+)
 from nlctl.analysis.lyapunov.model_reference.decrease import decrease
 from nlctl.errors import DiagramError
 

@@ -15,7 +15,7 @@ from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Graph, needed
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
 from nlctl.native.enclosures.divide import decide_claim, enclose_supremum
-from nlctl.native.enclosures.unrounded import UnroundedGraph
+from nlctl.native.enclosures.scalars import UnroundedGraph
 
 ROUNDING = 1e-9  # of a sample's own floats, relative: they are rounded at every step
 

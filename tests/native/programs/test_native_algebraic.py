@@ -12,8 +12,7 @@ from scipy.special import lambertw
 import nlctl
 from nlctl.errors import AlgebraicLoopError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
-from nlctl.native.diagram.schedule import schedule
-from nlctl.native.diagram.tearing import first_loop, tear
+from nlctl.native.diagram.schedule import first_loop, schedule, tear
 
 
 def called(compiled, t=0.0, x=(), u=(), *, native=False):

@@ -29,15 +29,10 @@ static double nlctl_real(uint64_t x) { double y; memcpy(&y, &x, sizeof y); retur
 
 
 class CModule:
-    """Functions that are compiled together.
-
-    Attributes
-    ----------
-    functions, tables : dict
-        Text of functions by name, and names of constants, in the order in which they were needed.
-    """
+    """Functions that are compiled together."""
 
     def __init__(self) -> None:
+        # text of functions by name, and names of constants, in the order in which they were needed
         self.functions: dict[str, str] = {}
         self.tables: dict[tuple[float, ...], str] = {}
 
@@ -51,9 +46,9 @@ class CModule:
         for values, name in self.tables.items():
             numbers = ", ".join(map(c_number, values))
             tables.append(f"static const double {name}[{len(values)}] = {{{numbers}}};")
-        found = "\n".join([*tables, *self.functions.values()])
-        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in found]
-        return "\n".join([*used, found])
+        body = "\n".join([*tables, *self.functions.values()])
+        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in body]
+        return "\n".join([*used, body])
 
 
 def _called(line: str) -> str:
@@ -219,10 +214,10 @@ class CBody:
 
     def load(self, where: str, width: int) -> Value:
         self.note("")
-        found = self.new(where)
+        value = self.new(where)
         if where in self.labels:
             self.lines[-1] += f" /* {self.labels[where]} */"
-        return found
+        return value
 
     def store(self, value: Value, where: str) -> None:
         self.write(f"{where} = {value.text};")

@@ -73,11 +73,11 @@ def applied(b: Body, name: str, *args: Value) -> Value:
     return b.each(code, *args)
 
 
-def sin_cos(b: Body, x: Value, wanted: set[str]) -> dict[str, Value]:
+def sin_cos(b: Body, x: Value, kinds: set[str]) -> dict[str, Value]:
     """Return sine, cosine or both of one angle."""
-    if len(wanted) == 2:
+    if len(kinds) == 2:
         return dict(zip(("sin", "cos"), _call(b, "sincos", _sin_and_cos, x), strict=True))
-    (name,) = wanted
+    (name,) = kinds
     make = _sin if name == "sin" else _cos
     return {name: _call(b, name, make, x)[0]}
 
@@ -120,10 +120,8 @@ def _reduced(b: Body, x: Value, shift: float) -> tuple[Value, Value]:
 
 
 def _scaled(b: Body, y: Value, m: Value, small: Value) -> Value:
-    """Return y 2^k, where k + 1023 is in the last bits of m.
-
-    Where the result may be small it is made in two steps, so that it underflows gradually.
-    """
+    """Return y 2^k, where k + 1023 is in the last bits of m."""
+    # Where the result may be small it is made in two steps, so that it underflows gradually.
     bits = b.logic("add", b.bits(m), b.integer("and", b.mask(small), _STEP))
     y = b.mul(y, b.real(b.integer("shl", bits, 52)), exact=True)
     return b.mul(y, b.select(small, 2.0**-_STEP, 1.0), exact=True)

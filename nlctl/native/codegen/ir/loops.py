@@ -90,10 +90,8 @@ class _Loop:
         return self.b.element(v, 0)
 
     def _turn(self, index: str | None, at: int, skipped: int = 0) -> None:
-        """Write what is computed for the elements from index + at on.
-
-        The first `skipped` of them have been added to the sums before.
-        """
+        """Write what is computed for the elements from index + at on."""
+        # The first `skipped` of them have been added to the sums before.
         w = self.w
         outer, pairs = w.names, w.pairs
         w.names, w.pairs = dict(outer), {}
@@ -104,11 +102,11 @@ class _Loop:
                 w.names[node] = outer[node] = self.b.add(w.names[node], term)
             else:
                 w.names[node] = w.operation(node)
-        for each in self.loop.stores:
-            self._reads((each.expr,), index, at)
-            array, row, step = each.array, each.row, self.lanes
+        for store in self.loop.stores:
+            self._reads((store.expr,), index, at)
+            array, row, step = store.array, store.row, self.lanes
             where = self.b.address(array, (row + at) * step, index, step)
-            self.b.store(self.b.wide(w.names[each.expr], self.chunk), where)
+            self.b.store(self.b.wide(w.names[store.expr], self.chunk), where)
         w.names, w.pairs = outer, pairs
 
     def _kept(self, term: Value, skipped: int) -> Value:

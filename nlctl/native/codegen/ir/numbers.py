@@ -16,30 +16,19 @@ PACKED = 4  # numbers of one member whose sines, powers, ... are computed togeth
 
 
 class Writer:
-    """Writes one function; `names` says what each expression is called so far.
-
-    Attributes
-    ----------
-    b : Body
-    plan : Plan
-    lanes : int
-        Number of members.
-    exact : set of Expr
-        Operations that are rounded one by one.
-    both : set of Expr
-        Angles of which sine and cosine are needed.
-    pairs : dict
-        Sines and cosines of those that have been computed, by the angle's name.
-    """
+    """Writes one function; `names` says what each expression is called so far."""
 
     def __init__(self, b: Body, plan: FunctionPlan, lanes: int, exact: Any) -> None:
+        # `lanes` members, and operations that are `exact`: rounded one by one
         self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
+        # sines and cosines of those that have been computed, by the angle's name
         self.pairs: dict[str, dict[str, Value]] = {}
         kinds = Counter(
             a for n in plan.nodes for a in n.args if n.op in ("sin", "cos") and n not in plan.known
         )
+        # angles of which sine and cosine are needed
         self.both = {angle for angle, count in kinds.items() if count == 2 and not b.portable}
 
     def number(self, node: Expr) -> None:
@@ -143,19 +132,19 @@ class Writer:
         x = b.gathered([self.names[a] for a in angles], 2 if len(angles) == 2 else PACKED)
         kinds = {node.op for node in nodes}
         if kinds <= {"sin", "cos"}:
-            found = sin_cos(b, x, kinds)
+            values = sin_cos(b, x, kinds)
         else:
-            found = {kind: applied(b, kind, x) for kind in kinds}
+            values = {kind: applied(b, kind, x) for kind in kinds}
         for node in nodes:
-            self.names[node] = b.element(found[node.op], angles.index(node.args[0]))
+            self.names[node] = b.element(values[node.op], angles.index(node.args[0]))
 
 
 def _depths(nodes: tuple[Expr, ...], is_packable: Any) -> dict[Expr, int]:
     """Return how many functions stand one behind the other before each number of a level."""
-    found: dict[Expr, int] = {}
+    depth: dict[Expr, int] = {}
     for node in nodes:
-        found[node] = max((found[a] + is_packable(a) for a in node.args if a in found), default=0)
-    return found
+        depth[node] = max((depth[a] + is_packable(a) for a in node.args if a in depth), default=0)
+    return depth
 
 
 def one_line(node: Expr) -> str:

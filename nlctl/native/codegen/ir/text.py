@@ -18,21 +18,11 @@ RARELY = "!prof !0"  # the first way of a branch is all but never taken
 
 @dataclass(frozen=True)
 class Value:
-    """A value of a function.
+    """A value of a function."""
 
-    Attributes
-    ----------
-    text : str
-        Its name, or a constant.
-    width : int
-        Number of elements, 0 for what is not a vector.
-    kind : str
-        ``"f"`` float, ``"b"`` truth value, ``"i"`` integer.
-    """
-
-    text: str
-    width: int
-    kind: str = "f"
+    text: str  # its name, or a constant
+    width: int  # number of elements, 0 for what is not a vector
+    kind: str = "f"  # ``"f"`` float, ``"b"`` truth value, ``"i"`` integer
 
     @property
     def type(self) -> str:
@@ -62,18 +52,11 @@ def constant(x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
 
 @dataclass(kw_only=True)
 class Module:
-    """Functions that are compiled together.
+    """Functions that are compiled together."""
 
-    Attributes
-    ----------
-    inlined : bool
-        Whether small functions become part of those that call them.
-    declared, tables, functions : dict
-        Text of what is declared, constants by name, and text of functions by name, in the order
-        in which they were needed.
-    """
-
-    inlined: bool
+    inlined: bool  # whether small functions become part of those that call them
+    # text of what is declared, constants by name, and text of functions by name, in the order in
+    # which they were needed
     declared: dict[str, None] = field(default_factory=dict)
     tables: dict[tuple[float, ...], str] = field(default_factory=dict)
     functions: dict[str, str] = field(default_factory=dict)
@@ -281,11 +264,11 @@ class Body:
         if full not in self.module.functions:
             self.module.functions[full] = ""  # before those that it calls
             self.module.functions[full] = self._defined(full, kind, make, args)
-        found = self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
+        result = self.new(f"call {kind} {full}({', '.join(map(str, args))})", width)
         if count == 1:
-            return (found,)
+            return (result,)
         return tuple(
-            self.new(f"extractvalue {kind} {found.text}, {i}", width) for i in range(count)
+            self.new(f"extractvalue {kind} {result.text}, {i}", width) for i in range(count)
         )
 
     def _full(self, name: str, width: int) -> str:
@@ -328,10 +311,10 @@ class Body:
         if full not in self.module.functions:
             inner, (given, known) = Body(self.module), (Value("%x", x.width), Value("%y", x.width))
             is_far = inner.compare("ogt", inner.intrinsic("fabs", given), limit)
-            found = inner.select(is_far, inner.each(name, given), known)
+            value = inner.select(is_far, inner.each(name, given), known)
             self.module.functions[full] = (
                 f"define internal preserve_allcc {kind} {full}({given}, {known}) "
-                f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {found}\n}}\n"
+                f"noinline cold nounwind {{\nentry:\n{inner.text()}  ret {value}\n}}\n"
             )
         return self.new(f"call preserve_allcc {kind} {full}({x}, {y})", x.width)
 

@@ -1,0 +1,179 @@
+"""A loop that a page runs itself: its program, its sliders, and what stands behind its curves."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from nlctl.errors import ParameterError
+from nlctl.export.web import Handle, WebProgram, check_linker, handles, web_program
+from nlctl.faults.effects import NEVER
+from nlctl.plotting.bands import quantile, upper_envelope
+from nlctl.responses.time_response import as_response
+
+from ..report.document import Live
+from ..robustness.stl.formula import Always, And, Band, Eventually, Formula, Not
+from ..robustness.stl.limits import limits_of_requirements
+from ..robustness.stl.spec import Requirement
+from .study.histories import Histories
+
+__all__ = ["live_item", "live_numbers", "live_program"]
+
+_NODES = 240  # stretches of time of a band
+_LARGEST = 1e300  # instead of infinity, which JSON has not
+
+
+def live_program(
+    loop: ct.InputOutputSystem, response: Any, params: Mapping[str, Any]
+) -> WebProgram:
+    """Return the program of a page that runs a loop as a response was run."""
+    check_linker()
+    if not isinstance(loop, ct.InterconnectedSystem):
+        raise ParameterError(
+            f"a page runs diagrams, and '{loop.name}' is a single block: make a diagram of it with "
+            "nlctl.interconnect"
+        )
+    u = np.atleast_2d(response.u) if loop.ninputs else 0.0
+    return web_program(
+        loop, response.time, u, params=params, initial_state=np.asarray(response.x)[:, 0]
+    )
+
+
+def live_item(
+    program: WebProgram,
+    response: Any,
+    names: Sequence[str],
+    *,
+    signals: Sequence[str] = (),
+    requirements: Sequence[Requirement] = (),
+    histories: Histories | None = None,
+    command: Sequence[str] = (),
+    base: Mapping[str, Any] | None = None,
+) -> Live:
+    """Return the part of a page that runs a loop.
+
+    `names` are what may be moved, a sensible few by default; `command` repeats the run as it
+    stands, else the call of Python with the settings `base` does.
+    """
+    moved = handles(
+        program.compiled, names, program.p, program.x0, program.u,
+        (float(response.time[0]), float(response.time[-1])),
+    )  # fmt: skip
+    known = program.signals
+    limits = {k: v for k, v in limits_of_requirements(requirements).items() if k in known}
+    content = {
+        "module": base64.b64encode(gzip.compress(program.module, 9, mtime=0)).decode(),
+        "facts": program.facts,
+        "handles": [_plain(handle) for handle in moved],
+        "never": NEVER,
+        "outputs": list(program.outputs),
+        "rows": _rows(response, known, signals, limits),
+        "limits": {name: [[*line] for line in lines] for name, lines in limits.items()},
+        "bands": {} if histories is None else _bands(histories, known),
+        "requirements": [
+            {"key": r.key, "text": str(r.formula), "meaning": r.meaning, "until": r.until,
+             "formula": _formula(r.formula)}
+            for r in requirements if set(r.signals) <= set(known)
+        ],
+        "numbers": live_numbers(program)["outputs"],
+        "command": _command(command, response, base or {}),
+    }  # fmt: skip
+    what = ", ".join(handle.name for handle in moved)
+    return Live(
+        key="live",
+        caption="This page runs the loop itself, by the integrators and equations that made it. "
+        "Grey: as reported.",
+        description=f"Sliders for {what}.",
+        program=content,
+    )
+
+
+def live_numbers(program: WebProgram) -> dict[str, Any]:
+    """Return what ``report.json`` has of a page's run as it stands: the same numbers."""
+    lane = program.run.lanes[0]
+    ends = {
+        name: [float(y.min()), float(y.max()), float(y[-1])] for name, y in program.signals.items()
+    }
+    return {
+        "program": program.digest,
+        "steps": int(lane["accepted"]),
+        "rtol": program.facts["rtol"],
+        "outputs": ends,
+    }
+
+
+def _plain(handle: Handle) -> dict[str, Any]:
+    """Return a handle without what it has not."""
+    return {name: value for name, value in vars(handle).items() if value not in ("", None)}
+
+
+def _rows(
+    response: Any,
+    known: Mapping[str, np.ndarray],
+    signals: Sequence[str],
+    watched: Collection[str],
+) -> list[dict[str, Any]]:
+    """Return the rows of the static figure, with the outputs that the page computes.
+
+    What requirements always ask of a signal is seen in a row of its own.
+    """
+    _, rows = as_response(response, None).rows([*signals] or None)
+    apart = [] if signals else [name for name in known if name in watched]
+    kept = {name: [name] for name in apart}
+    for title, names in rows.items():
+        left = [name for name in names if name in known and name not in apart]
+        kept |= {title if len(left) == len(names) else ", ".join(left): left} if left else {}
+    return [{"title": title, "names": names} for title, names in kept.items()]
+
+
+def _bands(histories: Histories, known: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Return what 90 % of a study's runs lie in, by signal: times, and both ends."""
+    nodes = np.unique(np.linspace(0, histories.time.size - 1, _NODES + 1).astype(int))
+    return {
+        name: [
+            [float(f"{value:.5g}") for value in row]
+            for row in (
+                histories.time[nodes],
+                -upper_envelope(-quantile(samples, 0.05, -np.inf), nodes),
+                upper_envelope(quantile(samples, 0.95, np.inf), nodes),
+            )
+        ]
+        for name, samples in histories.signals.items()
+        if name in known and np.isfinite(samples).all()
+    }
+
+
+def _formula(formula: Formula) -> list[Any]:
+    """Return a formula as JSON can hold it."""
+    match formula:
+        case Band():
+            return ["band", formula.signal, _finite(formula.lower), _finite(formula.upper),
+                    formula.scale]  # fmt: skip
+        case Not():
+            return ["not", _formula(formula.part)]
+        case And():
+            return ["and", *map(_formula, formula.parts)]
+        case Always():
+            return ["always", _formula(formula.part), formula.start, _finite(formula.end)]
+        case Eventually():
+            return ["eventually", _formula(formula.part), formula.start, _finite(formula.end)]
+    raise TypeError(f"no formula: {formula!r}")
+
+
+def _finite(value: float) -> float:
+    return float(np.clip(value, -_LARGEST, _LARGEST))
+
+
+def _command(words: Sequence[str], response: Any, base: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what repeats a run: words of a shell, or the settings of a call of Python."""
+    if words:
+        return {"shell": shlex.join(words)}
+    times = np.asarray(response.time)
+    grid = f"np.linspace({times[0]:g}, {times[-1]:g}, {times.size})"
+    return {"python": grid, "params": {k: v for k, v in base.items() if isinstance(v, float | int)}}

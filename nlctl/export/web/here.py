@@ -1,0 +1,91 @@
+"""A page's program in this process: the same operations in the same order, rounded alike."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import lzma
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from ...native.integrate.memory import with_fields
+from ...native.integrate.state import RUNNING
+from ...native.machine.finish import Loaded, finished
+from ...native.run import Run
+from .linking import integrators_text
+
+_ROUNDS = 2000
+_PLACE = ctypes.c_void_p
+_NUMBER = ctypes.c_int64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Here:
+    """The functions of a page's program.
+
+    Attributes
+    ----------
+    loaded : Loaded
+        Those of the program.
+    """
+
+    loaded: Loaded
+
+    def address(self, name: str) -> int:
+        """Return where a function is."""
+        return self.loaded.addresses[name]
+
+    def call(self, name: str, *arrays: np.ndarray) -> None:
+        """Call a function of arrays."""
+        kind = ctypes.CFUNCTYPE(None, *[_PLACE] * len(arrays))
+        kind(self.address(name))(*(array.ctypes.data for array in arrays))
+
+
+def here(text: str, names: Sequence[str]) -> Here:
+    """Return the functions of a program, as machine code of this process."""
+    return Here(loaded=finished(text, names))
+
+
+def carried_out(run: Run, code: Here, p: np.ndarray) -> Run:
+    """Return a run that has ended, by a page's program; `run` stays as it was laid out."""
+    task = run.task
+    samples = [code.address(f"sample{k}") for k in range(len(run.machine.samples))]
+    resets = [code.address("reset")] if run.machine.resets else []
+    c = np.zeros_like(task.p)
+    code.call("prepare", p, c)
+    task = with_fields(
+        task,
+        p=c,
+        clocks=with_fields(task.clocks, functions=np.array(samples, dtype=np.int64)),
+        resets=with_fields(task.resets, functions=np.array(resets, dtype=np.int64)),
+    )
+    table, work = task.table.ctypes.data, run.work.table.ctypes.data
+    rhs, out, lane = code.address("rhs"), code.address("out"), run.work.lanes[0]
+    call = _integrators()
+    call("start", rhs, table, work)
+    run.work.samples[0] = run.work.x
+    tried = -1
+    while lane["status"] == RUNNING and lane["accepted"] + lane["rejected"] != tried:
+        tried = int(lane["accepted"] + lane["rejected"])
+        call("advance", rhs, 0, 0, table, work, _ROUNDS)
+    call("outputs", rhs, out, table, work)
+    return Run(machine=run.machine, task=task, work=run.work)
+
+
+@functools.cache
+def _integrators() -> Callable[..., None]:
+    """Return the integrators, called by their names and numbers."""
+    module = llvm.parse_assembly(integrators_text())
+    loaded = finished(lzma.compress(module.as_bitcode(), preset=1), ("start", "advance", "outputs"))
+    nothing = (_PLACE * 4)()
+
+    def call(name: str, *numbers: Any) -> None:
+        kinds = [_NUMBER] * len(numbers)
+        function = ctypes.CFUNCTYPE(ctypes.c_int32, _PLACE, _PLACE, *kinds)
+        function(loaded.addresses[name])(nothing, ctypes.byref(nothing, 8), *numbers)
+
+    return call

@@ -1,0 +1,160 @@
+"""Object code and a linked program for WebAssembly: LLVM in a child process, the linker of Zig."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import lzma
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import llvmlite.binding as llvm
+
+from ...errors import CompileError, UsageError
+from ...native import integrators
+from ...native.machine import store
+from .layout import laid_out_as_here
+from .rounding import integrators_alike
+
+OF_MATH = [
+    "exp",
+    "log",
+    "log2",
+    "log10",
+    "log1p",
+    "expm1",
+    "sin",
+    "cos",
+    "tan",
+    "sinh",
+    "cosh",
+    "asin",
+    "acos",
+    "atan",
+    "asinh",
+    "acosh",
+    "atanh",
+    "cbrt",
+    "atan2",
+    "hypot",
+    "pow",
+]
+"""Functions of the C library that are JavaScript's ``Math``, by the same names."""
+PROVIDED = frozenset({*OF_MATH, "fmod", "nextafter"})
+_SCRIPT = Path(__file__).with_name("wasm_object.py")
+_NO_ZIG = (
+    "a page that runs is linked by Zig, which is not installed: pip install 'nlctl[export]' "
+    "(or ziglang)"
+)
+
+
+_STACK = 1 << 20  # bytes
+_SIZE = """
+define internal {i64, i1} @size(i64 %a, i64 %b) alwaysinline nounwind {
+  %product = mul i64 %a, %b
+  %both = or i64 %a, %b
+  %large = icmp ugt i64 %both, 2147483647
+  %r = insertvalue {i64, i1} undef, i64 %product, 0
+  %q = insertvalue {i64, i1} %r, i1 %large, 1
+  ret {i64, i1} %q
+}
+"""  # of an array: products of 64 bits that may overflow call a function that is nowhere
+
+
+def check_linker() -> None:
+    """Refuse, before anything is computed, where there is no linker.
+
+    Raises
+    ------
+    UsageError
+        If Zig, which links WebAssembly, is not installed.
+
+    Examples
+    --------
+    >>> from nlctl.export.web import check_linker
+    >>> check_linker()  # doctest: +SKIP
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise UsageError(_NO_ZIG)
+
+
+def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes:
+    """Return modules of IR, by names of their own, and the integrators as a WebAssembly module."""
+    check_linker()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "integrators.o").write_bytes(_integrators())
+        objects = wasm_objects(texts, folder, what)
+        command = [
+            sys.executable, "-m", "ziglang", "wasm-ld", *(path.name for path in objects),
+            "integrators.o", "-o", "page.wasm", "--no-entry", "--gc-sections", "--strip-all",
+            "--allow-undefined", "--stack-first", "-z", f"stack-size={_STACK}",
+            *(f"--export={name}" for name in exports),
+        ]  # fmt: skip
+        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        page = folder / "page.wasm"
+        if run.returncode or not page.exists():
+            raise CompileError(f"'{what}' cannot be linked for a page: {_last(run.stderr)}")
+        return page.read_bytes()
+
+
+def wasm_objects(texts: Mapping[str, str], folder: Path, what: str, speed: int = 2) -> list[Path]:
+    """Write object code of modules of IR; LLVM works in a child process, which it may end."""
+    paths = [folder / f"{name}.ll" for name in texts]
+    for path, text in zip(paths, texts.values(), strict=True):
+        path.write_text(text, encoding="utf-8")
+    command = [sys.executable, str(_SCRIPT), str(speed), *map(str, paths)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    if run.returncode:
+        raise CompileError(f"LLVM makes no WebAssembly of '{what}': {_last(run.stderr)}")
+    return [path.with_suffix(".o") for path in paths]
+
+
+def _last(text: str) -> str:
+    """Return the line of a message that says what is wrong."""
+    lines = text.strip().splitlines() or ["no message"]
+    return next((line for line in lines if "error" in line.lower()), lines[-1])
+
+
+@functools.cache
+def _integrators() -> bytes:
+    """Return the integrators, from the cache of machine code if they are there."""
+    text = integrators_text()
+    key = hashlib.sha256(repr((_SCRIPT.read_bytes(), llvm.llvm_version_info, text)).encode())
+    code = store.read(key.hexdigest())
+    if code is None:
+        with tempfile.TemporaryDirectory() as folder:
+            texts = {"integrators": text}
+            code = wasm_objects(texts, Path(folder), "the integrators")[0].read_bytes()
+        store.write(key.hexdigest(), code)
+    return code
+
+
+@functools.cache
+def integrators_text() -> str:
+    """Return the integrators' IR for another machine than this one.
+
+    WebAssembly has no common symbols; names of functions, which are thousands of characters, would
+    be most of the object file.
+    """
+    bitcode = integrators.shipped_bitcode()
+    if bitcode is None:
+        raise CompileError(
+            "a page that runs needs the integrators' bitcode that nlctl ships, which is not that "
+            "of the sources here: python -m nlctl.native.ship"
+        )
+    text = str(llvm.parse_bitcode(lzma.decompress(bitcode)))
+    text = re.sub(r"^target (triple|datalayout) = .*\n", "", text, flags=re.MULTILINE)
+    text = text.replace("= common global", "= internal global")
+    text = text.replace("@llvm.smul.with.overflow.i64", "@size")
+    text = re.sub(r"^declare .*@size\(.*\n", _SIZE, text, flags=re.MULTILINE)
+    short: dict[str, str] = {}
+    text = re.sub(
+        r'@"?(_Z[\w.$]+)"?', lambda m: f"@f{short.setdefault(m[1], str(len(short)))}", text
+    )
+    return integrators_alike(laid_out_as_here(text))
