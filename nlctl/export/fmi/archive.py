@@ -69,8 +69,8 @@ def fmu(
     tolerance : float, optional
         Of the integrator in Co-Simulation, unless an importer gives it another.
     platforms : sequence of str, optional
-        Of ``"linux"``, ``"windows"`` and ``"macos"``, which libraries are compiled for; without any the
-        FMU has its sources alone.
+        Of ``"linux"``, ``"windows"`` and ``"macos"``, which libraries are compiled for; without
+        any the FMU has its sources alone.
 
     Returns
     -------

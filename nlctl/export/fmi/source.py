@@ -90,7 +90,8 @@ def _sizes(model: Model) -> list[str]:
     rows, at, what = model.lowered.rows, model.places, model.happenings
     resets = sum(end - begin for _, begin, end in model.jumping)
     sizes = {
-        "STATES": rows["x"], "CONTINUOUS": len(model.continuous), "STILL": rows["x"] - len(model.continuous), "INPUTS": rows["u"],
+        "STATES": rows["x"], "CONTINUOUS": len(model.continuous),
+        "STILL": rows["x"] - len(model.continuous), "INPUTS": rows["u"],
         "OUTPUTS": rows["y"], "PARAMETERS": len(model.parameters), "ROOM": rows["c"],
         "SIGNS": rows["g"], "GUARDS": len(model.guards), "MEMORY": len(model.memory),
         "SAMPLED": len(model.sampled), "RESETS": resets, "SERIES": len(what.series),
