@@ -34,9 +34,9 @@ def step_times(path: Path, tolerance: float) -> np.ndarray:
     model.exitInitializationMode()
     do_step, pointer = model.dll.fmi3DoStep, ctypes.c_void_p
     do_step.argtypes = [pointer, ctypes.c_double, ctypes.c_double, ctypes.c_bool, *[pointer] * 4]
-    told = (ctypes.c_bool * 3)(), ctypes.c_double()
-    first = ctypes.addressof(told[0])
-    places = (first, first + 1, first + 2, ctypes.addressof(told[1]))
+    answers = (ctypes.c_bool * 3)(), ctypes.c_double()
+    first = ctypes.addressof(answers[0])
+    places = (first, first + 1, first + 2, ctypes.addressof(answers[1]))
     taken = np.zeros(COUNT)
     for k in range(COUNT):
         begin = time.perf_counter()

@@ -19,8 +19,7 @@ from nlctl.responses.time_response import as_response
 
 from ..report.document import Live
 from ..robustness.stl.formula import Always, And, Band, Eventually, Formula, Not
-from ..robustness.stl.limits import limits_of_requirements
-from ..robustness.stl.spec import Requirement
+from ..robustness.stl.spec import Requirement, limits_of_requirements
 from .study.histories import Histories
 
 __all__ = ["live_item", "live_numbers", "live_program"]
