@@ -27,7 +27,7 @@ def step_times(path: Path, tolerance: float) -> np.ndarray:
     said = fmpy.read_model_description(str(path))
     model = FMU3Slave(
         guid=said.guid, unzipDirectory=fmpy.extract(str(path)), instanceName="one",
-        modelIdentifier=said.coSimulation.modelIdentifier,
+        modelIdentifier="m",
     )  # fmt: skip
     model.instantiate()
     model.enterInitializationMode(startTime=0.0, tolerance=tolerance)

@@ -143,6 +143,16 @@ def test_inputs_move_it(tmp_path):
         np.testing.assert_allclose(run["y"], exact, rtol=0, atol=1e-8)
 
 
+def test_a_sampled_block_alone_has_no_rates(tmp_path):
+    """x[k+1] = x[k] / 2 + u with u = 2: 4 (1 - 2^-k), held from sample to sample."""
+    law = ct.ss([[0.5]], [[1.0]], [[1.0]], 0, 0.1, name="law", inputs="u", outputs="y")
+    loop = nlctl.interconnect({"law": nlctl.sampled(law)}, inputs="u", outputs="y")
+    path = fmu(loop, tmp_path / "law.fmu", name="law", platforms=["linux"])
+    for kind in KINDS:
+        run, _ = simulated(path, kind, 1.0, points=10, start_values={"u": 2.0})
+        np.testing.assert_array_equal(run["y"], 4.0 * (1.0 - 0.5 ** np.arange(11)))
+
+
 def test_the_same_diagram_is_the_same_file(tmp_path):
     one, other = (
         fmu(linear()[0], tmp_path / name, platforms=["linux"]) for name in ("a.fmu", "b.fmu")
