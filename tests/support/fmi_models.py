@@ -58,12 +58,23 @@ def sampled_pid():
     )  # fmt: skip
 
 
-def with_backlash():
+def with_delay():
+    """A computer whose outputs follow two and a half samples later."""
+    plant = ct.ss([[0, 1], [-1, -0.5]], [[0], [1]], [[1, 0]], 0, inputs="u", outputs="y",
+                  name="plant")  # fmt: skip
+    law = ct.ss(1.0, 0.1, -0.3, -0.5, 0.1, inputs="y", outputs="u", name="law")
+    loop = nlctl.interconnect(
+        {"plant": plant, "law": nlctl.sampled(law, delay=0.25)}, outputs=["y", "u"]
+    )
+    return loop, {"plant.x[0]": 1.0}, 5.0
+
+
+def with_backlash(actuator=nlctl.Backlash):
     plant = ct.ss([[0, 1], [-1, -0.5]], [[0], [1]], [[1, 0]], 0, inputs="v", outputs="y",
                   name="plant")  # fmt: skip
     drive = ct.nlsys(None, lambda t, x, u, p: 2.5 * np.sin(1.3 * t) - 0.5 * u[0], inputs=["y"],
                      outputs=["u"], name="drive")  # fmt: skip
-    gap = nlctl.block(nlctl.Backlash(), "gap")
+    gap = nlctl.block(actuator(), "gap")
     return (
         nlctl.interconnect({"drive": drive, "gap": gap, "plant": plant}, outputs=["y", "v"]),
         {},
@@ -99,6 +110,9 @@ MODELS = {
     "backlash": with_backlash,
     "kicked": kicked,
     "relay": with_relay,
+    "delay of a computer": with_delay,
+    "Preisach": lambda: with_backlash(nlctl.actuators.Preisach),
+    "plays": lambda: with_backlash(nlctl.actuators.PrandtlIshlinskii),
 }
 
 
