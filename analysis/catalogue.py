@@ -34,13 +34,13 @@ def _modules() -> list[Any]:
 
 def block_records() -> dict[str, type]:
     """Return every block record of nlctl by name."""
-    found = {}
+    records = {}
     for module in _modules():
         for name in module.__all__:
             thing = getattr(module, name)
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):
-                found[name] = thing
-    return found
+                records[name] = thing
+    return records
 
 
 def named_block(name: str) -> type:
@@ -63,18 +63,18 @@ def block_summaries() -> dict[str, dict[str, str]]:
 
 def function_summaries() -> dict[str, dict[str, str]]:
     """Return the first line of each function that makes blocks: ``{group: {name: line}}``."""
-    found = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
-    return {group: lines for group, lines in found.items() if lines}
+    summaries = {group: _summaries(group, _is_function) for group in _OF_FUNCTIONS}
+    return {group: lines for group, lines in summaries.items() if lines}
 
 
 def paper_summaries() -> dict[str, str]:
     """Return the first line of each paper's module: ``{name: line}``."""
-    found = {}
+    summaries = {}
     for name in public_names("papers"):
         module = Path(NLCTL_FOLDER, "papers", f"{name}.py")
         said = ast.get_docstring(ast.parse(module.read_bytes())) or ""
-        found[name] = said.partition("\n")[0]
-    return found
+        summaries[name] = said.partition("\n")[0]
+    return summaries
 
 
 def making_function(name: str) -> Any:
@@ -85,13 +85,13 @@ def making_function(name: str) -> Any:
 
 def _summaries(group: str, chosen: Callable[[ast.stmt], bool]) -> dict[str, str]:
     """Return what is chosen of the public names of a module, or of a package and its rooms."""
-    found = {
+    summaries = {
         node.name: (ast.get_docstring(node) or "").partition("\n")[0]
         for path in (sorted(Path(NLCTL_FOLDER, group).rglob("*.py")) or [Path(face(group))])
         for node in ast.parse(path.read_bytes()).body
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and chosen(node)
     }
-    return {name: found[name] for name in public_names(group) if name in found}
+    return {name: summaries[name] for name in public_names(group) if name in summaries}
 
 
 def _is_record(node: ast.stmt) -> bool:

@@ -40,7 +40,7 @@ class ControllerGuide:
     code : str
         One line that makes it.
     instead : tuple of str
-        Names of `nlctl` that may stand in the place of a piece of it.
+        Names of `nlctl` that may replace a piece of it.
     """
 
     name: str

@@ -26,9 +26,9 @@ __all__ = [
     "checks_of",
     "checks_section",
     "headline",
+    "in_sentences",
     "proof_check",
     "proof_of",
-    "told",
 ]
 
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
@@ -73,26 +73,26 @@ def headline(checks: Sequence[LoopCheck]) -> Headline:
     )
 
 
-def told(checks: Sequence[LoopCheck]) -> str:
+def in_sentences(checks: Sequence[LoopCheck]) -> str:
     """Return what was checked in a sentence, first what does not hold or is not known."""
     parts = (
         ("Does not hold", "fail"), ("Not known", "caution"), ("Checked, and it holds", "pass"),
     )  # fmt: skip
-    found = []
+    sentences = []
     for words, status in parts:
         these = [c.what[0].lower() + c.what[1:] for c in checks if c.status == status]
-        found += [f"{words}: {'; '.join(these)}."] * bool(these)
-    return " ".join(found)
+        sentences += [f"{words}: {'; '.join(these)}."] * bool(these)
+    return " ".join(sentences)
 
 
-def proof_check(found: Ledger) -> LoopCheck:
+def proof_check(ledger: Ledger) -> LoopCheck:
     """Return whether the proof's statements, corrected where they can be, hold along the run."""
-    lines = [line for line in found.lines if line.reading == "corrected"]
-    kept = f"{len(lines) - len(found.violated)} of {len(lines)} hold"
+    lines = [line for line in ledger.lines if line.reading == "corrected"]
+    kept = f"{len(lines) - len(ledger.violated)} of {len(lines)} hold"
     return LoopCheck(
         what="The lines of the proof, corrected where they can be, hold along the run",
         found=kept,
-        status={"violated": "fail", "undecided": "caution"}.get(found.answer, "pass"),
+        status={"violated": "fail", "undecided": "caution"}.get(ledger.answer, "pass"),
     )
 
 
@@ -125,8 +125,8 @@ def _engine(loop: Any, response: Any, params: Mapping[str, Any]) -> Iterator[Loo
         yield LoopCheck(what=what, found="python-control ran them itself", status="pass")
         return
     steps = f"{counted(run.accepted, 'step')}, {counted(run.events, 'event')}"
-    found = f"machine code was compared with them along the run, which took {steps}"
-    yield LoopCheck(what=what, found=found, status="pass")
+    finding = f"machine code was compared with them along the run, which took {steps}"
+    yield LoopCheck(what=what, found=finding, status="pass")
     reading = native.compile(loop, params=dict(params))
     what = "Steps end where equations switch"
     opaque = list(called(reading))
@@ -134,8 +134,8 @@ def _engine(loop: Any, response: Any, params: Mapping[str, Any]) -> Iterator[Loo
         yield LoopCheck(what=what, found=f"not known of: {'; '.join(opaque)}", status="caution")
     else:
         number = counted(run.conditions, "condition")
-        found = f"{number} of the equations located" if run.conditions else "nothing switches"
-        yield LoopCheck(what=what, found=found, status="pass")
+        finding = f"{number} of the equations located" if run.conditions else "nothing switches"
+        yield LoopCheck(what=what, found=finding, status="pass")
 
 
 def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
@@ -153,11 +153,11 @@ def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck
     scale = np.maximum(np.ptp(response.y, axis=1), np.finfo(float).tiny)
     off = np.max(np.abs(again.y - response.y), axis=1) / scale
     worst = int(np.argmax(off))
-    found = (
+    finding = (
         f"at rtol {_TIGHTER * RTOL:.0e} {response.output_labels[worst]} differs most, by "
         f"{off[worst]:.1e} of its range"
     )
-    return LoopCheck(what=what, found=found, status="pass" if off[worst] <= _SAME else "caution")
+    return LoopCheck(what=what, found=finding, status="pass" if off[worst] <= _SAME else "caution")
 
 
 def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
@@ -179,5 +179,5 @@ def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
     except UsageError as error:
         return LoopCheck(what=what, found=str(error), status="not applicable")
     slowest = float(np.max(np.linalg.eigvals(A).real))
-    found = f"the largest real part of an eigenvalue of its linearisation is {slowest:.4g} 1/s"
-    return LoopCheck(what=what, found=found, status="pass" if slowest < 0 else "caution")
+    finding = f"the largest real part of an eigenvalue of its linearisation is {slowest:.4g} 1/s"
+    return LoopCheck(what=what, found=finding, status="pass" if slowest < 0 else "caution")

@@ -1,9 +1,9 @@
 """What a diagram computes, as data that can be kept and compared: another loop has another record.
 
-Each block is told by a key of its functions and of all that these reach (`nlctl.native.machine.
-fingerprint`), connections and values stand beside.  Independently of any code that is read,
-python-control's own rates and outputs are evaluated at a few points: they tell a loop from another
-one where a key cannot, such as a function of another language.
+Each block is identified by a key of its functions and of all that these reach
+(`nlctl.native.machine.fingerprint`); connections and values are recorded too.  Independently of
+any code that is read, python-control's own rates and outputs are evaluated at a few points: they
+distinguish two loops where a key cannot, such as that of a function of another language.
 """
 
 from __future__ import annotations
@@ -69,14 +69,14 @@ def facts_and_unseen(
     read = {p.path or p.system.name: _read(p.system) for p in leaves(system)}
     start = zip(state_names(system), initial_state(system).tolist(), strict=True)
     wired = [p for p in places(system) if isinstance(p.system, ct.InterconnectedSystem)]
-    found = {
+    contents = {
         "blocks": {path: key for path, (key, _) in read.items()},
         "wiring": {p.path or "diagram": _wiring(p.system) for p in wired},
         "parameters": _parameters(system),
         "initial_state": {name: repr(value) for name, value in start if value},
     }
-    unseen = {path: told for path, (_, told) in read.items() if told}
-    facts = {part: _steady(system, content) for part, content in found.items()}
+    unseen = {path: reasons for path, (_, reasons) in read.items() if reasons}
+    facts = {part: _steady(system, content) for part, content in contents.items()}
     return facts, _steady(system, unseen)
 
 
@@ -101,10 +101,10 @@ def unseen_parts(system: ct.InputOutputSystem) -> dict[str, list[str]]:
 
 
 def _read(system: System) -> tuple[str, list[str]]:
-    """Return a key of a block's equations, and what it cannot see; values are told elsewhere."""
+    """Return a key of a block's equations, and what it cannot see; values are not in it."""
     if isinstance(system, Sampled):
-        own = short_key(_read(system.inner)[0], *_parts(system)[1:])
-        return own, unseen_in(*_parts(system))
+        equations = short_key(_read(system.inner)[0], *_parts(system)[1:])
+        return equations, unseen_in(*_parts(system))
     key, unseen = content_of(*_parts(system))
     return key[:16], unseen
 
@@ -143,19 +143,19 @@ def _wiring(diagram: Any) -> str:
 
 def _parameters(system: Any) -> dict[str, str]:
     """Return all values, of blocks of any kind."""
-    found = {
+    values = {
         f"{place.path or place.system.name}.{name}": value
         for place in leaves(system)
         if not isinstance(within(place.system), Block)
         for name, value in dict(place.system.params or {}).items()
     }
-    found |= dict(system.params or {})
-    found |= {row.name: row.value for row in all_parameter_rows(system)}
-    return {name: value_text(value) for name, value in found.items()}
+    values |= dict(system.params or {})
+    values |= {row.name: row.value for row in all_parameter_rows(system)}
+    return {name: value_text(value) for name, value in values.items()}
 
 
 def value_text(value: object) -> str:
-    """Return what tells a parameter's value from another one."""
+    """Return a text that differs where values of a parameter differ."""
     if isinstance(value, bool | int | float | str | np.generic):
         return repr(value.item() if isinstance(value, np.generic) else value)
     try:
@@ -165,7 +165,7 @@ def value_text(value: object) -> str:
 
 
 def array_text(values: Any) -> str:
-    """Return what tells an array of numbers from another one."""
+    """Return a text that differs where arrays of numbers differ."""
     array = np.asarray(values, dtype="<f8")
     return f"{hashlib.sha256(array.tobytes()).hexdigest()[:16]} of shape {array.shape}"
 
@@ -177,10 +177,10 @@ def text_key(text: str) -> str:
 
 def loop_values(system: Any, end: float) -> dict[str, float | str]:
     """Return rates of states and outputs, each summed with weights over some points."""
-    start, width, own = initial_state(system), system.ninputs or 0, overridden(system)
+    start, width, simulated = initial_state(system), system.ninputs or 0, overridden(system)
     reach = np.maximum(1.0, abs(start)) / 4
     rates, outputs, raised = np.zeros(start.size), np.zeros(system.noutputs or 0), []
-    clocks = clocks_of(place.system for place in leaves(own))
+    clocks = clocks_of(place.system for place in leaves(simulated))
     everything = happening(frozenset(moments(clocks)))  # sampled blocks' next states as well
     with warnings.catch_warnings(), np.errstate(all="ignore"), everything:
         warnings.simplefilter("ignore")
@@ -189,7 +189,7 @@ def loop_values(system: Any, end: float) -> dict[str, float | str]:
             x = start + reach * spread[: start.size] * (k > 0)
             t, u = end * k / (_POINTS - 1), spread[start.size :]
             try:
-                rate, output = values_now(own, (t, x, u))
+                rate, output = values_now(simulated, (t, x, u))
             except Exception as error:  # whatever a function of the user's raises
                 raised.append(f"{type(error).__name__} at point {k}")
                 continue
@@ -222,8 +222,8 @@ def fact_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator
     for part, words in (("blocks", "the equations of '{}'"), ("wiring", "the wiring of '{}'")):
         for name in _changed(old[part], new[part]):
             here, there = name in old[part], name in new[part]
-            told = words.format(name) if here and there else f"'{name}'"
-            yield told + ("" if here and there else " is gone" if here else " is new")
+            words_of_part = words.format(name) if here and there else f"'{name}'"
+            yield words_of_part + ("" if here and there else " is gone" if here else " is new")
     for part, words, default in (("parameters", "{}", "absent"), ("initial_state", "{}(0)", "0.0")):
         for name in _changed(old[part], new[part]):
             was, now = (content.get(name, default) for content in (old[part], new[part]))

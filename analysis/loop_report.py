@@ -99,7 +99,7 @@ def loop_report(
     "The loop 'actuator' has 2 blocks and 1 state."
     """
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
-    found = [f"The loop '{loop.name}' has {blocks} and {states}."]
+    sentences = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = diagram_sections(loop, ("loop", "loop-equations"))
     given = {}
     if response is not None:
@@ -108,24 +108,24 @@ def loop_report(
         parts.append(run_section(loop, response, signals, given))
     moved = _moved(loop, response, given, live)
     parts += sections
-    _proved(loop, ledger, certificate, found, parts)
-    again = _Again(asked=requirements)
+    _proved(loop, ledger, certificate, sentences, parts)
+    studied = _Studied(requirements=requirements)
     if study is not None:
         _check_study(loop, study)
-        found.append(without_assumptions(study.verdict))
-        again = _again(study, requirements)
-        parts += _studied(study, again)
+        sentences.append(without_assumptions(study.verdict))
+        studied = _runs_again(study, requirements)
+        parts += _study_parts(study, studied)
     if moved is not None:
         item = live_item(
             moved, response, () if isinstance(live, bool) else live, signals=signals,
-            requirements=again.asked, histories=again.kept, command=repeat, base=given,
+            requirements=studied.requirements, histories=studied.kept, command=repeat, base=given,
         )  # fmt: skip
         parts = [_with_live(part, item) for part in parts]
     described, sources = ([], []) if study is None else methods(study)
     return Report(
         title=title,
         question=question or ("" if study is None else study.study.study.question),
-        verdict=verdict or " ".join(found),
+        verdict=verdict or " ".join(sentences),
         claims=[*claims, *([] if study is None else study_claims(study, "study-"))],
         sections=parts,
         command=command,
@@ -144,17 +144,17 @@ def _proved(
     loop: ct.InputOutputSystem,
     ledger: Ledger | None,
     certificate: Certificate | None,
-    found: list[str],
+    sentences: list[str],
     parts: list[Section],
 ) -> None:
-    """Add what was proved to what was found, and to the parts of the page."""
+    """Add what was proved to the sentences and to the parts of the page."""
     if ledger is not None:
         _check_record(loop, "ledger", ledger.loop, ledger.loop_facts)
-        found.append(ledger_text(ledger))
+        sentences.append(ledger_text(ledger))
         parts.append(ledger_section(ledger, "ledger", "The proof line by line"))
     if certificate is not None:
         _check_record(loop, "certificate", certificate.name, certificate.loop_facts)
-        found.append(f"Certificate: {certificate.verdict}.")
+        sentences.append(f"Certificate: {certificate.verdict}.")
         parts.append(certificate_section(certificate))
 
 
@@ -178,60 +178,60 @@ def _with_live(section: Section, item: Live) -> Section:
     return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
 
 
-class _Again(NamedTuple):
-    """What is asked of a loop, some runs of its study, and what was lost of that."""
+class _Studied(NamedTuple):
+    """Requirements on a loop, some runs of its study, and what was lost of that."""
 
-    asked: Sequence[Requirement]
+    requirements: Sequence[Requirement]
     kept: Histories | None = None
     lost: Sequence[str] = ()
 
 
-def _again(result: Result, requirements: Sequence[Requirement]) -> _Again:
-    """Return what a study asks, and some of its runs again."""
+def _runs_again(result: Result, requirements: Sequence[Requirement]) -> _Studied:
+    """Return what a study requires, and some of its runs again."""
     lost: list[str] = []
-    prepared = loop_again(result, tell=lost.append)
-    own = () if prepared is None else prepared.experiment.spec.requirements
-    return _Again((*requirements, *own), rows_again(result, prepared), lost)
+    prepared = loop_again(result, notify=lost.append)
+    of_study = () if prepared is None else prepared.experiment.spec.requirements
+    return _Studied((*requirements, *of_study), rows_again(result, prepared), lost)
 
 
-def _studied(result: Result, again: _Again) -> list[Section]:
+def _study_parts(result: Result, studied: _Studied) -> list[Section]:
     """Return a study as the part behind everything else."""
-    intro = [result.study.study.question or result.study.study.title, *again.lost]
+    intro = [result.study.study.question or result.study.study.title, *studied.lost]
     heading = Section(
         key="study",
         title=f"The study: {result.study.study.title}",
         items=[Paragraph(text=words) for words in intro],
     )
-    return [heading, *study_sections(result, again.kept, prefix="study-", level=3, limits=False)]
+    return [heading, *study_sections(result, studied.kept, prefix="study-", level=3, limits=False)]
 
 
 def _numbers(response: Any, study: Result | None, moved: WebProgram | None) -> dict[str, Any]:
     """Return all numbers for ``report.json``."""
-    told: dict[str, Any] = {} if study is None else {"study": numbers(study)}
+    content: dict[str, Any] = {} if study is None else {"study": numbers(study)}
     if moved is not None:
-        told["live"] = live_numbers(moved)
+        content["live"] = live_numbers(moved)
     if response is not None:
-        told["run"] = {
+        content["run"] = {
             name: {"least": y.min(), "largest": y.max(), "last": y[-1]}
             for name, y in outputs_of_run(response).items()
         }
-    return told
+    return content
 
 
 def _check_record(
     loop: ct.InputOutputSystem, what: str, name: str, facts: Mapping[str, Mapping[str, str]]
 ) -> None:
     """Refuse what has a record of another loop."""
-    if told := difference_text([*fact_differences(facts, loop_facts(loop))]):
+    if differing := difference_text([*fact_differences(facts, loop_facts(loop))]):
         raise DiagramError(
-            f"the {what} is of another loop '{name}' than '{loop.name}' ({told}): give the loop "
-            "that it was made of"
+            f"the {what} is of another loop '{name}' than '{loop.name}' ({differing}): give the "
+            "loop that it was made of"
         )
 
 
 def _check_study(loop: ct.InputOutputSystem, result: Result) -> None:
-    if told := diagram_differences(result.origin, loop):
+    if differing := diagram_differences(result.origin, loop):
         raise DiagramError(
-            f"the study in '{result.folder}' is of another loop than '{loop.name}' ({told}): give "
-            "the loop as the study's function makes it"
+            f"the study in '{result.folder}' is of another loop than '{loop.name}' ({differing}): "
+            "give the loop as the study's function makes it"
         )

@@ -38,10 +38,7 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
 
 
 def check_response(
-    loop: Any,
-    response: Any,
-    params: Mapping[str, Any] | None = None,
-    names: Sequence[str] = (),
+    loop: Any, response: Any, params: Mapping[str, Any] | None = None, names: Sequence[str] = ()
 ) -> None:
     """Refuse a response that is not one of a loop.
 
@@ -50,7 +47,7 @@ def check_response(
     come to those at the end, to a hundredth of how far each state moves and a thousandth of its
     largest sample so far.  What samples, delays or slides cannot begin anywhere: it is
     simulated as a whole, and states and outputs at twelve samples are compared.  A loop that
-    differs by less is not told from this one; a response that was simulated so coarsely that it
+    differs by less counts as this one; a response that was simulated so coarsely that it
     is wrong by more is refused too.
     """
     params = own_parameters(loop, response) if params is None else dict(params)
@@ -61,8 +58,8 @@ def check_response(
     if supplied_blocks(loop) or clocks_of(b.system for b in leaves(loop)):
         _check_span(loop, response, params, places, [*(names or loop.output_labels)])
         return
-    for place, own in own_outputs(loop, response, params):
-        _check_outputs(loop, response, place, own, names)
+    for place, outputs in own_outputs(loop, response, params):
+        _check_outputs(loop, response, place, outputs, names)
     ends = np.searchsorted(t, t + _SHORTEST * (t[last] - t[0]) * (1 - 1e-9))
     for a in places[:-1]:
         _check_span(loop, response, params, np.array([a, min(max(ends[a], a + 1), last)]), [])
@@ -75,8 +72,8 @@ def own_outputs(
     x, u, evaluate = _states(response), _inputs(loop, response), rates_and_outputs(loop, params)
     for place in np.unique(np.linspace(0, len(response.time) - 1, _PLACES).astype(int)):
         with np.errstate(all="ignore"):
-            _, own = evaluate(float(response.time[place]), x[:, place], u[:, place])
-        yield int(place), dict(zip(loop.output_labels, own.tolist(), strict=True))
+            _, y = evaluate(float(response.time[place]), x[:, place], u[:, place])
+        yield int(place), dict(zip(loop.output_labels, y.tolist(), strict=True))
 
 
 def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
@@ -97,18 +94,14 @@ def check_shape(loop: Any, response: Any, names: Sequence[str]) -> None:
 
 
 def _check_outputs(
-    loop: Any,
-    response: Any,
-    place: int,
-    own: Mapping[str, float],
-    names: Sequence[str],
+    loop: Any, response: Any, place: int, outputs: Mapping[str, float], names: Sequence[str]
 ) -> None:
     """Refuse outputs at one sample that are not the loop's at the same states."""
     for name in names or loop.output_labels:
         y = np.asarray(response.y[list(response.output_labels).index(name)], dtype=float)
         scale = float(np.nanmax(np.abs(y), initial=1.0))
-        if np.isfinite(y[place]) and not agree(y[place], own[name], OF_RESPONSES * scale):
-            raise _another(loop, name, y[place], response.time[place], own[name])
+        if np.isfinite(y[place]) and not agree(y[place], outputs[name], OF_RESPONSES * scale):
+            raise _another(loop, name, y[place], response.time[place], outputs[name])
 
 
 def _check_span(
@@ -121,20 +114,20 @@ def _check_span(
     """Simulate a loop from the first sample to the last; refuse other states, and named outputs."""
     span = slice(int(places[0]), int(places[-1]) + 1)
     whole, labels = _signals(response, names), [*loop.state_labels, *names]
-    told = whole[:, span]
-    moved = np.abs(np.diff(told, axis=1)).sum(axis=1)
+    given_states = whole[:, span]
+    moved = np.abs(np.diff(given_states, axis=1)).sum(axis=1)
     largest = np.abs(whole[:, : span.stop]).max(axis=1)
     allowed = (_FOLLOWS * moved + _LOCAL * largest + np.finfo(float).tiny)[:, None]
     places = places[1:] - places[0]
     for engine in _engines(loop):
-        own = _again(loop, response, span, params, engine, names)
-        wrong = ~(np.abs(own - told)[:, places] <= allowed)
+        simulated = _again(loop, response, span, params, engine, names)
+        wrong = ~(np.abs(simulated - given_states)[:, places] <= allowed)
         if not wrong.any():
             return
     first = int(np.argmax(wrong.any(axis=0)))
     row, k = int(np.argmax(wrong[:, first])), int(places[first])
     t = response.time[span]
-    raise _another(loop, labels[row], told[row, k], t[k], own[row, k], t[0])
+    raise _another(loop, labels[row], given_states[row, k], t[k], simulated[row, k], t[0])
 
 
 def _engines(loop: Any) -> tuple[str, ...]:
@@ -148,12 +141,7 @@ def _engines(loop: Any) -> tuple[str, ...]:
 
 
 def _again(
-    loop: Any,
-    response: Any,
-    span: slice,
-    params: Mapping[str, Any],
-    engine: str,
-    names: list[str],
+    loop: Any, response: Any, span: slice, params: Mapping[str, Any], engine: str, names: list[str]
 ) -> np.ndarray:
     """Return states, and named outputs, of a loop over some samples; NaN where it does not come."""
     u, steps = _inputs(loop, response)[:, span], count()
@@ -162,7 +150,7 @@ def _again(
         if next(steps) > _STEPS * (span.stop - span.start):
             raise DivergedError("too many steps", t)
 
-    found = np.full((len(response.x) + len(names), span.stop - span.start), np.nan)
+    rows = np.full((len(response.x) + len(names), span.stop - span.start), np.nan)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", EngineWarning)
         try:
@@ -174,9 +162,9 @@ def _again(
                 else input_output_response(*given, **common, engine=engine, progress=bounded)
             )
         except DivergedError:
-            return found
-    found[:] = _signals(run, names)
-    return found
+            return rows
+    rows[:] = _signals(run, names)
+    return rows
 
 
 def _signals(response: Any, names: Sequence[str]) -> np.ndarray:
@@ -200,11 +188,11 @@ def _inputs(loop: Any, response: Any) -> np.ndarray:
 
 
 def _another(
-    loop: System, name: str, told: float, t: float, own: float, since: float | None = None
+    loop: System, name: str, value: float, t: float, simulated: float, since: float | None = None
 ) -> DiagramError:
     begun = "" if since is None else f" from the states at t = {since:g} s"
     return DiagramError(
-        f"the response is not of '{loop.name}': {name} is {told:.6g} at t = {t:g} s, and the loop "
-        f"says {own:.6g}{begun}; give the parameters that it was run with as params={{...}}"
+        f"the response is not of '{loop.name}': {name} is {value:.6g} at t = {t:g} s, and the loop "
+        f"says {simulated:.6g}{begun}; give the parameters that it was run with as params={{...}}"
         + ("" if since is None else ", or simulate it with smaller tolerances")
     )

@@ -19,7 +19,7 @@ __all__ = [
     "tolerance_of",
 ]  # fmt: skip
 
-AT_LEAST = 5  # switches that are looked at
+AT_LEAST = 5  # switches that are examined
 WITHIN = 100.0  # tolerances that what is compared changes by in between
 SECOND_ORDER = (
     "what switches does not reach the rate of what is compared, and cannot hold it at 0 (second-"

@@ -49,9 +49,9 @@ def as_numbers(value: object) -> np.ndarray | None:
 def as_annotated(function: _F) -> _F:
     """Let a function say which argument is not what its annotation says, where a call fails."""
     if isinstance(function, type):
-        made: Any = function
-        made.__init__ = reporting(made.__init__, made.__name__)
-        return made
+        reported: Any = function
+        reported.__init__ = reporting(reported.__init__, reported.__name__)
+        return reported
     return reporting(function, function.__name__)
 
 
@@ -67,9 +67,9 @@ def reporting(
         except (UsageError, DivergedError):
             raise
         except Exception as error:
-            if _says_it(error) or (told := _complaint(function, who, args, kwargs, rule)) is None:
+            if _says_it(error) or (rest := _complaint(function, who, args, kwargs, rule)) is None:
                 raise
-            raise ParameterError(told) from error
+            raise ParameterError(rest) from error
 
     return called
 
@@ -105,7 +105,7 @@ def _complaint(function: Any, who: str, args: Any, kwargs: Any, rule: Any) -> st
     for name, value in bound.items():
         by_name = signature.parameters[name].kind is inspect.Parameter.VAR_KEYWORD
         pairs = value.items() if by_name else [(name, value)]
-        given += [(own, each, rules[name]) for own, each in pairs if name in rules]
+        given += [(shown_as, one, rules[name]) for shown_as, one in pairs if name in rules]
     for strict in (False, True):
         for name, value, kind in given:
             may_be_infinite = "inf" in repr(getattr(signature.parameters.get(name), "default", 0))
@@ -118,16 +118,16 @@ def _complaint(function: Any, who: str, args: Any, kwargs: Any, rule: Any) -> st
 @functools.cache
 def _annotations(function: Any) -> dict[str, Any]:
     """Return annotations as objects, those that can be found."""
-    found = {}
+    hints = {}
     for name, text in function.__annotations__.items():
         try:
-            found[name] = _evaluated(function, {name: text})[name]
+            hints[name] = _evaluated(function, {name: text})[name]
         except Exception:  # an annotation may be any expression
             continue
     for name, parameter in inspect.signature(function).parameters.items():
-        if parameter.kind is parameter.VAR_POSITIONAL and name in found:
-            found[name] = tuple[found[name], ...]
-    return found
+        if parameter.kind is parameter.VAR_POSITIONAL and name in hints:
+            hints[name] = tuple[hints[name], ...]
+    return hints
 
 
 def _evaluated(function: Any, annotations: dict[str, Any]) -> dict[str, Any]:
@@ -142,18 +142,18 @@ def _evaluated(function: Any, annotations: dict[str, Any]) -> dict[str, Any]:
 @functools.cache
 def _imported_for_types(module: str) -> dict[str, Any]:
     """Return what a module imports under ``if TYPE_CHECKING:``."""
-    home, found = sys.modules[module], {}
+    home, names = sys.modules[module], {}
     for node in ast.parse(inspect.getsource(home)).body:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             for line in node.body:
                 if isinstance(line, ast.Import):
-                    found |= {a.asname or a.name: importlib.import_module(a.name)
+                    names |= {a.asname or a.name: importlib.import_module(a.name)
                               for a in line.names}  # fmt: skip
                 if isinstance(line, ast.ImportFrom):
                     source = "." * line.level + (line.module or "")
-                    made = importlib.import_module(source, home.__package__)
-                    found |= {a.asname or a.name: getattr(made, a.name) for a in line.names}
-    return found
+                    imported = importlib.import_module(source, home.__package__)
+                    names |= {a.asname or a.name: getattr(imported, a.name) for a in line.names}
+    return names
 
 
 def _fits(value: object, rule: Any, strict: bool) -> bool:

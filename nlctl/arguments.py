@@ -131,9 +131,9 @@ def flag(who: str, name: str, value: object) -> bool:
 def of_type(who: str, name: str, value: object, kind: type[_T], how: str = "") -> _T:
     """Return a value of the kind that a function works on."""
     if not isinstance(value, kind):
-        made = f" ({how})" if how else ""
+        remedy = f" ({how})" if how else ""
         raise ParameterError(
-            f"{who} needs {name} to be of type {kind.__name__}{made}, got {type(value).__name__}"
+            f"{who} needs {name} to be of type {kind.__name__}{remedy}, got {type(value).__name__}"
         )
     return value
 

@@ -229,11 +229,11 @@ class Block(OwnParameters):
         prefix, fields = f"{self.name}.", declared_params(self.spec)
         if isinstance(params, Parameters):  # the diagram has sorted the names
             return {k.removeprefix(prefix): v for k, v in params.items() if k.startswith(prefix)}
-        own = {k.removeprefix(prefix): v for k, v in params.items()}
-        for name in own:
+        overrides = {k.removeprefix(prefix): v for k, v in params.items()}
+        for name in overrides:
             if base_name(name) not in fields:
                 raise unknown("parameter", name, fields, f"of block '{self.name}'")
-        return own
+        return overrides
 
     def taken(self, params: Mapping[str, Any]) -> Any:
         """Return what equations get as `p`; python-control asks for it before a run.
@@ -258,9 +258,9 @@ class Block(OwnParameters):
 
         Without any it is the record itself, which was checked when it was made.
         """
-        spec, own = self.spec, self._own(params)
-        if not (is_checked(spec) and all(v is getattr(spec, k, own) for k, v in own.items())):
-            spec = with_overrides(spec, own, self.name)
+        spec, given = self.spec, self._own(params)
+        if not is_checked(spec) or any(v is not getattr(spec, k, given) for k, v in given.items()):
+            spec = with_overrides(spec, given, self.name)
         for kind in ("inputs", "outputs", "states"):
             had, has = getattr(self, f"n{kind}"), len(getattr(spec, kind))
             if had != has:
@@ -360,13 +360,13 @@ def block(
     _check_timebase(spec, name, dt)
     if dt is None and spec.states:  # whatever python-control's default is
         dt = 0
-    made = Block(spec, name, **({} if dt is None else {"dt": dt}))
-    _probe(made)
+    system = Block(spec, name, **({} if dt is None else {"dt": dt}))
+    _probe(system)
     for kind, given in (("inputs", inputs), ("outputs", outputs)):
         if given is not None:
             names = renamed(f"block '{name}'", kind[:-1], list(getattr(spec, kind)), given)
-            made.update_names(**{kind: names})
-    return made
+            system.update_names(**{kind: names})
+    return system
 
 
 def _check_has_equations(spec: Any) -> None:
@@ -440,61 +440,61 @@ def memory_states(spec: Any) -> tuple[str, ...]:
     return tuple(getattr(spec, "memory", ())) if hasattr(spec, "commit") else ()
 
 
-def event_count(made: Block) -> int:
+def event_count(system: Block) -> int:
     """Return the number of switching functions that a block declares."""
-    return _count(made, "switching")
+    return _count(system, "switching")
 
 
-def guard_count(made: Block) -> int:
+def guard_count(system: Block) -> int:
     """Return the number of guards of a block."""
-    return _count(made, "guard")
+    return _count(system, "guard")
 
 
-def equation_now(made: Any, what: str, t: float, x: Any, u: Any) -> np.ndarray:
+def equation_now(system: Any, what: str, t: float, x: Any, u: Any) -> np.ndarray:
     """Return what an equation of a block says, of shape (k,), with the parameters it has now."""
-    found = getattr(made.spec, what)(t, x, u, current_parameters(made))
-    return np.asarray(found, dtype=float).reshape(-1)
+    values = getattr(system.spec, what)(t, x, u, current_parameters(system))
+    return np.asarray(values, dtype=float).reshape(-1)
 
 
-def _count(made: Block, what: str) -> int:
+def _count(system: Block, what: str) -> int:
     """Return how many numbers an equation of a block returns, 0 if there is none."""
-    if not hasattr(made.spec, what):
+    if not hasattr(system.spec, what):
         return 0
-    supplied = supplied_of(made)
+    supplied = supplied_of(system)
     further = 0 if supplied is None else supplied.rates
-    u = np.full((made.ninputs or 0) + further, 0.25)
-    found = getattr(made.spec, what)(0.0, default_state(made), u, current_parameters(made))
-    return int(np.size(found))
+    u = np.full((system.ninputs or 0) + further, 0.25)
+    values = getattr(system.spec, what)(0.0, default_state(system), u, current_parameters(system))
+    return int(np.size(values))
 
 
-def _probe(made: Block) -> None:
+def _probe(system: Block) -> None:
     """Call the equations once: sizes must match, and feedthrough must be declared truly."""
-    spec, who = made.spec, f"{type(made.spec).__name__} (block '{made.name}')"
-    if supplied_of(made) is not None:
+    spec, who = system.spec, f"{type(system.spec).__name__} (block '{system.name}')"
+    if supplied_of(system) is not None:
         return
-    x, u, p = default_state(made), np.full(made.ninputs or 0, 0.25), current_parameters(made)
+    x, u, p = default_state(system), np.full(system.ninputs or 0, 0.25), current_parameters(system)
     with np.errstate(all="ignore"):
-        results = [("output", spec.output, made.noutputs)]
-        if made.nstates:
-            results.append(("update", spec.update, made.nstates))
+        results = [("output", spec.output, system.noutputs)]
+        if system.nstates:
+            results.append(("update", spec.update, system.nstates))
         if memory_states(spec):
             results.append(("commit", spec.commit, len(memory_states(spec))))
         if hasattr(spec, "reset"):
-            results.append(("reset", spec.reset, made.nstates or 0))
-        for what, function, wanted in results:
+            results.append(("reset", spec.reset, system.nstates or 0))
+        for what, function, count in results:
             got = np.size(function(0.0, x, u, p))
-            if got != wanted:
-                names = made.output_labels if what == "output" else made.state_labels
+            if got != count:
+                names = system.output_labels if what == "output" else system.state_labels
                 raise BlockError(
-                    f"{who} returns {counted(got, 'value')} from {what}, needs {wanted}: "
+                    f"{who} returns {counted(got, 'value')} from {what}, needs {count}: "
                     f"{', '.join(names)}"
                 )
         # With NaN for an input, an output that it reaches turns NaN as well.
-        if not spec.feedthrough and made.ninputs:
+        if not spec.feedthrough and system.ninputs:
             before = np.asarray(spec.output(0.0, x, u, p), dtype=float)
             after = np.asarray(spec.output(0.0, x, u * np.nan, p), dtype=float)
             if not np.array_equal(before, after, equal_nan=True):
-                label = made.output_labels[int(np.argmax(before != after))]
+                label = system.output_labels[int(np.argmax(before != after))]
                 raise BlockError(
                     f"{who} declares feedthrough = False, but output '{label}' depends on the input"
                 )

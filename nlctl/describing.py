@@ -97,8 +97,8 @@ def describing_function(
     if A is None or not np.all(np.isfinite(A) & (A > 0)):
         raise ParameterError(f"describing_function needs amplitudes > 0, got {amplitudes!r}")
     rig, given = _rig(block), dict(params or {}) | {"sine.omega": omega, "harmonic.omega": omega}
-    found = [_settled(block, rig, float(a), omega, given) for a in np.ravel(A)]
-    return np.array(found, dtype=complex).reshape(A.shape)
+    values = [_settled(block, rig, float(a), omega, given) for a in np.ravel(A)]
+    return np.array(values, dtype=complex).reshape(A.shape)
 
 
 def _rig(block: Any) -> Compiled:
@@ -120,12 +120,12 @@ def _rig(block: Any) -> Compiled:
         _harmonic, None, inputs=["v"], outputs=["b", "a"], states=["b", "a"],
         params={"omega": 1.0}, name="harmonic",
     )  # fmt: skip
-    taken, made = (
+    input_, output = (
         f"{system.name}.{system.input_labels[0]}",
         f"{system.name}.{system.output_labels[0]}",
     )
     rig = interconnect(
-        [sine, system, harmonic], [[taken, "sine.u"], ["harmonic.v", made]],
+        [sine, system, harmonic], [[input_, "sine.u"], ["harmonic.v", output]],
         outlist=["harmonic.b", "harmonic.a"], name=f"describing function of {system.name}",
     )  # fmt: skip
     compiled = compile_diagram(rig)
@@ -173,7 +173,7 @@ class LimitCycle:
         Half of the peak-to-peak value of that signal in the simulated loop, and 2 pi over its
         period; NaN where the oscillation dies out, grows without bound, or does not settle.
     found : str
-        What became of it, in words.
+        How the run ended, in words.
 
     Examples
     --------
@@ -254,11 +254,11 @@ def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
     linear = ct.ss(
         linear.A, linear.B, linear.C, linear.D, inputs=["u"], outputs=["y"], name="linear"
     )
-    taken, made = _ends(block)
+    input_, output = _ends(block)
     loop = compile_diagram(
         interconnect(
             [linear, block],
-            [["linear.u", f"-{made}"], [taken, "linear.y"]],
+            [["linear.u", f"-{output}"], [input_, "linear.y"]],
             outlist=["linear.y"],
             outputs=["y"],
             name="cycle",
@@ -281,7 +281,7 @@ def _cycle(system: Any, block: Any, A: float, omega: float) -> LimitCycle:
 def _followed(
     loop: Compiled, state: np.ndarray, predicted: tuple[float, float], rises: Any
 ) -> dict[str, Any]:
-    """Return amplitude and frequency that a loop settles at, and what became of it."""
+    """Return amplitude and frequency that a loop settles at, and how it ended."""
     A, omega = predicted
     nothing = {"amplitude": np.nan, "omega": np.nan}
     before = np.array([np.nan, np.nan])

@@ -16,7 +16,7 @@ def equation(function: _Function) -> _Function:
     """Mark a function as an equation of a block.
 
     An equation is written once, in plain Python and NumPy, and read by everybody: python-control
-    calls it as it stands, the native engine compiles it, interval proofs evaluate it on balls and
+    calls it unchanged, the native engine compiles it, interval proofs evaluate it on balls and
     the reader finds it in the paper.
 
     What an equation may contain is what all of these understand: arithmetic, comparisons, NumPy
@@ -32,7 +32,7 @@ def equation(function: _Function) -> _Function:
     Returns
     -------
     callable
-        The function, unchanged; numba is told that compiled code may call it.
+        The function, unchanged; numba is informed that compiled code may call it.
 
     Raises
     ------

@@ -212,7 +212,7 @@ class ZenoError(DivergedError):
 
 
 class InexactWarning(UserWarning):
-    """Derivatives hold differences, of a function that is called as it stands: it says which.
+    """Derivatives hold differences, of a function that is called in Python: it says which.
 
     Examples
     --------
@@ -223,10 +223,10 @@ class InexactWarning(UserWarning):
     ...     lambda t, x, u, params: [u[0] - scipy.special.j0(x[0])],
     ...     None, states=1, inputs=1, outputs=1, name="plant",
     ... )
-    >>> with warnings.catch_warnings(record=True) as told:
+    >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
     ...     linear = nlctl.linearize(system, [1.0])
-    >>> print(told[0].category.__name__, linear.A.round(6))  # J_0' = -J_1
+    >>> print(caught[0].category.__name__, linear.A.round(6))  # J_0' = -J_1
     InexactWarning [[0.440051]]
     """
 
@@ -320,10 +320,10 @@ class EngineWarning(UserWarning):
     ...     return u
     >>> seen = []
     >>> block = ct.nlsys(None, remembers, inputs=1, outputs=1, name="block")
-    >>> with warnings.catch_warnings(record=True) as told:
+    >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
     ...     response = nlctl.input_output_response(block, [0.0, 1.0], 2.0)
-    >>> print(told[0].category.__name__, response.outputs)
+    >>> print(caught[0].category.__name__, response.outputs)
     EngineWarning [2. 2.]
     """
 
@@ -340,11 +340,11 @@ class CacheWarning(UserWarning):
     >>> with (
     ...     tempfile.TemporaryDirectory() as folder,
     ...     mock.patch.dict(os.environ, NLCTL_CACHE_DIR=folder),
-    ...     warnings.catch_warnings(record=True) as told,
+    ...     warnings.catch_warnings(record=True) as caught,
     ... ):
     ...     warnings.simplefilter("always")
     ...     os.chmod(folder, 0o777)
     ...     outputs = nlctl.compile(nlctl.block(nlctl.Gain(), "gain")).output(0, [], [1.0])
-    >>> {warning.category.__name__ for warning in told}
+    >>> {warning.category.__name__ for warning in caught}
     {'CacheWarning'}
     """

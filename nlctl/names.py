@@ -205,10 +205,10 @@ class Parameters(dict[str, Any]):
         for key in [k for k in self if "." in prefix + k and self._means_one(prefix + k, outer)]:
             dict.__setitem__(self, key, outer[prefix + key])
         for name in [n for n in outer if "." not in n or "[" in n]:  # few: bare ones, elements
-            own = name.removeprefix(prefix)
-            is_own = name.startswith(prefix) and base_name(own) in self
+            local = name.removeprefix(prefix)
+            is_own = name.startswith(prefix) and base_name(local) in self
             if "." not in name or (is_own and self._means_one(name, outer)):
-                dict.__setitem__(self, own, outer[name])
+                dict.__setitem__(self, local, outer[name])
 
     @staticmethod
     def _means_one(name: str, outer: Parameters) -> bool:
@@ -228,16 +228,16 @@ class Parameters(dict[str, Any]):
         if self.table is None and base in self:
             base = self.prefix + base  # seen from inside the diagram
         full = find_name("parameter", base, names, clashes)
-        own = full.removeprefix(self.prefix)
-        if not (full.startswith(self.prefix) and own in self):
+        local = full.removeprefix(self.prefix)
+        if not (full.startswith(self.prefix) and local in self):
             return  # another block's
         index = name[len(base_name(name)) :]
         if not index:
-            for key in [k for k in self if k != own and base_name(k) == own]:
+            for key in [k for k in self if k != local and base_name(k) == local]:
                 del self[key]  # the whole vector replaces elements set before
         if self.block is not None and not self.complete:
-            self.block.params = {own + index: value}
-        dict.__setitem__(self, own + index, value)
+            self.block.params = {local + index: value}
+        dict.__setitem__(self, local + index, value)
 
     def _known_names(self) -> tuple[Mapping[str, Any], set[str]]:
         """Return the names that overrides may use here, and those that are ambiguous."""
@@ -248,7 +248,7 @@ class Parameters(dict[str, Any]):
         }
 
     def _is_elsewhere(self, name: str) -> bool:
-        """Whether a name may mean a block elsewhere: python-control has not told all names yet."""
+        """Whether a name may mean a block elsewhere: python-control has not given all names yet."""
         is_own = self.block is not None and not self.complete
         known = is_own or self.table is not None or "." not in name
         if known or _same_block(base_name(name), self._known_names()[0]):

@@ -168,46 +168,46 @@ def record(cls: type[_T]) -> type[_T]:
         raise ParameterError(
             f"record needs a class of your own that is not one already, got {cls.__name__}"
         )
-    told = cls.__doc__ if cls.__dict__.get("__doc__") else ""
+    doc = cls.__doc__ if cls.__dict__.get("__doc__") else ""
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
-    made: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    made.__doc__ = _documented(made, told or "")
-    init, known = made.__init__, [f.name for f in dataclasses.fields(made) if f.init]
+    described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    described.__doc__ = _documented(described, doc or "")
+    init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
     @functools.wraps(init)
     def by_name(self: Any, *arguments: Any, **given: Any) -> None:
         for name in given:
             if name not in known:
-                raise unknown("parameter", name, known, f"of {made.__name__}", UnknownKeywordError)
+                raise unknown("parameter", name, known, f"of {cls.__name__}", UnknownKeywordError)
         init(self, *arguments, **given)
 
-    made.__init__ = reporting(by_name, made.__name__)
-    return made
+    described.__init__ = reporting(by_name, described.__name__)
+    return described
 
 
-def _documented(cls: Any, told: str) -> str:
+def _documented(cls: Any, doc: str) -> str:
     """Return the docstring of a record class with all fields in numpydoc's Parameters."""
-    margin = told.rpartition("\n")[2]  # what stands in front of the closing quotes
+    margin = doc.rpartition("\n")[2]  # what stands in front of the closing quotes
     margin = margin if margin.isspace() else ""
-    there = re.findall(r"^\s*(\w+(?:, \w+)*) :", told, re.M)
+    there = re.findall(r"^\s*(\w+(?:, \w+)*) :", doc, re.M)
     told_of = {name for names in there for name in names.split(", ")}
     lines = []
     for field in dataclasses.fields(cls):
         if field.name not in told_of:
             lines += _entry(field, declared_params(cls).get(field.name))
     if not lines:
-        return told
+        return doc
     entries = "".join(f"{margin}{line}\n" for line in lines)
-    own = re.search(r"^\s*Parameters\n\s*-+\n", told, re.M)
-    if own:
-        return told[: own.end()] + entries + told[own.end() :]
+    heading = re.search(r"^\s*Parameters\n\s*-+\n", doc, re.M)
+    if heading:
+        return doc[: heading.end()] + entries + doc[heading.end() :]
     section = f"{margin}Parameters\n{margin}----------\n{entries}{margin}"
-    first = re.search(r"^[ \t]*\w+\n[ \t]*-+$", told, re.M)  # a section that follows by numpydoc
+    first = re.search(r"^[ \t]*\w+\n[ \t]*-+$", doc, re.M)  # a section that follows by numpydoc
     if first:
-        return f"{told[: first.start()]}{section.rstrip()}\n\n{told[first.start() :]}"
-    return f"{told.rstrip()}\n\n{section}"
+        return f"{doc[: first.start()]}{section.rstrip()}\n\n{doc[first.start() :]}"
+    return f"{doc.rstrip()}\n\n{section}"
 
 
 def _entry(field: Any, rule: Param | None) -> list[str]:
@@ -329,9 +329,9 @@ def _check_bounds(who: str, name: str, value: object, rule: Param) -> None:
 def with_overrides(spec: Any, overrides: Mapping[str, Any], block: str) -> Any:
     """Return `spec` with parameters replaced, checked, and errors that name the block."""
     # A diagram hands every block all of its values each time: those that it has are checked.
-    own = {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
+    fields = {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
     whole = {
-        k: v for k, v in overrides.items() if "[" not in k and (v is None or v is not own.get(k))
+        k: v for k, v in overrides.items() if "[" not in k and (v is None or v is not fields.get(k))
     }
     try:
         changed = dataclasses.replace(spec, **whole) if whole else spec

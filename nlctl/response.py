@@ -227,10 +227,10 @@ def input_output_response(
         watched=watched_functions(stop_when, events),
         hold=hold,
     )
-    made = _computed(_held(unified(run)), "auto" if engine is None else engine)
-    if run.watched and made.success is not False:
-        check_moves(run.watched, (made.t, made.x, made.u), params)
-    return made
+    response = _computed(_held(unified(run)), "auto" if engine is None else engine)
+    if run.watched and response.success is not False:
+        check_moves(run.watched, (response.t, response.x, response.u), params)
+    return response
 
 
 def _held(run: RunArguments) -> RunArguments:
@@ -239,9 +239,9 @@ def _held(run: RunArguments) -> RunArguments:
     if run.hold == "foh" or not (is_system(system) and ct.isctime(system) and system.ninputs):
         return run
     times, inputs = held(run.times, input_array(system, run.inputs, run.times))
-    wanted = run.evaluation_times
-    wanted = run.times if isinstance(wanted, str) and wanted == "T" else wanted
-    return replace(run, times=times, inputs=inputs, evaluation_times=wanted)
+    evaluation = run.evaluation_times
+    evaluation = run.times if isinstance(evaluation, str) and evaluation == "T" else evaluation
+    return replace(run, times=times, inputs=inputs, evaluation_times=evaluation)
 
 
 @functools.cache

@@ -67,13 +67,13 @@ def supplying(outputs: Mapping[Any, SuppliedOutput]) -> Iterator[None]:
     Python-control then finds the signals of the present, and what arrives at these blocks is left
     in `outputs`, which goes by block.
     """
-    token = _NOW.set({id(made): output for made, output in outputs.items()})
+    token = _NOW.set({id(block): output for block, output in outputs.items()})
     try:
         yield
     finally:
         _NOW.reset(token)
 
 
-def supplied_now(made: Any) -> SuppliedOutput | None:
+def supplied_now(block: Any) -> SuppliedOutput | None:
     """Return what is supplied to a block now, None if nothing is."""
-    return (_NOW.get() or {}).get(id(made))
+    return (_NOW.get() or {}).get(id(block))

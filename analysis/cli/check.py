@@ -82,56 +82,56 @@ def repeat_command(
     return shlex.join(["nlctl", "check", example, "--until", f"{horizon:.17g}", *options])
 
 
-def worst_lines(found: Ledger) -> list[Line]:
+def worst_lines(ledger: Ledger) -> list[Line]:
     """Return one line for each run that violates one; if none does, |r| <= C_0 of (36).
 
     Margins of different lines have different units; that of (36) says which run is nearest to
     its bound.
     """
     first: dict[int, Line] = {}
-    for line in found.violated:
+    for line in ledger.violated:
         first.setdefault(line.member, line)
-    return list(first.values()) or [found["(36)"]]
+    return list(first.values()) or [ledger["(36)"]]
 
 
-def show_ledger(found: Ledger, console: Console) -> None:
+def show_ledger(ledger: Ledger, console: Console) -> None:
     """Print a ledger: a table on a terminal, elsewhere one line of text per statement."""
     if not console.is_terminal:
-        print(found)
+        print(ledger)
         return
-    title, *_ = str(found).splitlines()
+    title, *_ = str(ledger).splitlines()
     rows = Table("line", "status", "least margin", "at (s)", "statement", title=Text(title))
-    if found.members > 1:
+    if ledger.members > 1:
         rows.add_column("run")
-    for line in found.lines:
+    for line in ledger.lines:
         what = Text.assemble(line.statement, "\n", (line.evidence, "dim"))
         if line.reading == "paper":
             what.append("\nas in the paper", "italic")
         if line.follows:
             what.append(f"\n{line.follows}", "red" if line.reading == "corrected" else "yellow")
         cells = (line.key, Text(line.status, _STYLES.get(line.status, "")), _number(line.least))
-        who = (str(line.member),) if found.members > 1 else ()
+        who = (str(line.member),) if ledger.members > 1 else ()
         rows.add_row(*cells, _number(line.time), what, *who)
     console.print(rows)
 
 
-def ledger_summary(found: Ledger) -> str:
+def ledger_summary(ledger: Ledger) -> str:
     """Return the ledger in a few lines: bound, number of lines by status, what is violated."""
-    count = {status: sum(x.status == status for x in found.lines) for status in STATUSES}
-    told = ", ".join(f"{number} {status}" for status, number in count.items() if number)
-    paper = ", ".join(line.key for line in found.failing)
-    own = ", ".join(line.key for line in found.violated)
-    open_ = "; ".join(f"{line.key} ({line.evidence})" for line in found.undecided)
-    lost = found["run"]
+    count = {status: sum(x.status == status for x in ledger.lines) for status in STATUSES}
+    counts = ", ".join(f"{number} {status}" for status, number in count.items() if number)
+    paper = ", ".join(line.key for line in ledger.failing)
+    corrected = ", ".join(line.key for line in ledger.violated)
+    open_ = "; ".join(f"{line.key} ({line.evidence})" for line in ledger.undecided)
+    lost = ledger["run"]
     until = f" until it is lost at {lost.time:.5g} s" if lost.status == "violated" else ""
     lines = [
-        f"max |r| = {abs(found.max_r):.5g}{until}, least margin of |r| <= C_0: "
-        f"{found['(36)'].least:.5g}",
-        f"{len(found.lines)} lines: {told}",
-        f"violated: {own or 'none of the corrected statements'}",
+        f"max |r| = {abs(ledger.max_r):.5g}{until}, least margin of |r| <= C_0: "
+        f"{ledger['(36)'].least:.5g}",
+        f"{len(ledger.lines)} lines: {counts}",
+        f"violated: {corrected or 'none of the corrected statements'}",
     ]
     lines += [f"undecided: {open_}"] if open_ else []
-    lines += [f"false as the paper has it: {paper}"] if paper else []
+    lines += [f"false as printed: {paper}"] if paper else []
     return "\n".join(lines)
 
 

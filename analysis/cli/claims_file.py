@@ -14,8 +14,6 @@ from .printing import printable
 if TYPE_CHECKING:
     from ..report.document import Claim
 
-__all__ = ["Junit", "check_junit", "write_claims"]
-
 Junit = Annotated[
     Path | None,
     typer.Option(help="File to write: the claims as JUnit XML, a test case each."),

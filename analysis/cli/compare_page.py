@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from ..pages.compared import Compared
     from ..report.document import Report
 
-__all__ = ["compose_comparison"]
-
 
 def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
     """Compose the page of two reports or runs, which have been checked."""
@@ -25,8 +23,8 @@ def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Rep
     others = []
     if are_runs:
         others = [*long_table_differences(first, second, rtol)]
-        if told := origin_differences(first, second):
-            others.insert(0, f"The runs were not computed from the same: {told}")
+        if origins := origin_differences(first, second):
+            others.insert(0, f"The runs were not computed from the same: {origins}")
     command = ["nlctl", "compare", *(path.as_posix() for path in both)]
     command += ["--rtol", f"{rtol:g}"] * (rtol > 0) + ["--out", out.as_posix()]
     return comparison_page(

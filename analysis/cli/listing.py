@@ -23,8 +23,6 @@ from ..catalogue import (
 if TYPE_CHECKING:
     from ..studies.kind import Kind
 
-__all__ = ["show", "show_all"]
-
 _KINDS, _CONTROLLERS = "kinds", "controllers"
 _WIDEST = 120  # characters of a table that no terminal shows
 HELP = """
@@ -56,8 +54,8 @@ def show(name: str) -> None:
     if name == _CONTROLLERS:
         return _show_controllers()
     blocks = [block for group in block_summaries().values() for block in group]
-    functions = [made for group in function_summaries().values() for made in group]
-    known = {each.lower(): each for each in (*functions, *blocks)}
+    functions = [function for group in function_summaries().values() for function in group]
+    known = {entry.lower(): entry for entry in (*functions, *blocks)}
     name = known.get(name.removesuffix("()").lower(), name)
     if name in blocks:
         return _show_block(name, named_block(name))
@@ -104,8 +102,8 @@ def _show(name: str, thing: Any) -> None:
 def _show_group(title: str, lines: dict[str, str], width: int) -> None:
     console = _console()
     console.print(f"[bold]{title}[/bold]", highlight=False)
-    for name, told in lines.items():
-        line = Text(f"  {name:<{width}}  {told}")
+    for name, summary in lines.items():
+        line = Text(f"  {name:<{width}}  {summary}")
         cut = {"no_wrap": True, "overflow": "ellipsis"} if console.is_terminal else {}
         console.print(line, soft_wrap=not console.is_terminal, **cut)
 
@@ -117,8 +115,8 @@ def _show_controllers() -> None:
     console = _console()
     for guide in GUIDES:
         console.print(f"[bold]{guide.name}[/bold]", highlight=False)
-        for key, told in rows_of(guide).items():
-            console.print(Text(f"  {key:<9} {told}"), soft_wrap=True)
+        for key, text in rows_of(guide).items():
+            console.print(Text(f"  {key:<9} {text}"), soft_wrap=True)
 
 
 def _show_block(name: str, record: type) -> None:
@@ -141,9 +139,9 @@ def _signals(record: type) -> str:
     from nlctl.errors import UsageError
 
     try:
-        made = record()
-        states = f"; states {', '.join(made.states)}" if made.states else ""
-        return f"({', '.join(made.inputs)}) -> ({', '.join(made.outputs)}){states}"
+        spec = record()
+        states = f"; states {', '.join(spec.states)}" if spec.states else ""
+        return f"({', '.join(spec.inputs)}) -> ({', '.join(spec.outputs)}){states}"
     except (UsageError, TypeError):
         return ""
 
@@ -166,38 +164,38 @@ def _show_function(name: str, function: Any) -> None:
     import inspect
 
     table = Table("argument", "default", "meaning", title=None)
-    told = _told_arguments(inspect.getdoc(function) or "")
+    meanings = _documented_arguments(inspect.getdoc(function) or "")
     rows: dict[tuple[str, str], list[str]] = {}
     for key, argument in inspect.signature(function).parameters.items():
         default = "needed" if argument.default is argument.empty else repr(argument.default)
-        rows.setdefault((default, told.get(key) or key), []).append(key)
+        rows.setdefault((default, meanings.get(key) or key), []).append(key)
     for (default, meaning), keys in rows.items():
         table.add_row(
             ", ".join(keys), Text(default), Text("" if meaning in keys else _plain(meaning))
         )
-    _show_table(f"{name}()", _summary(function), table, _made_signals(function))
+    _show_table(f"{name}()", _summary(function), table, _signals_of_system(function))
 
 
-def _told_arguments(docstring: str) -> dict[str, str]:
-    """Return what the section Parameters of a docstring says of each argument."""
+def _documented_arguments(docstring: str) -> dict[str, str]:
+    """Return the description of each argument in the section Parameters of a docstring."""
     section = docstring.partition("Parameters\n----------\n")[2].partition("\n\n")[0]
-    found: dict[str, str] = {}
+    meanings: dict[str, str] = {}
     names: list[str] = []
     for line in section.splitlines():
         if not line.startswith(" "):
             names = [name.strip(" *") for name in line.partition(" : ")[0].split(",")]
         else:
-            found |= {name: f"{found.get(name, '')} {line.strip()}".strip() for name in names}
-    return found
+            meanings |= {name: f"{meanings.get(name, '')} {line.strip()}".strip() for name in names}
+    return meanings
 
 
-def _made_signals(function: Any) -> str:
+def _signals_of_system(function: Any) -> str:
     """Return the signals of what a function makes of its defaults, if it makes anything of them."""
     from nlctl.errors import UsageError
 
     try:
-        made = function()
-        return f"({', '.join(made.input_labels)}) -> ({', '.join(made.output_labels)})"
+        system = function()
+        return f"({', '.join(system.input_labels)}) -> ({', '.join(system.output_labels)})"
     except (UsageError, TypeError, AttributeError):
         return ""
 
@@ -209,13 +207,13 @@ def _show_kind(name: str, kind: Kind) -> None:
         if key != "kind":
             default = "needed" if field.is_required() else repr(field.default)
             table.add_row(key, Text(default), Text(field.description or ""))
-    told = f"{_plain(kind.answers)}; claim: {_plain(kind.claims)}" if kind.claims else kind.answers
-    _show_table(name, told or kind.title, table)
+    about = f"{_plain(kind.answers)}; claim: {_plain(kind.claims)}" if kind.claims else kind.answers
+    _show_table(name, about or kind.title, table)
 
 
-def _show_table(name: str, told: str, table: Table, signals: str = "") -> None:
+def _show_table(name: str, summary: str, table: Table, signals: str = "") -> None:
     console = _console()
-    console.print(Text.assemble((name, "bold"), f"  {told}"))
+    console.print(Text.assemble((name, "bold"), f"  {summary}"))
     if signals:
         console.print(Text(f"  {signals}"))
     if table.row_count:
@@ -226,5 +224,5 @@ def _plain(markdown: str) -> str:
     return markdown.replace("`", "")
 
 
-def _summary(made: Any) -> str:
-    return (made.__doc__ or "").strip().splitlines()[0]
+def _summary(documented: Any) -> str:
+    return (documented.__doc__ or "").strip().splitlines()[0]

@@ -18,17 +18,17 @@ def named_loop(name: str) -> Any:
     if ":" in name:
         from ..studies.resolve import named_function  # takes a second
 
-        made = named_function(name, Path.cwd())()  # who types its name wants it called
+        loop = named_function(name, Path.cwd())()  # who types its name wants it called
     else:
         from nlctl.paper import named_example
 
         try:
-            made = named_example(name)()
+            loop = named_example(name)()
         except UsageError as error:
             raise ParameterError(f"{error}; {_OWN}") from None
-    if not is_system(made):
-        raise ParameterError(f"{name} needs to return a diagram, it returned {type(made).__name__}")
-    return made
+    if not is_system(loop):
+        raise ParameterError(f"{name} needs to return a diagram, it returned {type(loop).__name__}")
+    return loop
 
 
 _OWN = "a loop of your own is path/to/file.py:function or package.module:function"

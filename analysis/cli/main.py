@@ -33,8 +33,8 @@ LoopArgument = Annotated[
 ]
 
 
-def _told_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(asked: bool) -> None:
+    if asked:
         from nlctl._version import __version__
 
         print(f"nlctl {__version__}")
@@ -44,7 +44,7 @@ def _told_version(wanted: bool) -> None:
 @app.callback()
 def version(
     version: Annotated[
-        bool, typer.Option("--version", callback=_told_version, is_eager=True, help="Say which.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Say which.")
     ] = False,
 ) -> None:
     """Adaptive neural control of pure-feedback nonlinear systems with python-control."""
@@ -159,17 +159,17 @@ def check(
     run: Any = horizon
     if engine == "python-control":
         run, settings = interpreted_runs(diagram, horizon, start, params), {}
-    found = ledger(diagram, run, **settings, k=k, max_steps=steps)
+    lines = ledger(diagram, run, **settings, k=k, max_steps=steps)
     if json:
-        print(found.to_json())
+        print(lines.to_json())
     else:
-        show_ledger(found, Console())
-        print(ledger_summary(found))
-        for line in worst_lines(found) if ensemble else ():
+        show_ledger(lines, Console())
+        print(ledger_summary(lines))
+        for line in worst_lines(lines) if ensemble else ():
             print(f"run {line.member}, worst in {line.key}, again (with constants of its own):")
             print(f"  {repeat_command(loop, horizon, set_ or [], start, line.member, engine, k)}")
-    if found.answer in UNPROVED:
-        raise typer.Exit(UNPROVED[found.answer])
+    if lines.answer in UNPROVED:
+        raise typer.Exit(UNPROVED[lines.answer])
 
 
 @app.command()
@@ -179,10 +179,10 @@ def new(
     """Write a loop, a study of it and a test into a new folder; they run as they are."""
     from .starting import start_project
 
-    made = start_project(folder)
-    for path in made:
+    paths = start_project(folder)
+    for path in paths:
         say(path)
-    loop, study, test = (shlex.quote(path.as_posix()) for path in made)
+    loop, study, test = (shlex.quote(path.as_posix()) for path in paths)
     say(f"nlctl simulate {loop}:make --plot {shlex.quote(folder.as_posix())}/run.svg")
     say(f"nlctl report {loop}:make    # its page")
     say(f"nlctl report {study}    # the study, and its page")

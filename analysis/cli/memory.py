@@ -1,12 +1,10 @@
-"""What becomes of a run where memory is short: a message, and neither a trace nor a wait."""
+"""How a run ends where memory is short: with a message, and neither a trace nor a wait."""
 
 from __future__ import annotations
 
 import errno
 import mmap
 import os
-
-__all__ = ["TOO_LITTLE", "TO_BEGIN", "check_memory", "is_short_of_memory"]
 
 TOO_LITTLE = "this needs more memory than there is"
 TO_BEGIN = 1300 * 10**6
@@ -22,7 +20,7 @@ def check_memory(needed: int = TO_RUN) -> None:
     """Refuse to begin where the process may not have what a run takes (``ulimit -v``).
 
     Compilers of C++ end the process where they get no memory, and its threads may wait for others
-    that never began: neither can be told afterwards.
+    that never began: afterwards nobody can say which.
     """
     try:
         import resource

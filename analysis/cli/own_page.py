@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from ..report.document import Report
     from ..robustness.stl.spec import Requirement
 
-__all__ = ["compose_page", "is_loop_name", "is_paper_name", "live_words", "page_folder"]
-
 HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
 
 
@@ -47,31 +45,31 @@ def compose_page(
         from nlctl.export.web import check_linker
 
         check_linker()
-    made = simulated(name, settings, inputs, until, step)
+    run = simulated(name, settings, inputs, until, step)
     from ..loop_checks import (
         LoopCheck,
         checks_of,
         checks_section,
         headline,
+        in_sentences,
         proof_check,
         proof_of,
-        told,
     )
     from ..loop_report import loop_report
     from .terminal import progress_bar
 
     with progress_bar("checking the loop", 2) as advance:
-        checks = checks_of(made.loop, made.response, made.params)
+        checks = checks_of(run.loop, run.response, run.params)
         advance(1)
-        proof = proof_of(made.loop, until, made.start, made.params)
+        proof = proof_of(run.loop, until, run.start, run.params)
         advance(1)
     applies = not isinstance(proof, LoopCheck)
     every = [*checks, proof_check(proof) if applies else proof]
     page = loop_report(
-        made.loop,
-        title=made.loop.name,
-        response=made.response,
-        params=made.params,
+        run.loop,
+        title=run.loop.name,
+        response=run.response,
+        params=run.params,
         ledger=proof if applies else None,
         sections=[checks_section(every)],
         command=_command("report", name, settings, inputs, until, step)
@@ -80,7 +78,7 @@ def compose_page(
         requirements=requirements,
         repeat=shlex.split(_command("simulate", name, settings, inputs, until, step)),
     )
-    return replace(page, verdict=f"{page.verdict} {told(every)}", headline=headline(every))
+    return replace(page, verdict=f"{page.verdict} {in_sentences(every)}", headline=headline(every))
 
 
 def _requirements(texts: Sequence[str], until: float) -> list[Requirement]:

@@ -7,15 +7,12 @@ import re
 import sys
 from typing import Any
 
-__all__ = ["error_line", "in_json", "printable", "say"]
-
-
 _ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
 def printable(text: object) -> str:
     """Return a text with its control characters spelt out; lines and tabs stay."""
-    return _ORDERS.sub(lambda found: repr(found[0])[1:-1], str(text))
+    return _ORDERS.sub(lambda match: repr(match[0])[1:-1], str(text))
 
 
 def say(text: object = "") -> None:
@@ -31,4 +28,4 @@ def error_line(text: object) -> None:
 def in_json(content: Any) -> str:
     """Return content as JSON that is safe to print."""
     text = json.dumps(content, indent=1, ensure_ascii=False)
-    return _ORDERS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    return _ORDERS.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

@@ -9,13 +9,11 @@ from contextlib import contextmanager
 
 from .printing import error_line
 
-__all__ = ["progress_lines"]
-
 FIRST_LINE, NEXT_LINE = 2.0, 10.0  # s: what is done sooner needs no line
 
 
 @contextmanager
-def progress_lines(what: str, told: Callable[[], str]) -> Iterator[None]:
+def progress_lines(what: str, progress: Callable[[], str]) -> Iterator[None]:
     """Print what is being done after two seconds, and then every ten, until the body is done."""
     begun, done = time.monotonic(), threading.Event()
     shown = threading.Event()
@@ -27,7 +25,7 @@ def progress_lines(what: str, told: Callable[[], str]) -> Iterator[None]:
         pause = FIRST_LINE
         while not done.wait(pause):
             shown.set()
-            line(told())
+            line(progress())
             pause = NEXT_LINE
 
     thread = threading.Thread(target=watch, daemon=True)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
     from nlctl.errors import UsageError
 
-    from ..report.document import Claim
+    from ..report.document import Claim, Report
 
 Set = Annotated[
     list[str] | None,
@@ -144,30 +144,30 @@ def report(
         if (live or move) and (what is None or is_paper_name(str(what))):
             raise _no_live()
         if what is None:
-            made = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
+            written = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
         elif is_paper_name(str(what)):
             key = paper_key(str(what), "file, folder or paper")
-            made = _paper(key, out or Path("reports", key), jobs, far=far, **options)
+            written = _paper(key, out or Path("reports", key), jobs, far=far, **options)
         elif is_loop:
             run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE,
                    move or live, require or [])  # fmt: skip
-            made = _loop(str(what), run, out, **options)
+            written = _loop(str(what), run, out, **options)
         else:
-            made = _study(what, out, jobs, trust=trust, live=move or live, **options)
+            written = _study(what, out, jobs, trust=trust, live=move or live, **options)
         from ..report.typography import plain_text
 
-        say(plain_text(made.told))
-        finish_report(made.page, pdf=pdf, open_=open_)
-        write_claims(junit, made.title, made.claims)
-        if made.code:
-            raise typer.Exit(made.code)
+        say(plain_text(written.verdict))
+        finish_report(written.page, pdf=pdf, open_=open_)
+        write_claims(junit, written.title, written.claims)
+        if written.code:
+            raise typer.Exit(written.code)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Made:
+@dataclass(frozen=True)
+class WrittenPage:
     """A page that was written: its verdict, its claims, and the exit code of the command."""
 
-    told: str
+    verdict: str
     title: str
     claims: Sequence[Claim]
     page: Path
@@ -203,45 +203,46 @@ def _loop(
     interactive: bool,
     force: bool,
     stamp: Stamp,
-) -> Made:
+) -> WrittenPage:
     """Report a loop of the user's."""
     folder = out or page_folder(name)
     check_report_options(folder, pdf=pdf, force=force)
     from ..report.render import write_report
 
-    made = stamped(compose_page(name, *run), stamp)
-    page = write_report(made, folder, interactive=interactive, force=force)
-    code = int(not all(claim.holds for claim in made.claims))
-    return Made(told=made.verdict, title=made.title, claims=made.claims, page=page, code=code)
+    composed = stamped(compose_page(name, *run), stamp)
+    page = write_report(composed, folder, interactive=interactive, force=force)
+    code = int(not all(claim.holds for claim in composed.claims))
+    return _written(composed, page, code)
 
 
 def _paper(
     name: str, out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool,
     stamp: Stamp,
-) -> Made:  # fmt: skip
+) -> WrittenPage:  # fmt: skip
     """Reproduce a paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
         check_report_options(out, pdf=pdf, force=force)
         from ..papers import named_paper
         from ..report.render import write_report
-        from .study_report import tell
+        from .study_report import notify
         from .terminal import progress_bar
 
         reproduction = named_paper(name)
         reproduction.clear(out, force=force)
-        made = reproduction.compose(
-            out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, tell=tell
+        composed = reproduction.compose(
+            out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, notify=notify
         )
         options = " --far" * far + " --interactive" * interactive
-        report = stamped(replace(made.report, command=made.report.command + options), stamp)
+        report = stamped(replace(composed.report, command=composed.report.command + options), stamp)
         page = write_report(
-            report, out, interactive=interactive, force=force, pool=beside, drawn=made.drawn
+            report, out, interactive=interactive, force=force, pool=beside, drawn=composed.drawn
         )
-    return Made(
-        told=report.verdict, title=report.title, claims=report.claims, page=page,
-        code=int(not made.passed),
-    )  # fmt: skip
+    return _written(report, page, int(not composed.passed))
+
+
+def _written(report: Report, page: Path, code: int) -> WrittenPage:
+    return WrittenPage(report.verdict, report.title, report.claims, page, code)
 
 
 def _import_ahead(name: str) -> None:
@@ -277,7 +278,7 @@ def _study(
     trust: bool,
     stamp: Stamp,
     live: bool | Sequence[str],
-) -> Made:
+) -> WrittenPage:
     """Report a study."""
     from ..pages.study.claims import claims
     from .study_report import report_study
@@ -307,7 +308,7 @@ def _study(
         if study.suffix == ".toml":
             error_line("nlctl: incomplete; the same command resumes")
     title = result.study.study.title
-    return Made(told=result.verdict, title=title, claims=claims(result), page=page, code=code)
+    return WrittenPage(result.verdict, title, claims(result), page, code)
 
 
 def compare_command(
@@ -332,8 +333,8 @@ def compare_command(
         from ..report.render import write_report
         from .compare_page import compose_comparison
 
-        made = compose_comparison(first, second, out, rtol)
-        page = write_report(made, out, force=force)
+        comparison = compose_comparison(first, second, out, rtol)
+        page = write_report(comparison, out, force=force)
         with redirect_stdout(sys.stderr):  # what differs, alone, is on stdout
             finish_report(page, pdf=pdf, open_=open_)
     if not same:
@@ -379,7 +380,7 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
 def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     """Print where the page is; print it to PDF and show it, as wanted."""
     from ..report.browser import open_page, write_pdf
-    from ..studies.whole.page import recorded_print
+    from ..studies.intact.page import recorded_print
 
     say(page)
     if pdf:
@@ -408,29 +409,29 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
         for path in (p for p in paths if p in without or not p.exists()):
             raise _no_report(path)
     are_runs = all((path / "results.json").exists() for path in paths)
-    found: list[Any] = (
+    differences: list[Any] = (
         run_differences(first, second)
         if as_runs
         else compare_contents(first, second, rtol=rtol, common=are_runs)
     )
     if are_runs and not as_runs:
-        found += long_table_differences(first, second, rtol)
-    if as_runs and (told := origin_differences(first, second)):
-        error_line(f"nlctl: the two runs were not computed from the same: {told}")
+        differences += long_table_differences(first, second, rtol)
+    if as_runs and (origins := origin_differences(first, second)):
+        error_line(f"nlctl: the two runs were not computed from the same: {origins}")
     if as_json:
-        told = [text if isinstance(text, str) else vars(text) for text in found]
-        print(in_json(told))
-        return not found
-    for difference in found:
+        origins = [text if isinstance(text, str) else vars(text) for text in differences]
+        print(in_json(origins))
+        return not differences
+    for difference in differences:
         say(difference)
-    say(counted(len(found), "difference") if found else "no difference")
-    return not found
+    say(counted(len(differences), "difference") if differences else "no difference")
+    return not differences
 
 
 def _check_run(path: Path) -> None:
     """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
-    from ..studies.whole.page import check_page, is_run
+    from ..studies.intact.page import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()
@@ -441,7 +442,7 @@ def _check_run(path: Path) -> None:
 
 
 def _no_report(path: Path) -> UsageError:
-    """Return what is said of a path that cannot be compared, with the next step."""
+    """Return why a path cannot be compared, with the next step."""
     from nlctl.errors import UsageError
 
     if not path.exists():
@@ -461,7 +462,7 @@ def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     from ..pages.trend import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
-    from ..studies.whole.page import check_page
+    from ..studies.intact.page import check_page
     from .terminal import check_writable
 
     check_writable(folder)

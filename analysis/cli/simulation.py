@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Simulated", "simulated"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Simulated:

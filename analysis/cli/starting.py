@@ -9,8 +9,6 @@ from string import Template
 from nlctl.errors import ParameterError
 from nlctl.host.files import replace_file
 
-__all__ = ["start_project"]
-
 _FILES = {"loop.py": "loop.py", "study.toml": "{name}.toml", "test_loop.py": "test_loop.py"}
 
 
@@ -24,10 +22,10 @@ def start_project(folder: Path) -> list[Path]:
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ParameterError(f"'{folder}' exists already: give the name of a new folder")
     folder.mkdir(parents=True, exist_ok=True)
-    made = []
+    paths = []
     for source, target in _FILES.items():
         text = (Path(__file__).parent / "starter" / f"{source}.txt").read_text(encoding="utf-8")
         content = Template(text).substitute(name=name).encode()
         path = folder / target.format(name=name)
-        made.append(replace_file(path, lambda file, content=content: file.write(content)))
-    return made
+        paths.append(replace_file(path, lambda file, content=content: file.write(content)))
+    return paths

@@ -82,7 +82,7 @@ def run_command(
     A study file names code, which is run: run the studies of those whose programs you would run.
 
     Exit codes: 0 all claims are shown, 1 a claim is refuted, 5 none is refuted but not all are
-    shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: go on with
+    shown yet, 2 an invalid study, 3 an error in a function of yours, 4 incomplete: continue with
     --resume.
     """
     options = [part for text in set_ or [] for part in ("--set", text)]
@@ -92,7 +92,7 @@ def run_command(
     options += [] if junit is None else ["--junit", str(junit)]
     options += ["--force"] * force + ["--trust"] * trust
     folder = run_folder(study) if out is None else out
-    with exit_codes(json), _told_how_to_go_on(study, options, folder, resume, json):
+    with exit_codes(json), _saying_how_to_resume(study, options, folder, resume, json):
         check_memory(TO_BEGIN)
         from ..studies import read_study
         from ..studies import run as run_study
@@ -138,17 +138,17 @@ def validate(
         check_memory()
         check_study_path(study)
         file = asking(lambda trust: read_study(study, set_ or [], trust=trust), trust)
-        found = plan(file, jobs or None)
+        runs = plan(file, jobs or None)
         if json:
-            content = {"valid": True, **vars(found), "total": found.total}
+            content = {"valid": True, **vars(runs), "total": runs.total}
             print(in_json(content))
             return
         say(f"{study} is a valid study.")
-        for key, count in found.runs.items():
-            say(f"  {key}: {'at most ' if key in found.at_most else ''}{counted(count, 'run')}")
+        for key, count in runs.runs.items():
+            say(f"  {key}: {'at most ' if key in runs.at_most else ''}{counted(count, 'run')}")
         say(
-            f"In all {counted(found.total, 'run')}, about {_duration(found.seconds)} on this "
-            f"machine, and at most about {found.size / 1e6:.2g} MB on disk."
+            f"In all {counted(runs.total, 'run')}, about {_duration(runs.seconds)} on this "
+            f"machine, and at most about {runs.size / 1e6:.2g} MB on disk."
         )
 
 
@@ -164,7 +164,7 @@ def replay_command(
 ) -> None:
     """Run one row again, compare it with the stored one bit for bit, and plot its signals.
 
-    The loop is made anew: the code that the study names is run.
+    The loop is built again: the code that the study names is run.
     """
     with exit_codes(json):
         check_memory(TO_BEGIN)
@@ -176,14 +176,14 @@ def replay_command(
             check_figure(plot)
         check_run_path(folder)
         check_memory()
-        made = asking(lambda trust: replay_row(folder, row, part, trust=trust), trust)
+        replayed = asking(lambda trust: replay_row(folder, row, part, trust=trust), trust)
         if plot is not None:
-            write_figure(plot, replay_figure(made))
+            write_figure(plot, replay_figure(replayed))
         if json:
-            print(in_json(made.plain()))
+            print(in_json(replayed.plain()))
         else:
-            say(made)
-        if made.differences:
+            say(replayed)
+        if replayed.differences:
             raise typer.Exit(FAILS)
 
 
@@ -191,25 +191,27 @@ def verify_command(
     folder: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run.")],
     json: Json = False,
 ) -> None:
-    """Say whether the folder of a run is whole: every file as the run has written it.
+    """Say whether the folder of a run is intact: every file as the run has written it.
 
-    Nothing is run or imported.  Exit codes: 0 it is whole, 1 something is missing, edited or too
+    Nothing is run or imported.  Exit codes: 0 it is intact, 1 something is missing, edited or too
     much, 2 it is not the folder of a run that has come to an end.
     """
     with exit_codes(json):
         from ..studies import verify
 
         check_run_path(folder)
-        found = verify(folder)
+        verified = verify(folder)
         if json:
-            content = {key: getattr(found, key) for key in ("is_whole", "files", "rows")}
-            lists = {k: list(getattr(found, k)) for k in ("analyses", "done", "problems", "others")}
+            content = {key: getattr(verified, key) for key in ("is_intact", "files", "rows")}
+            lists = {
+                k: list(getattr(verified, k)) for k in ("analyses", "done", "problems", "others")
+            }
             print(in_json(content | lists))
         else:
-            say(found)
-            for name in found.others:
+            say(verified)
+            for name in verified.others:
                 say(f"  '{name}' is not a part of the run")
-        if not found.is_whole:
+        if not verified.is_intact:
             raise typer.Exit(FAILS)
 
 
@@ -240,12 +242,12 @@ def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
     from nlctl.errors import UsageError
 
-    from ..studies.whole.page import is_run
+    from ..studies.intact.page import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))
-        told = f": look at that run with 'nlctl report {run}'" if is_run(study) else ""
-        raise UsageError(f"'{study}' is a folder, and a study is a file (.toml){told}")
+        advice = f": look at that run with 'nlctl report {run}'" if is_run(study) else ""
+        raise UsageError(f"'{study}' is a folder, and a study is a file (.toml){advice}")
 
 
 def check_run_path(run: Path) -> None:
@@ -262,7 +264,7 @@ def run_folder(study: Path) -> Path:
 
 
 @contextmanager
-def _told_how_to_go_on(
+def _saying_how_to_resume(
     study: Path, options: list[str], folder: Path, resume: bool, json: bool
 ) -> Iterator[None]:
     """Print the command that resumes, where a run ends early and may be continued.
@@ -322,15 +324,15 @@ def exit_codes(json: bool) -> Iterator[None]:
 
 def _fail(error: Exception, json: bool) -> None:
     """Print one message: as JSON where that was asked for."""
-    told = (
+    message = (
         f"{TOO_LITTLE} ({error or type(error).__name__})"
         if is_short_of_memory(error)
         else str(error)
     )
     if not json:
-        error_line(f"nlctl: {told}")
+        error_line(f"nlctl: {message}")
         return
-    content: dict[str, Any] = {"error": told}
+    content: dict[str, Any] = {"error": message}
     problems = getattr(error, "problems", None)
     if problems is not None:
         content |= {"valid": False, "problems": [problem.plain() for problem in problems]}
@@ -396,7 +398,7 @@ def _show(result: Any, json: bool) -> None:
     for finding in result.findings:
         say(f"\n{finding.title}\n  {finding.sentence}")
         if finding.claim:
-            say(f"  Claim: {finding.claim}: {finding.told}.")
+            say(f"  Claim: {finding.claim}: {finding.outcome}.")
     say(f"\n{result.folder}")
 
 

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from ..studies.result import Result
     from ..studies.run import Watch
 
-__all__ = ["NO_STAMP", "Stamp", "report_study", "stamped", "tell"]
-
-
 Stamp = Mapping[str, str]  # revision and date, as far as they are given
 NO_STAMP: Stamp = MappingProxyType({})
 
@@ -53,7 +50,7 @@ def report_study(
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result
-    from ..studies.whole.page import recorded_page
+    from ..studies.intact.page import recorded_page
 
     if live:
         from nlctl.export.web import check_linker
@@ -65,22 +62,22 @@ def report_study(
         else load_result(path, trust=trust)
     )
     command = f"nlctl report {shlex.quote(path.as_posix())}" + " --interactive" * interactive
-    prepared = loop_again(result, trust=trust, tell=tell)
+    prepared = loop_again(result, trust=trust, notify=notify)
     loop = None if prepared is None else loop_of(prepared)
     published = PUBLISHED.get(result.study.loop)
-    kept = rows_again(result, prepared, threads)
-    made = study_report(result, kept, command + live_words(live), loop, published)
+    runs = rows_again(result, prepared, threads)
+    report = study_report(result, runs, command + live_words(live), loop, published)
     if live and prepared is not None:
         from ..pages.study.live import with_study_live
 
-        made = with_study_live(made, result, prepared, kept, [] if live is True else live)
-    made = stamped(made, stamp)
+        report = with_study_live(report, result, prepared, runs, [] if live is True else live)
+    report = stamped(report, stamp)
     if out is not None:  # the data stay with the run
         data = Path(os.path.relpath(result.folder, out))
-        made = replace(made, files={(data / k).as_posix(): v for k, v in made.files.items()})
+        report = replace(report, files={(data / k).as_posix(): v for k, v in report.files.items()})
     folder = result.folder if out is None else out
     with recorded_page(folder) if _is_in_run(folder, result) else nullcontext():
-        return write_report(made, folder, interactive=interactive, force=force), result
+        return write_report(report, folder, interactive=interactive, force=force), result
 
 
 def _is_in_run(page: Path, result: Result) -> bool:
@@ -97,6 +94,6 @@ def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trus
     return run(file, folder, resume=True, force=force, threads=threads, **how)
 
 
-def tell(words: str) -> None:
+def notify(words: str) -> None:
     """Print what a page will lack."""
     error_line(f"nlctl: {words}")

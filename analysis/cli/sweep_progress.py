@@ -27,7 +27,7 @@ def sweep_bar(
     """Show a bar on stderr while the body runs; elsewhere a line now and then.
 
     With the bar stand the rows, the rate, the remaining time, the violations so far and, for
-    independent draws, bounds of their probability that may be looked at any time.
+    independent draws, bounds of their probability that hold at any time.
     """
     console = console or Console(stderr=True)
     if not console.is_terminal:

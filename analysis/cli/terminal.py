@@ -98,17 +98,17 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 
 def trace_of(error: BaseException) -> str:
-    """Return what is told of an error that is not a mistake of usage.
+    """Return what is printed of an error that is not a mistake of usage.
 
     Where it comes from a function of the user's, that is its kind, its message and the lines of
     the user's files; otherwise the whole trace.
     """
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if _is_users(Path(frame.filename))]
-    if not own:
+    users = [frame for frame in frames if _is_users(Path(frame.filename))]
+    if not users:
         return "".join(traceback.format_exception(error)).rstrip()
     lines = [f"nlctl: {type(error).__name__}: {error}"]
-    for frame in own:
+    for frame in users:
         lines.append(f'  File "{frame.filename}", line {frame.lineno}, in {frame.name}')
         lines += [f"    {frame.line}"] if frame.line else []
     return "\n".join(lines)

@@ -24,8 +24,6 @@ from .study_report import report_study
 if TYPE_CHECKING:
     from ..studies.finding import Finding
 
-__all__ = ["register_tuning"]
-
 _KIND = "tuning"
 _EXAMPLE = """
   [[analysis]]

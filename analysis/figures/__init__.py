@@ -1,5 +1,7 @@
 """Results -> matplotlib figures.  Nothing here writes a file or shows a window."""
 
+from nlctl.plotting.bands import LIMIT, Limit, most_frequent, quantile
+
 from .faults import fault_margins, fault_pairs
 from .overlaid import overlaid
 from .proof import (
@@ -13,25 +15,15 @@ from .proof import (
     windowed_maximum,
 )
 from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
-from .runs import (
-    CLIP,
-    LIMIT,
-    Limit,
-    fans,
-    margins_figure,
-    most_frequent,
-    quantile,
-    running_estimate,
-)
+from .runs import CLIP, fans, margins_figure, running_estimate
 from .searches import degradation, deviations, failure_map_figure, radius_steps, search
 from .trend import trend
-from .tuning import before_and_after, bought, margins_of_both, tried
+from .tuning import bought, margins_of_both, tried
 
 __all__ = [
     "CLIP",
     "LIMIT",
     "Limit",
-    "before_and_after",
     "bought",
     "bounds",
     "burst",

@@ -13,8 +13,6 @@ from ..robustness.stl.spec import violates
 from .labels import number_axes, plain
 from .searches import COLOURS, MAP_INK, centred
 
-__all__ = ["fault_margins", "fault_pairs"]
-
 REACH = 1.0  # margins beyond are drawn there
 
 

@@ -12,8 +12,6 @@ from matplotlib.figure import Figure
 from nlctl.plotting.axes import WIDTH, set_style
 from nlctl.plotting.labels import plain
 
-__all__ = ["arms", "drawable", "number_axes", "plain", "within_reach"]
-
 _LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
 
 
@@ -31,7 +29,7 @@ def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
 
 
 def arms(value: np.ndarray, low: object, high: object) -> np.ndarray:
-    """Return the lengths of error bars; a bootstrap interval may lie beside its estimate."""
+    """Return the lengths of error bars; an estimate may lie outside its bootstrap interval."""
     return np.maximum([value - np.asarray(low), np.asarray(high) - value], 0.0)
 
 

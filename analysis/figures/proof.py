@@ -27,17 +27,6 @@ from nlctl.plotting.axes import (
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.long_run import LongRun
 
-__all__ = [
-    "bounds",
-    "burst",
-    "equality_residuals",
-    "inequality_margins",
-    "long_zeta",
-    "lyapunov_bound",
-    "story",
-    "windowed_maximum",
-]
-
 
 @as_annotated
 def burst(run: LongRun) -> Figure:
@@ -314,7 +303,7 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     ax = figure.subplots()
     set_style(ax)
     for kind, colour in (("proved", GREEN), ("along this run", BLUE), ("what happens", GREY)):
-        places = [i for i, (_, own) in enumerate(shown.values()) if own == kind]
+        places = [i for i, (_, group) in enumerate(shown.values()) if group == kind]
         bars = ax.barh(places, [numbers[i] for i in places], 0.55, color=colour, label=kind)
         ax.bar_label(bars, fmt="%.4g", padding=4)
     ax.set_yticks(range(len(shown)), list(shown))

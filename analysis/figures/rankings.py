@@ -15,9 +15,6 @@ from nlctl.plotting.axes import BLUE, GREY, ORANGE, PURPLE, SHORT_LINE, legend_a
 
 from .labels import arms, drawable, number_axes, within_reach
 
-__all__ = ["paired_differences", "screening", "set_apart", "shares", "tornado"]
-__all__ += ["violation_rates"]
-
 
 @as_annotated
 def screening(effects: pd.DataFrame) -> Figure:

@@ -26,22 +26,10 @@ from nlctl.plotting.axes import (
     set_style,
     stacked_axes,
 )
-from nlctl.plotting.bands import LIMIT, Limit, bands, most_frequent, quantile
+from nlctl.plotting.bands import Limit, bands
 
 from ..robustness.stl.spec import violates
 from .labels import arms, within_reach
-
-__all__ = [
-    "CLIP",
-    "LIMIT",
-    "Limit",
-    "clipped_margins",
-    "fans",
-    "margins_figure",
-    "most_frequent",
-    "quantile",
-    "running_estimate",
-]
 
 CLIP = 2.0
 """Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""
@@ -100,9 +88,7 @@ def margins_figure(values: np.ndarray) -> Figure:
 
 @as_annotated
 def running_estimate(
-    curve: pd.DataFrame,
-    limit: float | None = None,
-    fixed: tuple[float, float] | None = None,
+    curve: pd.DataFrame, limit: float | None = None, fixed: tuple[float, float] | None = None
 ) -> Figure:
     """Share of violations after n runs, and bounds that hold at all n together.
 

@@ -30,8 +30,6 @@ from ..robustness.stl.spec import violates
 from .labels import arms, drawable, number_axes, plain, within_reach
 from .runs import clipped_margins
 
-__all__ = ["degradation", "deviations", "failure_map_figure", "radius_steps", "search"]
-
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
 MAP_INK = "#111111"  # on the map, which is light on dark pages as well
 COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # MAP_INK shows on all
@@ -136,12 +134,12 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
 
 @as_annotated
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
-    """Lowest margin that was found at each size that was looked at, and the radius.
+    """Lowest margin that was found at each size that was tried, and the radius.
 
     Parameters
     ----------
     steps : pandas.DataFrame
-        Sizes that were looked at, with the lowest margin at each.
+        Sizes that were tried, with the lowest margin at each.
     radius : float
         The robustness radius.
 

@@ -14,8 +14,6 @@ from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, set_style
 from nlctl.plotting.labels import plain
 
-__all__ = ["trend"]
-
 _LOOKS = {  # how a claim ended: colour, marker, word
     "holds": (BLUE, "o", "holds"),
     "open": (GREY, "D", "open"),

@@ -1,8 +1,6 @@
-"""Figures of tuning: before and after, how it was found, and what each gain has bought."""
+"""Figures of tuning: how gains were found, what each has bought, margins before and after."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -16,49 +14,18 @@ from nlctl.plotting.axes import (
     PURPLE,
     SHORT_LINE,
     TEXT_INK,
-    TIME,
     legend_above,
     stacked_axes,
 )
 
-from .labels import number_axes, plain, within_reach
+from .labels import number_axes, within_reach
 from .runs import clipped_margins
-
-__all__ = ["before_and_after", "bought", "margins_of_both", "tried"]
 
 _CHOSEN = {
     "search": (BLUE, "o", "search"),
     "Sobol'": (GREY, "x", "points of Sobol'"),
     "put back": (GREEN, "+", "a gain put back"),
 }
-
-
-@as_annotated
-def before_and_after(
-    time: np.ndarray, before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]
-) -> Figure:
-    """Draw signals over time with the gains of the start and with those that were found.
-
-    Parameters
-    ----------
-    time : ndarray of shape (m,)
-        In s.
-    before, after : mapping of str to ndarray of shape (m,)
-        The same signals.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
-    """
-    figure, axes = stacked_axes(len(before), 1.8)
-    for ax, name in zip(axes, before, strict=True):
-        ax.plot(time, before[name], "--", color=GREY, linewidth=1.4, label="before")
-        ax.plot(time, after[name], color=BLUE, linewidth=1.4, label="after")
-        ax.set_ylabel(plain(name), parse_math=False)
-    legend_above(axes[0])
-    axes[-1].set_xlabel(TIME)
-    return figure
 
 
 @as_annotated
@@ -81,9 +48,9 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     y = within_reach(history["cost"]) if cost else clipped_margins(history["margin"])
     runs = within_reach(history["runs"])
     for name, (colour, marker, label) in _CHOSEN.items():
-        own = (history["by"] == name).to_numpy()
-        if own.any():
-            ax.plot(runs[own], y[own], marker, color=colour, markersize=4, label=label)
+        by_this = (history["by"] == name).to_numpy()
+        if by_this.any():
+            ax.plot(runs[by_this], y[by_this], marker, color=colour, markersize=4, label=label)
     if not cost:
         best = np.maximum.accumulate(y)
         ax.step(runs, best, where="post", color=TEXT_INK, linewidth=1.4, label="best")

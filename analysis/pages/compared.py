@@ -17,18 +17,16 @@ from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figu
 from ..report.compare import ABSENT, Difference, differing_numbers
 from ..report.document import (
     Claim,
-    Figure,
     Headline,
     Item,
     Paragraph,
     Report,
     Section,
     Table,
+    captioned,
     versions,
 )
 from ..report.outline import sort_key, summary
-
-__all__ = ["Compared", "comparison_page"]
 
 _LISTED = 100  # numbers of a table
 _DRAWN = 4  # signals of a figure
@@ -71,9 +69,9 @@ def comparison_page(
     command: str = "",
 ) -> Report:
     """Compose the page; `others` are differences that the reports lack, such as of long tables."""
-    found = differing_numbers(first.content, second.content, rtol, common=common)
+    differences = differing_numbers(first.content, second.content, rtol, common=common)
     claims = claim_changes(first.content["claims"], second.content["claims"])
-    numbers, words = _sorted_out(found)
+    numbers, words = _sorted_out(differences)
     pictures = [
         *figure_changes([c.content for c in (first, second)], [first.folder, second.folder])
     ]
@@ -106,7 +104,7 @@ def _title(first: Compared, second: Compared) -> str:
 
 
 def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headline:
-    """Return what became of the claims, or that nothing differs."""
+    """Return how the claims changed, or that nothing differs."""
     moved: dict[tuple[str, str], list[ClaimChange]] = {}
     for change in claims:
         if change.statuses[0] != change.statuses[1]:
@@ -118,10 +116,10 @@ def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headl
             else ("The claim ends as before" if claims else "Neither report makes a claim")
         )
         return Headline(look="neutral" if count else "pass", text=f"{same}{_differ(count)}.")
-    told = [f"{counted(len(c), 'claim')}: {_moved(*s)}" for s, c in moved.items()]
+    sentences = [f"{counted(len(c), 'claim')}: {_moved(*s)}" for s, c in moved.items()]
     worst = max(change.worse for change in claims)
     looks = {2: "fail", 1: "caution", 0: "neutral"}
-    return Headline(look=looks.get(worst, "pass"), text=f"{'; '.join(told)}.")
+    return Headline(look=looks.get(worst, "pass"), text=f"{'; '.join(sentences)}.")
 
 
 def _differ(count: int) -> str:
@@ -143,24 +141,24 @@ def _verdict(
 ) -> str:
     """Return the claims that became worse, and how much else differs."""
     worse = [f"{c.ids + ': ' if c.ids else ''}{c.text}" for c in claims if c.worse > 0]
-    told = [f"Worse: {'; '.join(worse)}."] * bool(worse)
+    sentences = [f"Worse: {'; '.join(worse)}."] * bool(worse)
     other = [what for *_, what in pictures if not what.endswith("as before")]
-    told.append(
+    sentences.append(
         f"{counted(len(numbers), 'number')} and {counted(len(other), 'figure')} of "
         f"{len(pictures)} differ."
     )
     if not curves:
-        told.append("No signals over time are there of both.")
-    return " ".join(told)
+        sentences.append("No signals over time are there of both.")
+    return " ".join(sentences)
 
 
-def _sorted_out(found: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
+def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
     """Return differences of numbers, those with the largest share first, and the others.
 
     Those of claims are in their own table.
     """
     numbers, words = [], []
-    for one in found:
+    for one in differences:
         if not one.where.startswith("claim '"):
             (numbers if _both_numbers(one) else words).append(one)
     return sorted(numbers, key=lambda d: -np.nan_to_num(_share(d), nan=np.inf)), words
@@ -263,14 +261,13 @@ def _signal_items(
         if not names:
             continue
         both = [(c.time, {n: c.signals[n] for n in names[:_DRAWN]}) for c in (one, other)]
+        drawn = figures.overlaid(*both, unit=one.unit, bands=(one.bands, other.bands))
         caption = f"{key.removesuffix('-history')}: {', '.join(names[:_DRAWN])} before and after."
-        yield Figure(
-            key=f"overlaid-{key}",
-            caption=caption,
-            description=f"{caption} Largest differences: "
-            + "; ".join(f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:_DRAWN]),
-            figure=figures.overlaid(*both, unit=one.unit),
-        )
+        if any(name in one.bands and name in other.bands for name in names[:_DRAWN]):
+            caption += " Bands hold 90 % of the rows at each time: filled before, hatched after."
+        largest = (f"{n} {apart[n][0]:.4g} at {apart[n][1]:.4g} s" for n in names[:_DRAWN])
+        values = f"Largest differences: {'; '.join(largest)}"
+        yield captioned(f"overlaid-{key}", caption, values, drawn)
         yield Table(
             caption="How far the signals are apart at most, and when; to 6 digits.",
             columns=("signal", "largest difference", "at (s)", "share of its range before",
@@ -331,14 +328,14 @@ def _words_section(words: Sequence[Difference], others: Sequence[str]) -> Sectio
 
 def _compared_section(first: Compared, second: Compared) -> Section:
     both = (first, second)
-    told = [summary([Claim(**c) for c in one.content["claims"]])[1] for one in both]
-    rows = [("report", *(one.name for one in both)), ("claims", *told)]
+    summaries = [summary([Claim(**c) for c in one.content["claims"]])[1] for one in both]
+    rows = [("report", *(one.name for one in both)), ("claims", *summaries)]
     rows += [(key, *(str(c.content.get(key, "")) for c in both)) for key in _TOLD_APART]
-    made = [dict(one.content.get("provenance", {})) for one in both]
+    provenances = [dict(one.content.get("provenance", {})) for one in both]
     rows += [
-        (key, *(str(one.get(key, "")) for one in made))
-        for key in dict.fromkeys([*made[0], *made[1]])
-        if made[0].get(key) != made[1].get(key)
+        (key, *(str(one.get(key, "")) for one in provenances))
+        for key in dict.fromkeys([*provenances[0], *provenances[1]])
+        if provenances[0].get(key) != provenances[1].get(key)
     ]
     table = Table(
         caption="What was compared, and what made each of them that differs.",

@@ -17,8 +17,6 @@ from ..report.document import Figure, Item, Paragraph, Section, Table
 from ..report.equations import block_items
 from ..studies.page.text import unit_text
 
-__all__ = ["diagram_figure", "diagram_sections"]
-
 _LONGEST = 60  # characters of a value
 _DIAGRAM = "The loop as simulated, with nominal values, and the inside of its nested diagrams."
 _ALL_PARAMETERS = "All parameters of the loop, with their values."
@@ -91,7 +89,7 @@ def _equation_items(diagram: ct.InputOutputSystem) -> Iterator[Item]:
     """Yield the equations of every block, read from the functions that are run."""
     try:
         blocks = typeset(diagram)
-    except UsageError as refused:  # it was run all the same, by calling a function as it stands
+    except UsageError as refused:  # it was run all the same, by calling a function in Python
         yield Paragraph(text=f"There are no formulas of this loop: {refused}")
         return
     yield Paragraph(text=_EQUATIONS)
@@ -104,5 +102,5 @@ def _value(value: Any) -> Any:
     """Return a value as the table shows it; of long ones only the size."""
     if isinstance(value, bool | int | float | str):
         return value
-    told = str(value)
-    return told if len(told) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"
+    text = str(value)
+    return text if len(text) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"

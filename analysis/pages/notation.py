@@ -3,15 +3,13 @@ r"""The ledger's notation -> text with formulas: what stands for symbols becomes
     "V' <= -alpha_1 V, Q = sup I"  ->  r"\(\dot{V}\le -\alpha_{1}\,V\), \(Q=\sup I\)"
 
 The ledger writes a formula as it is typed on a terminal.  A word is part of a formula if it is a
-symbol of the paper, a function, or a single letter; numbers and signs beside it belong to it.
+symbol of the paper, a function, or a single letter; numbers and signs next to it belong to it.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-
-__all__ = ["formulas"]
 
 _GREEK = {
     "eps": r"\varepsilon", "delta": r"\delta", "alpha": r"\alpha", "sigma": r"\sigma",
@@ -40,24 +38,24 @@ ARTICLES = frozenset(["a", "A"])
 
 def formulas(words: str) -> str:
     """Return a statement of the ledger as text with formulas between ``\\(`` and ``\\)``."""
-    told, run = "", []
+    text, run = "", []
     for kind, token in _tokens(words):
         if kind in ("integral", "function", "name", "number", "sign", "space", "label"):
             run.append((kind, token))
         elif token == "," and _depth(run) > 0:
             run.append(("sign", token))
         else:
-            told, run = told + _segment(run) + token, []
-    return told + _segment(run)
+            text, run = text + _segment(run) + token, []
+    return text + _segment(run)
 
 
 def _tokens(words: str) -> Iterator[tuple[str, str]]:
     """Yield kind and text; an article and the unit of a number are words."""
     before: list[str] = ["", ""]
-    for found in _TOKEN.finditer(words):
-        kind, token = str(found.lastgroup), found[0]
+    for match in _TOKEN.finditer(words):
+        kind, token = str(match.lastgroup), match[0]
         alone = before[-1] in ("", "space", "other", "word")
-        if kind == "name" and token in ARTICLES and alone and words[found.end() :][:1] == " ":
+        if kind == "name" and token in ARTICLES and alone and words[match.end() :][:1] == " ":
             kind = "word"
         if (
             kind == "name"
@@ -104,32 +102,32 @@ def _unbalanced(run: list[tuple[str, str]]) -> bool:
 
 def _without_brackets(run: list[tuple[str, str]]) -> str:
     """Return a run whose brackets hold words as well: formulas between its brackets."""
-    told, part = "", []
+    text, part = "", []
     for kind, token in run:
         if kind == "sign" and token in OPENING | _CLOSING:
-            told, part = told + _segment(part) + token, []
+            text, part = text + _segment(part) + token, []
         else:
             part.append((kind, token))
-    return told + _segment(part)
+    return text + _segment(part)
 
 
 def _latex(run: list[tuple[str, str]]) -> str:
     """Return the LaTeX of tokens; factors that a space sets apart get a thin one."""
-    told = ""
+    latex = ""
     tokens = list(run)
     for place, (kind, token) in enumerate(tokens):
         if kind == "space":
             sides = tokens[place - 1], tokens[place + 1]
-            told += r"\," if all(map(_is_factor, sides, (True, False))) else ""
+            latex += r"\," if all(map(_is_factor, sides, (True, False))) else ""
         elif kind == "name":
-            told += _name(token)
+            latex += _name(token)
         elif kind == "function":
-            told += {"sqrt": r"\sqrt", "argmin": r"\mathrm{argmin}"}.get(token, rf"\{token} ")
+            latex += {"sqrt": r"\sqrt", "argmin": r"\mathrm{argmin}"}.get(token, rf"\{token} ")
         elif kind == "integral":
-            told += r"\int_0^s " if "_" in token else r"\int "
+            latex += r"\int_0^s " if "_" in token else r"\int "
         else:
-            told += _SIGNS.get(token, token)
-    return _powers(told)
+            latex += _SIGNS.get(token, token)
+    return _powers(latex)
 
 
 def _is_factor(token: tuple[str, str], before: bool) -> bool:
@@ -158,16 +156,16 @@ def _name(token: str) -> str:
     base, *indices = token.split("_")
     base, number = re.fullmatch(r"(.*?)(\d*)", base).groups()  # type: ignore[union-attr]
     differential, letter = ("d", base[1:]) if base[1:] in _GREEK and base[0] == "d" else ("", base)
-    told = _GREEK.get(letter, letter)
+    latex = _GREEK.get(letter, letter)
     for accent in (*(["hat"] if "hat" in indices else []), *(["tilde"] if tilde else [])):
-        told = rf"\{accent}{{{told}}}"
+        latex = rf"\{accent}{{{latex}}}"
     if dots:
-        told = rf"\{'dot' if dots == 1 else 'ddot'}{{{told}}}"
+        latex = rf"\{'dot' if dots == 1 else 'ddot'}{{{latex}}}"
     lower = ",".join(
         rf"\{i}" if i in ("max", "min") else i.strip("{}")
         for i in [*indices, number, side]
         if i not in ("", "hat")
     )
-    return f"{differential}{told}{f'_{{{lower}}}' if lower else ''}{star}" + (
-        " " if told.startswith("\\") and not told.endswith("}") and not lower + star else ""
+    return f"{differential}{latex}{f'_{{{lower}}}' if lower else ''}{star}" + (
+        " " if latex.startswith("\\") and not latex.endswith("}") and not lower + star else ""
     )

@@ -13,8 +13,6 @@ from ..report.document import Item, Paragraph, Section, Table
 from .notation import formulas
 from .run import own_values
 
-__all__ = ["certificate_section", "ledger_section", "ledger_text"]
-
 PROVED = (
     "Proved: by interval arithmetic over the whole box of states, or for all arguments. Computed: "
     "in closed form."
@@ -27,7 +25,7 @@ CHECKED = (
 VIOLATED = (
     "Violated: statements of the proof in their corrected form that do not hold along this run."
 )
-FAILING = "False as the paper has it: statements as printed, or as the paper uses them."
+FAILING = "False as printed, or as the paper uses it."
 LEFT_OPEN = "Left open: what this run cannot decide, and what does not apply to it."
 _GROUPS = (  # of the ledger's lines, each a table of its own
     (("violated",), "corrected", VIOLATED),
@@ -38,29 +36,29 @@ _GROUPS = (  # of the ledger's lines, each a table of its own
 )
 
 
-def ledger_section(found: Ledger, key: str, title: str, level: int = 2) -> Section:
+def ledger_section(ledger: Ledger, key: str, title: str, level: int = 2) -> Section:
     """Return a ledger: a sentence, then its lines, a table for each group of statuses."""
-    items: list[Item] = [Paragraph(text=ledger_text(found)), *_ledger_tables(found)]
+    items: list[Item] = [Paragraph(text=ledger_text(ledger)), *_ledger_tables(ledger)]
     return Section(key=key, title=title, items=items, level=level, folded=True)
 
 
-def ledger_text(found: Ledger) -> str:
+def ledger_text(ledger: Ledger) -> str:
     """Return the ledger in a paragraph: what is violated, and how many lines are what."""
-    own = ", ".join(line.key for line in found.violated)
-    paper = ", ".join(line.key for line in found.failing)
-    count = Counter(line.status for line in found.lines)
-    told = ", ".join(f"{number} {status}" for status, number in count.items())
+    corrected = ", ".join(line.key for line in ledger.violated)
+    paper = ", ".join(line.key for line in ledger.failing)
+    count = Counter(line.status for line in ledger.lines)
+    counts = ", ".join(f"{number} {status}" for status, number in count.items())
     return (
-        f"Corrected statements violated: {own or 'none'}. False as the paper has them: "
-        f"{paper or 'none'}. One run over {found.horizon:g} s; of {len(found.lines)} lines "
-        f"{told}. The constants hold on the box {formulas(str(found.constants.box))}."
+        f"Corrected statements violated: {corrected or 'none'}. False as printed: "
+        f"{paper or 'none'}. One run over {ledger.horizon:g} s; of {len(ledger.lines)} lines "
+        f"{counts}. The constants hold on the box {formulas(str(ledger.constants.box))}."
     )
 
 
-def _ledger_tables(found: Ledger) -> Iterator[Table]:
+def _ledger_tables(ledger: Ledger) -> Iterator[Table]:
     """Yield the lines of a ledger as tables, one for each group of statuses."""
     for statuses, reading, caption in _GROUPS:
-        group = [x for x in found.lines if x.status in statuses and reading in (None, x.reading)]
+        group = [x for x in ledger.lines if x.status in statuses and reading in (None, x.reading)]
         rows = [_row(line) for line in group]
         if rows:
             columns = ("line", "status", "statement", "least margin", "at (s)", "evidence")
@@ -69,28 +67,28 @@ def _ledger_tables(found: Ledger) -> Iterator[Table]:
 
 def _row(line: Line) -> tuple[str, ...]:
     least, at = ("" if np.isnan(x) else f"{x + 0.0:.4g}" for x in (line.least, line.time))
-    told = formulas(line.evidence)
+    evidence = formulas(line.evidence)
     if not np.isnan(line.first):
-        told = f"{told}, first at {line.first:.4g} s"
+        evidence = f"{evidence}, first at {line.first:.4g} s"
     if line.follows:
-        told = f"{told}. What follows: {formulas(line.follows)}"
+        evidence = f"{evidence}. What follows: {formulas(line.follows)}"
     status = line.status
     if status == "violated" and line.reading == "paper":
         status = "violated as printed"  # the paper's statement is wrong, nothing of ours
-    return line.key, status, formulas(line.statement), least, at, told
+    return line.key, status, formulas(line.statement), least, at, evidence
 
 
-def certificate_section(found: Certificate) -> Section:
+def certificate_section(certificate: Certificate) -> Section:
     """Return a certificate: what is proved, then every constant with where it comes from."""
     table = Table(
         caption="The constants of the certificate, and the bounds that follow from them.",
         columns=("symbol", "value", "unit", "status", "how", "for"),
         rows=[
             (c.symbol, f"{c.value:.6g}", c.unit, c.provenance, c.how, c.over)
-            for c in found.constants
+            for c in certificate.constants
         ],
         status="status",
     )
-    own = own_values("The loop of the proof", found.params)
-    items: list[Item] = [Paragraph(text=f"{found.verdict}."), *own, table]
+    values = own_values("The loop of the proof", certificate.params)
+    items: list[Item] = [Paragraph(text=f"{certificate.verdict}."), *values, table]
     return Section(key="certificate", title="A bound for all time", items=items)

@@ -15,8 +15,6 @@ from nlctl.responses.time_response import as_response
 
 from ..report.document import Figure, History, Item, Paragraph, Section, Table
 
-__all__ = ["outputs_of_run", "own_values", "run_section"]
-
 _SHOWN = 6  # signals of a chart at first
 
 
@@ -35,14 +33,14 @@ def run_section(
     ranges = [
         (n, *(float(f(y)) for f in (np.min, np.max)), float(y[-1])) for n, y in curves.items()
     ]
-    told = "; ".join(f"{n} between {low:.4g} and {high:.4g}" for n, low, high, _ in ranges)
+    text = "; ".join(f"{n} between {low:.4g} and {high:.4g}" for n, low, high, _ in ranges)
     history = History(
-        key="run-history", caption=caption, description=told, time=t, signals=curves,
+        key="run-history", caption=caption, description=text, time=t, signals=curves,
         shown=tuple(name for name in shown if name in curves)[:_SHOWN],
     )  # fmt: skip
     items: list[Item] = [
         *own_values("This run", params),
-        Figure(key="run-signals", caption=caption, description=told, figure=figure),
+        Figure(key="run-signals", caption=caption, description=text, figure=figure),
         history,
         Table(
             caption="The outputs of this run: least and largest sample, and the last one.",
@@ -54,7 +52,7 @@ def run_section(
 
 
 def own_values(what: str, params: Mapping[str, Any]) -> list[Item]:
-    """Return a paragraph with the values that are not those of the loop as it stands."""
+    """Return a paragraph with the values that are not the loop's nominal ones."""
     values = ", ".join(f"{name} = {value}" for name, value in params.items())
     return [Paragraph(text=f"{what} has values of its own: {values}.")] if params else []
 

@@ -7,8 +7,6 @@ from ..report.document import Claim, Figure
 from ..report.outline import claim_status
 from ..report.trends import Trend
 
-__all__ = ["trend_figure"]
-
 _DRAWN = 4  # numbers of a figure
 _ENDS = {
     **dict.fromkeys(("pass", "proved", "checked"), "holds"),

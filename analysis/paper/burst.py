@@ -1,4 +1,4 @@
-r"""Example 2 beyond the loss of its gain's sign: through the burst, and what becomes of the loop.
+r"""Example 2 beyond the loss of its gain's sign: through the burst, and what follows.
 
 Where the exact run is given up, v rises through so many periods of sin^2 v in a step that no
 integrator follows it.  From there the loop is carried on in three ways.
@@ -36,8 +36,6 @@ from ..lyapunov.loop.roles import Parts, read_parts
 from ..lyapunov.nussbaum.aftermath import Aftermath, aftermath
 from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LongRun
 
-__all__ = ["HELD_GAINS", "Burst", "averaged", "through_the_burst"]
-
 HELD_GAINS = (1e3, 3e3)  # K of N = -K: what both agree in is that of -3e10
 _BEAT = 20 * np.pi  # s; common period of the reference and of the disturbance
 _LENGTH = 1e-3  # s; the burst lasts a tenth of it
@@ -47,7 +45,7 @@ _DRAG = 1.0  # |c/eta|: c is about (lambda - a) r, a tenth of eta, while r is la
 
 @dataclass(frozen=True, kw_only=True)
 class Burst:
-    """What becomes of Example 2 after its gain has lost its sign, by an averaged computation.
+    """Example 2 after its gain has lost its sign, by an averaged computation.
 
     Attributes
     ----------
@@ -62,7 +60,7 @@ class Burst:
     late_time : ndarray of shape (k,)
         Since the end of `time` (s), over two common periods of reference and disturbance.
     late : mapping of float to ndarray
-        e over `late_time` by the constant K in the place of \\|N\\|.
+        e over `late_time` by the constant K instead of \\|N\\|.
     """
 
     start: float

@@ -92,12 +92,7 @@ class Case:
 
 CASES = (
     Case(key="1", title="as published, diagonal centres", example=1, group="published"),
-    Case(
-        key="1-3x9",
-        title="centres on a 3×9 grid",
-        example=1,
-        arguments={"centres": "3x9"},
-    ),
+    Case(key="1-3x9", title="centres on a 3×9 grid", example=1, arguments={"centres": "3x9"}),
     Case(key="1-9x3", title="centres on a 9×3 grid", example=1, arguments={"centres": "9x3"}),
     Case(
         key="1-integral",
@@ -114,12 +109,7 @@ CASES = (
         group="exchange",
     ),
     Case(key="2", title="as published, 3×3×3 centres", example=2, group="published"),
-    Case(
-        key="2-diagonal",
-        title="diagonal centres",
-        example=2,
-        arguments={"centres": "diagonal"},
-    ),
+    Case(key="2-diagonal", title="diagonal centres", example=2, arguments={"centres": "diagonal"}),
     Case(
         key="2-lambdas",
         title="r = 2e₁ + e₂ + e₃ instead of e₁ + 2e₂ + e₃",

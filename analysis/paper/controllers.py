@@ -26,14 +26,6 @@ from nlctl.controllers import (
 from nlctl.names import unknown
 from nlctl.references import BandLimitedNoise
 
-__all__ = [
-    "baselines",
-    "compared_controllers",
-    "part_of",
-    "published_controller",
-    "sensor",
-]
-
 
 @dataclass(frozen=True, kw_only=True)
 class _Gains:

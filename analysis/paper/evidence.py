@@ -34,19 +34,8 @@ from .burst import Burst, through_the_burst
 from .controllers import compared_controllers
 from .reference_run import continued, read_record
 
-__all__ = [
-    "FAR_HORIZONS",
-    "LOOK",
-    "Evidence",
-    "FarRuns",
-    "compile_evidence_ahead",
-    "evidence",
-    "far_runs_in_background",
-    "known_sign",
-]
-
 SPLIT = {"example_1": (0.6, 1.3)}  # bounds of the dead zone's k that make eps_u* small
-LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is told
+LOOK = min(LOOKS)  # s; from so much of a run the slow drift of zeta is predicted
 FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s)
     "2": ("Example 2 as published", 9_600.0),
     "1": ("Example 1 as printed, cos(w(t) t)", 1_000.0),
@@ -89,8 +78,8 @@ class Evidence:
 def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
     """Examine the proof for one of the paper's examples."""
     study = examine(loop, horizon)
-    run, found = study.runs.first, study.constants
-    given, s = premises(found, run.gains), run.signals
+    run, constants = study.runs.first, study.constants
+    given, s = premises(constants, run.gains), run.signals
     margins = inequalities(s, given)
     by_number = {m.equation: m.margin for m in margins}
     x = terms(s, given)
@@ -109,7 +98,7 @@ def evidence(loop: ct.InterconnectedSystem, horizon: float = 20.0) -> Evidence:
             "$r^2/2$": x.r**2 / 2,
         },
         assumptions=tuple(
-            m for m in assumptions(s, given, found.box, np.inf) if m.equation != "A1 range"
+            m for m in assumptions(s, given, constants.box, np.inf) if m.equation != "A1 range"
         ),
         margins=margins,
     )
@@ -134,7 +123,7 @@ def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
 
 @dataclass(frozen=True, kw_only=True)
 class FarRuns:
-    """What became of the loops far beyond 20 s.
+    """The loops far beyond 20 s.
 
     Attributes
     ----------

@@ -27,21 +27,6 @@ from nlctl.plotting.axes import (
 from . import TAIL, CaseRun
 from .burst import Burst
 
-__all__ = [
-    "SAMPLED_CONTROLLERS",
-    "actuator_path",
-    "adaptation",
-    "after_burst",
-    "control_input",
-    "error_comparison",
-    "nussbaum_gain",
-    "sampling_errors",
-    "tracking",
-    "tracking_error",
-    "upper_states",
-]
-
-
 SAMPLED_CONTROLLERS = (
     "paper",
     "sliding mode",

@@ -20,8 +20,6 @@ from nlctl.sampling import sampled
 
 from .controllers import compared_controllers, sensor
 
-__all__ = ["example_1", "example_2", "on_a_computer", "true_error"]
-
 _WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
 

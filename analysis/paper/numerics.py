@@ -12,8 +12,6 @@ from nlctl.response import input_output_response
 from .cases import CASES, Case
 from .reproduction import sample_times
 
-__all__ = ["numerics"]
-
 _REFERENCE = ("tsit5", 1e-10)
 _OTHERS = (("tsit5", 1e-9), ("tsit5", 1e-8), ("rodas5p", 1e-8))  # the report's own is the first
 

@@ -14,8 +14,6 @@ import numpy as np
 
 from ..lyapunov.nussbaum.long_run import LONG_RUN_SIGNALS, LongRun
 
-__all__ = ["AGREE", "RECORD", "continued", "read_record"]
-
 RECORD = Path(__file__).with_name("example-2-burst.csv")
 AGREE = 5.0  # s; bursts at two tolerances differ by less
 

@@ -37,22 +37,11 @@ from .reproduction import compile_cases_ahead as compile_cases
 from .rival_record import checked_rivals
 from .sampling_limits import checked_record
 
-__all__ = [
-    "QUICK",
-    "Composed",
-    "ProgressWatch",
-    "clear",
-    "compose",
-    "proof",
-    "reproduction",
-    "robustness",
-]
-
 QUICK = ("example-1-quick", "example-2-quick")
 """The studies of the report, of those that come with nlctl."""
 
 
-def _untold(words: str) -> None:
+def _unnotified(words: str) -> None:
     return None
 
 
@@ -60,9 +49,9 @@ class _Here(Executor):
     """Runs what is submitted at once, in this process."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        made: Future[Any] = Future()
-        made.set_result(fn(*args, **kwargs))
-        return made
+        future: Future[Any] = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
 
 
 def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
@@ -73,9 +62,7 @@ def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
 
 
 def proof(
-    horizon: float = HORIZON,
-    far: proofs.FarRuns | None = None,
-    watch: ProgressWatch = unwatched,
+    horizon: float = HORIZON, far: proofs.FarRuns | None = None, watch: ProgressWatch = unwatched
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part."""
     far = far or proofs.FarRuns()
@@ -86,12 +73,12 @@ def robustness(
     folders: Sequence[Path],
     *,
     threads: int | None = None,
-    tell: Callable[[str], object] = _untold,
+    notify: Callable[[str], object] = _unnotified,
 ) -> list[Section]:
     """Return runs of studies as the report's third part."""
     results = [load_result(folder) for folder in folders]
-    found = [(r, rows_again(r, loop_again(r, tell=tell), threads)) for r in results]
-    return study_part(found, published=PUBLISHED)
+    studies = [(r, rows_again(r, loop_again(r, notify=notify), threads)) for r in results]
+    return study_part(studies, published=PUBLISHED)
 
 
 def compose(
@@ -104,7 +91,7 @@ def compose(
     threads: int | None = None,
     beside: Executor | None = None,
     watch: ProgressWatch = unwatched,
-    tell: Callable[[str], object] = _untold,
+    notify: Callable[[str], object] = _unnotified,
 ) -> Composed:
     """Reproduce the paper, check its proof, run the studies, and compose the report of it all."""
     if studies:
@@ -113,42 +100,42 @@ def compose(
     ahead = [] if beside is None else [beside.submit(_compile_ahead, studies)]
     with _far_away(far, whole) as long_runs:
         runs, waiting = _runs(other, folder, studies, threads, watch)
-        found = _proved(horizon, watch)
+        proved = _proved(horizon, watch)
         with watch("running far beyond 20 s, and the studies", 2) as advance:
             far_away = long_runs.result()
             advance(1)
-            shown: Any = {"proofs": found, "far": far_away.runs, "burst": far_away.burst}
+            shown: Any = {"proofs": proved, "far": far_away.runs, "burst": far_away.burst}
             sections = paper_sections(runs, **shown)
             drawn = draw_ahead(sections, until=waiting[-1].done)
             *_, record, numbers = (task.result() for task in (*ahead, *waiting))
             advance(1)
     folders = [folder / name for name in studies]
-    made = paper_report(
+    report = paper_report(
         runs,
         **shown,
         sections=sections,
-        studies=robustness(folders, threads=threads, tell=tell) if folders else (),
+        studies=robustness(folders, threads=threads, notify=notify) if folders else (),
         numerics=numbers,
         sampling=record,
         rivals=checked_rivals(),
     )
-    return Composed(report=made, drawn=drawn, passed=all(c.passed for c in checks(runs)))
+    return Composed(report=report, drawn=drawn, passed=all(c.passed for c in checks(runs)))
 
 
 def clear(folder: Path, studies: Sequence[str] = QUICK, *, force: bool = False) -> None:
-    """Remove the runs of studies in a folder, to make them anew: runs and nothing else."""
+    """Remove the runs of studies in a folder, to make them again: runs and nothing else."""
     for name in studies:
         if (folder / name).exists():
             remove_run(folder / name, force=force)
 
 
 def _proved(horizon: float, watch: ProgressWatch) -> dict[int, proofs.Evidence]:
-    found = {}
+    proved = {}
     with watch("checking the proof", 2) as advance:
         for number, loop in ((1, paper.example_1()), (2, paper.example_2())):
-            found[number] = proofs.evidence(loop, horizon)
+            proved[number] = proofs.evidence(loop, horizon)
             advance(1)
-    return found
+    return proved
 
 
 @contextmanager

@@ -20,18 +20,6 @@ from ..loop_record import loop_facts, loop_values
 from ..studies import shipped
 from .rivals import rival_loop
 
-__all__ = [
-    "KEY",
-    "RIVALS_RECORD",
-    "RIVAL_ACTUATORS",
-    "beaten_by",
-    "checked_rivals",
-    "failed_text",
-    "loop_key",
-    "rivals_study",
-    "study_key",
-]
-
 RIVALS_RECORD = Path(__file__).with_name("rivals.csv")
 KEY = ["parameters", "rates"]
 RIVAL_ACTUATORS = {"ideal": "no nonlinearity"} | {
@@ -52,7 +40,7 @@ def study_key(example: str) -> str:
 
 
 def loop_key(example: str, controller: str, actuator: str) -> tuple[str, float]:
-    """Return what tells the loop of a pair from another one."""
+    """Return a key that differs where the loops of two pairs differ."""
     loop = rival_loop(example, f"{controller} / {actuator}")
     facts = loop_facts(loop)
     held = json.dumps([facts["parameters"], facts["initial_state"]], sort_keys=True)
@@ -66,8 +54,8 @@ def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
     record = pd.read_csv(path)
     again = "make it again with 'python campaign/rival_runs.py'"
     for example in paper.EXAMPLES:
-        made = set(record.loc[record["example"] == example, "study"])
-        if made != {study_key(example)}:
+        keys = set(record.loc[record["example"] == example, "study"])
+        if keys != {study_key(example)}:
             raise ValueError(
                 f"the record of rivals in '{example}' is of another study than "
                 f"reports/rivals-{example[-1]}.toml: {again}"
@@ -92,18 +80,18 @@ def beaten_by(record: pd.DataFrame, example: str) -> dict[str, dict[str, tuple[s
     One beats another with no more violations of the spec and a smaller RMS of e from 10 s on: the
     exact interval of the median difference on the same samples is on one side of 0.
     """
-    found = {}
-    for actuator, own in record[record["example"] == example].groupby("actuator", sort=False):
-        lines: list[dict[str, Any]] = own.to_dict("records")  # type: ignore[assignment]
+    tallies = {}
+    for actuator, runs in record[record["example"] == example].groupby("actuator", sort=False):
+        lines: list[dict[str, Any]] = runs.to_dict("records")  # type: ignore[assignment]
         (printed,) = (line for line in lines if line["controller"] == "paper")
         limit = printed["violations"]
         better = [r for r in lines if r["less_low"] > 0 and r["violations"] <= limit]
         worse = [r for r in lines if r["less_high"] < 0 and r["violations"] >= limit]
-        found[str(actuator)] = {
+        tallies[str(actuator)] = {
             "beaten by": tuple(r["controller"] for r in better),
             "beats": tuple(r["controller"] for r in worse),
         }
-    return found
+    return tallies
 
 
 def failed_text(row: dict[str, Any]) -> str:

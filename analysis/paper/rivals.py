@@ -34,18 +34,6 @@ from nlctl.names import unknown
 from . import loops
 from .controllers import part_of, published_controller
 
-__all__ = [
-    "KNOWLEDGE",
-    "RIVAL_GAINS",
-    "behind",
-    "example_with",
-    "made_with",
-    "rival_actuators",
-    "rival_controller",
-    "rival_controllers",
-    "rival_loop",
-]
-
 KNOWLEDGE = {
     "paper": "states, n derivatives of the reference",
     "paper, tuned": "states, n derivatives of the reference; gains for this plant",
@@ -74,9 +62,7 @@ def _paper(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
     return replaced(
         published,
         weights=AdaptiveWeights(
-            nodes=old["weights"].nodes,
-            sigma_1=old["weights"].sigma_1,
-            Gamma=gains["weights.Gamma"],
+            nodes=old["weights"].nodes, sigma_1=old["weights"].sigma_1, Gamma=gains["weights.Gamma"]
         ),
         robust=RobustTerm(
             gamma=gains["robust.gamma"], sigma_2=old["robust"].sigma_2, tau=old["robust"].tau
@@ -125,8 +111,8 @@ def _order(example: str) -> int:
 
 def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
     order = _order(example)
-    own = {key.removeprefix("controller."): value for key, value in gains.items()}
-    return FunnelControl(order=order, rho_0=5.0, **own)
+    settings = {key.removeprefix("controller."): value for key, value in gains.items()}
+    return FunnelControl(order=order, rho_0=5.0, **settings)
 
 
 _MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {

@@ -23,19 +23,6 @@ from nlctl.sampling import sampled
 from .cases import HORIZON, TAIL
 from .controllers import compared_controllers
 
-__all__ = [
-    "BAND",
-    "PEAK",
-    "QUANTITIES",
-    "SAMPLING_RECORD",
-    "Quantity",
-    "checked_record",
-    "controller_program",
-    "sampling_runs",
-    "spec_ends",
-    "where_it_ends",
-]
-
 SAMPLING_RECORD = Path(__file__).with_name("sampling-limits.csv")
 BAND, PEAK = 0.15, 15.0  # the spec of reports/example-1.toml: |y - yd| from 10 s on, and |u|
 _STEP = 0.002  # s: sampling time where something else is varied
@@ -97,22 +84,22 @@ def controller_program(controller: Any, *, delays: bool = False) -> Any:
     return sampled(controller, _STEP, method="euler", input_quantum=0.0, output_quantum=0.0)
 
 
-def sampling_runs(example: str, label: str, wanted: Mapping[str, np.ndarray]) -> pd.DataFrame:
+def sampling_runs(example: str, label: str, values: Mapping[str, np.ndarray]) -> pd.DataFrame:
     """Run an example with one controller on a computer, at some values of some quantities."""
     controller = compared_controllers(example)[label]
     loops: dict[bool, Compiled] = {}
     tables = []
     for quantity in QUANTITIES:
-        if quantity.key not in wanted:
+        if quantity.key not in values:
             continue
         delays = quantity.key == "delay"
         if delays not in loops:
             program = controller_program(controller, delays=delays)
             loops[delays] = compiled_loop(paper.EXAMPLES[example](controller=program))
-        table = _runner(loops[delays], quantity)(np.asarray(wanted[quantity.key], dtype=float))
+        table = _runner(loops[delays], quantity)(np.asarray(values[quantity.key], dtype=float))
         tables.append(table.assign(quantity=quantity.key))
-    made = pd.concat(tables, ignore_index=True).assign(example=example, controller=label)
-    return made.reindex(columns=["example", "controller", "quantity", "value", "error", "peak"])
+    joint = pd.concat(tables, ignore_index=True).assign(example=example, controller=label)
+    return joint.reindex(columns=["example", "controller", "quantity", "value", "error", "peak"])
 
 
 def _runner(loop: Compiled, quantity: Quantity) -> Callable[[np.ndarray], pd.DataFrame]:
@@ -120,13 +107,13 @@ def _runner(loop: Compiled, quantity: Quantity) -> Callable[[np.ndarray], pd.Dat
     times = np.linspace(0, HORIZON, round(HORIZON / _LOOK) + 1)
 
     def run(values: np.ndarray) -> pd.DataFrame:
-        made = ensemble_response(
+        responses = ensemble_response(
             loop, times, params={f"sampling.{quantity.key}": values}, keep=("y", "yd", "u"),
             max_steps=_EFFORT,
         )  # fmt: skip
         late = times >= TAIL
-        error = np.abs(made.signals["y"] - made.signals["yd"])[:, late].max(axis=1)
-        peak = np.abs(made.signals["u"]).max(axis=1)
+        error = np.abs(responses.signals["y"] - responses.signals["yd"])[:, late].max(axis=1)
+        peak = np.abs(responses.signals["u"]).max(axis=1)
         return pd.DataFrame({"value": values, "error": error, "peak": peak})
 
     return run
@@ -164,8 +151,8 @@ def checked_record(path: Path = SAMPLING_RECORD) -> pd.DataFrame:
     """Return the record, if the paper's own loops are those of which it was made."""
     record = pd.read_csv(path)
     for example in paper.EXAMPLES:
-        own = (record["example"] == example) & (record["controller"] == "paper")
-        one = record[own & (record["quantity"] == "dt")].iloc[[_COARSE // 2]]
+        papers = (record["example"] == example) & (record["controller"] == "paper")
+        one = record[papers & (record["quantity"] == "dt")].iloc[[_COARSE // 2]]
         check_lines(one, sampling_runs(example, "paper", {"dt": one["value"].to_numpy()}))
     return record
 

@@ -86,5 +86,5 @@ def named_paper(name: str) -> Reproduction:
     >>> named_paper("tabuada-2007").paper.cases
     1
     """
-    made: Reproduction = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
-    return made
+    reproduction: Reproduction = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
+    return reproduction

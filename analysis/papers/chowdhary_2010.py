@@ -76,19 +76,19 @@ def above_bound(run: PaperRun) -> float:
 def _statements() -> list[Statement]:
     """Return what the program has, and what the authors say of it."""
     say = partial(Statement, part="example-1")
-    own, other = "with recorded points", "without"
+    recorded, other = "with recorded points", "without"
     converge = "Do the weights come to their true values although nothing is excited?"
     return [
         *(
             say(
-                claim=converge, case=own, quantity=f"W_{i} at 40 s", printed=f"{value:g}",
+                claim=converge, case=recorded, quantity=f"W_{i} at 40 s", printed=f"{value:g}",
                 tolerance=1e-3, read="program",
                 value=lambda runs, i=i: float(weights(runs["with"])[i, -1]),
             )
             for i, value in enumerate(W)
         ),
         say(
-            claim="Are as many recorded points independent as there are weights?", case=own,
+            claim="Are as many recorded points independent as there are weights?", case=recorded,
             quantity="rank of Ω", printed="3", read="abstract",
             value=lambda runs: float(np.linalg.matrix_rank(record_matrix(runs["with"]))),
         ),
@@ -98,7 +98,8 @@ def _statements() -> list[Statement]:
             value=lambda runs: farthest(runs["without"]),
         ),
         say(
-            claim="Does the tracking error tend to 0?", case=own, quantity="max |e| for t ≥ 35 s",
+            claim="Does the tracking error tend to 0?", case=recorded,
+            quantity="max |e| for t ≥ 35 s",
             printed="0.001", relation="≤", read="abstract",
             value=lambda runs: largest_error(runs["with"], 35.0),
         ),
@@ -109,7 +110,7 @@ def _statements() -> list[Statement]:
         ),
         say(
             claim="Do errors decay exponentially, as fast as the record says?",
-            case=own, quantity="V / its bound, 1 s to 12 s", printed="1", relation="≤",
+            case=recorded, quantity="V / its bound, 1 s to 12 s", printed="1", relation="≤",
             read="abstract", value=lambda runs: above_bound(runs["with"]),
         ),
     ]  # fmt: skip
@@ -117,12 +118,12 @@ def _statements() -> list[Statement]:
 
 def _tracked(runs: PaperRuns) -> MatplotlibFigure:
     """The angle and its model, and the errors of both laws."""
-    own, other = runs["with"], runs["without"]
-    angles = {"model": (_TIMES, own["xm1"]), "plant": (_TIMES, own["y"])}
+    recorded, other = runs["with"], runs["without"]
+    angles = {"model": (_TIMES, recorded["xm1"]), "plant": (_TIMES, recorded["y"])}
     return rows_over_time(
         {
             "$x_1$": angles,
-            "$e$": {"with a record": (_TIMES, own["e"]), "without": (_TIMES, other["e"])},
+            "$e$": {"with a record": (_TIMES, recorded["e"]), "without": (_TIMES, other["e"])},
         }
     )
 
@@ -132,8 +133,8 @@ def _learned(runs: PaperRuns) -> MatplotlibFigure:
     rows = {}
     for key, label in (("with", "with a record"), ("without", "without")):
         names = [rf"$\hat W_{i}$" for i in range(3)]
-        found = zip(names, weights(runs[key]), strict=True)
-        rows[label] = {name: (_TIMES, values) for name, values in found}
+        estimates = zip(names, weights(runs[key]), strict=True)
+        rows[label] = {name: (_TIMES, values) for name, values in estimates}
     figure = rows_over_time(rows)
     for ax in figure.axes:
         for value in W:
@@ -204,7 +205,7 @@ _PAPER = Paper(
     reproduced="weights with and without a record, on the first author's uncertain pendulum",
     not_reproduced=(
         "the article's figures, which could not be read; its rule that trains on present data "
-        "first; recorded points by the rule of rank, in the place of which there is their number."
+        "first; recorded points by the rule of rank; only their number is used."
     ),
     sources=(
         PaperSource(

@@ -109,11 +109,11 @@ def _without_correction(command: str, suffix: str, amplitude: float) -> list[Sta
 
 
 def _statements() -> list[Statement]:
-    """Return what is said of the runs, and what must follow."""
+    """Return the statements on the runs, and what follows from them."""
     say = partial(Statement, part="example-1", case="controllable error, 5 sin 0.5t")
     return [
         *(line for c, (suffix, _) in _COMMANDS.items() for line in _with_correction(c, suffix)),
-        *(line for c, own in _COMMANDS.items() for line in _without_correction(c, *own)),
+        *(line for c, command in _COMMANDS.items() for line in _without_correction(c, *command)),
         say(
             claim="Does V fall by the integral of the controllable error squared?", read="post",
             quantity="imbalance of V, of V(0)", printed="0", tolerance=1e-5,
@@ -134,16 +134,16 @@ def _statements() -> list[Statement]:
 
 def _states_and_inputs(runs: PaperRuns) -> MatplotlibFigure:
     """Plant and model, and the input, with and without the correction."""
-    own, other = runs["with"], runs["without"]
-    t = own.time
+    corrected, other = runs["with"], runs["without"]
+    t = corrected.time
     return rows_over_time(
         {
             "state": {
-                "model": (t, own["xm1"]),
-                "plant": (t, own["x1"]),
+                "model": (t, corrected["xm1"]),
+                "plant": (t, corrected["x1"]),
                 "plant, learns from all": (t, other["x1"]),
             },
-            "$u$": {"plant's": (t, own["u"]), "learns from all": (t, other["u"])},
+            "$u$": {"plant's": (t, corrected["u"]), "learns from all": (t, other["u"])},
         }
     )
 

@@ -15,10 +15,8 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
-__all__ = ["find_browser", "open_page", "write_pdf"]
-
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
-BROWSER_TIMEOUT = 300  # s after which it is looked at whether the browser does anything
+BROWSER_TIMEOUT = 300  # s after which the browser is checked for activity
 BUSY = 1.0  # s of CPU time in that time are a sign of life, also on a machine with other work
 FLAGS = (
     *("--headless", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -76,19 +74,19 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
     browser = find_browser()
     flags = [*FLAGS, "--no-sandbox"] if _is_root() else FLAGS
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        made = Path(folder, "page.pdf")
+        printed = Path(folder, "page.pdf")
         command = [
             browser,
             *flags,
             f"--user-data-dir={folder}/profile",
-            f"--print-to-pdf={made}",
+            f"--print-to-pdf={printed}",
             "--no-pdf-header-footer",
             Path(page).resolve().as_uri(),
         ]
         reason = _run_while_busy(command, Path(folder, "errors.txt"))
-        if not made.exists():
+        if not printed.exists():
             raise UsageError(f"'{browser}' printed no PDF of '{page}': {reason}")
-        return replace_file(path, lambda file: file.write(made.read_bytes()))
+        return replace_file(path, lambda file: file.write(printed.read_bytes()))
 
 
 def _run_while_busy(command: list[str], errors: Path) -> str:
@@ -110,8 +108,8 @@ def _run_while_busy(command: list[str], errors: Path) -> str:
                 if spent - before < BUSY:
                     return f"no sign of work for {BROWSER_TIMEOUT} s"
             else:
-                told = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-                return (told or ["no message"])[-1]
+                messages = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+                return (messages or ["no message"])[-1]
     finally:
         if hasattr(os, "killpg"):
             with contextlib.suppress(ProcessLookupError):

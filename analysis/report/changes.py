@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,6 @@ from .document import Claim
 from .drawings import drawings
 from .history import SIGNALS_FILE
 from .outline import claim_status
-
-__all__ = ["STATUS_RANK", "ClaimChange", "Curves", "claim_changes", "curves_of", "figure_changes"]
 
 STATUS_RANK = {
     "pass": 0,
@@ -39,7 +37,7 @@ class ClaimChange:
 
     @property
     def statuses(self) -> tuple[str, str]:
-        """What became of it in both."""
+        """Its status in both."""
         before = _NEW if self.first is None else claim_status(self.first)[0]
         return before, _GONE if self.second is None else claim_status(self.second)[0]
 
@@ -77,7 +75,7 @@ def claim_changes(
     Claims belong together that say the same, or else have their evidence at the same place.
     """
     one, other = ([Claim(**claim) for claim in claims] for claims in (first, second))
-    found, left = [], list(other)
+    changes, left = [], list(other)
     alone = []
     for claim in one:
         same = next((c for c in left if c.text == claim.text), None)
@@ -85,22 +83,22 @@ def claim_changes(
             alone.append(claim)
             continue
         left.remove(same)
-        found.append(ClaimChange(first=claim, second=same))
+        changes.append(ClaimChange(first=claim, second=same))
     for claim in alone:
         same = next((c for c in left if c.evidence and c.evidence == claim.evidence), None)
         if same is not None:
             left.remove(same)
-        found.append(ClaimChange(first=claim, second=same))
-    found += [ClaimChange(first=None, second=claim) for claim in left]
+        changes.append(ClaimChange(first=claim, second=same))
+    changes += [ClaimChange(first=None, second=claim) for claim in left]
     return sorted(
-        found, key=lambda change: (-change.worse, change.statuses[0] == change.statuses[1])
+        changes, key=lambda change: (-change.worse, change.statuses[0] == change.statuses[1])
     )
 
 
 def figure_changes(
     reports: Sequence[Mapping[str, Any]], folders: Sequence[Path | None]
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield key, caption and what became of every figure of two reports."""
+    """Yield key, caption and change of every figure of two reports."""
     one, other = (_figures(report) for report in reports)
     drawn = [{} if folder is None else drawings(folder / "index.html") for folder in folders]
     for key in dict.fromkeys([*one, *other]):
@@ -125,11 +123,12 @@ def _figures(report: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curves:
-    """Signals of one chart of a page: times (s), samples by name, and their unit."""
+    """Signals of one chart of a page: times (s), samples by name, their unit, bands by name."""
 
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
     unit: str = ""
+    bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def largest_difference(self, other: Curves, name: str) -> tuple[float, float]:
         """Return how far a signal is from the same of another run at most (1), and when (s)."""
@@ -158,9 +157,11 @@ def curves_of(folder: Path | None) -> dict[str, Curves]:
 
 
 def _curves(chart: Mapping[str, Any]) -> Curves:
-    time, *samples = (
-        np.array([np.nan if x is None else x for x in row], dtype=float) for row in chart["data"]
-    )
-    return Curves(
-        time=time, signals=dict(zip(chart["names"], samples, strict=True)), unit=str(chart["unit"])
-    )
+    time, *samples = map(_samples, chart["data"])
+    bands = {name: (_samples(a), _samples(b)) for name, (a, b) in chart.get("bands", {}).items()}
+    signals = dict(zip(chart["names"], samples, strict=True))
+    return Curves(time=time, signals=signals, unit=str(chart["unit"]), bands=bands)
+
+
+def _samples(row: Sequence[float | None]) -> np.ndarray:
+    return np.array([np.nan if x is None else x for x in row], dtype=float)

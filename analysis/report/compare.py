@@ -18,8 +18,6 @@ from nlctl.errors import ParameterError, UsageError
 from .outline import sort_key
 from .page import PARTS
 
-__all__ = ["ABSENT", "Difference", "compare_contents", "differing_numbers", "read_report"]
-
 ABSENT = "absent"
 FOLDER = re.compile(r"\b(nlctl (?:replay|report|run)) (?:'[^']*'|\"[^\"]*\"|[^\s'\"])+")
 
@@ -128,26 +126,30 @@ def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 def _flat(report: Mapping[str, Any], sections: set[str]) -> dict[str, Any]:
     """Return all that is compared, by the name of the place where it stands."""
-    found = {"title": report["title"], "verdict": report["verdict"]}
+    values = {"title": report["title"], "verdict": report["verdict"]}
     claims = report["claims"]
     for name, claim in zip(_names([c["text"] for c in claims]), claims, strict=True):
-        found |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
-    found |= _leaves("numbers", report["numbers"])
+        values |= {f"claim '{name}', {k}": v for k, v in claim.items() if k != "text"}
+    values |= placed_values("numbers", report["numbers"])
     for key, section in report["sections"].items():
         if key not in sections:
             continue
         tables = [item for item in section["items"] if item["kind"] == "table"]
         for number, table in enumerate(tables, 1):
-            found |= _cells(f"section '{key}', table {number}", table)
-    return found
+            values |= _cells(f"section '{key}', table {number}", table)
+    return values
 
 
-def _leaves(where: str, value: object) -> dict[str, Any]:
-    if isinstance(value, dict):
-        return {k: v for n in value for k, v in _leaves(f"{where}.{n}", value[n]).items()}
-    if isinstance(value, list):
-        return {k: v for i, x in enumerate(value) for k, v in _leaves(f"{where}[{i}]", x).items()}
-    return {where: value}
+def placed_values(where: str, value: object) -> dict[str, Any]:
+    """Return what nested records hold, by its place; in a list by its key where it has one."""
+    if isinstance(value, Mapping):
+        parts = [(f"{where}.{name}", part) for name, part in value.items()]
+    elif isinstance(value, list):
+        keys = (x.get("key", i) if isinstance(x, Mapping) else i for i, x in enumerate(value))
+        parts = [(f"{where}[{key}]", part) for key, part in zip(keys, value, strict=True)]
+    else:
+        return {where: value}
+    return {place: leaf for at, part in parts for place, leaf in placed_values(at, part).items()}
 
 
 def _placeless(value: object) -> Any:
@@ -156,19 +158,19 @@ def _placeless(value: object) -> Any:
 
 
 def _cells(where: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the cells of a table by row and column; rows are told by their first cells."""
-    found = {f"{where}, columns": list(table["columns"])}
+    """Return the cells of a table by row and column; rows are named by their first cells."""
+    cells = {f"{where}, columns": list(table["columns"])}
     columns = _names(table["columns"])
     rows = [[_placeless(value) for value in row] for row in table["rows"]]
     for name, row in zip(_row_names(rows), rows, strict=True):
         for place, value in enumerate(row):
             column = columns[place] if place < len(columns) else str(place + 1)
-            found[f"{where}, row '{name}', column '{column}'"] = value
-    return found
+            cells[f"{where}, row '{name}', column '{column}'"] = value
+    return cells
 
 
 def _row_names(rows: Sequence[Sequence[Any]]) -> list[str]:
-    """Return a name for each row: as few of its first cells as tell the rows apart."""
+    """Return a name for each row: as few of its first cells as make names unique."""
     for width in (1, 2, 3):
         names = [" | ".join(map(str, row[:width])) for row in rows]
         if len(set(names)) == len(names):

@@ -3,7 +3,7 @@
 Text is plain text; a formula inside it stands between ``\\(`` and ``\\)``, in LaTeX.
 
 A report is data until the last step; `nlctl.analysis.report.render` turns it into a page and into
-``report.json``, so that every number on the page is also in the file beside it.
+``report.json``, so that every number on the page is also in the file next to it.
 """
 
 from __future__ import annotations
@@ -21,21 +21,6 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import checked_times
-
-__all__ = [
-    "Claim",
-    "Equation",
-    "Figure",
-    "Headline",
-    "History",
-    "Item",
-    "Live",
-    "Paragraph",
-    "Report",
-    "Section",
-    "Table",
-    "versions",
-]
 
 
 @as_annotated
@@ -131,12 +116,17 @@ class Figure:
     figure: MatplotlibFigure
 
 
+def captioned(key: str, caption: str, values: str, figure: MatplotlibFigure) -> Figure:
+    """Return a figure that is described by its caption and the values that it shows."""
+    return Figure(key=key, caption=caption, description=f"{caption} {values}", figure=figure)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class History:
     """Signals over time for a chart to zoom in and to read values from.
 
     It is on the page only if that is asked for, and only where scripts run.  Hence it shows
-    nothing of its own: a figure beside it shows the same signals.
+    nothing of its own: a figure next to it shows the same signals.
 
     Attributes
     ----------
@@ -150,12 +140,15 @@ class History:
         Unit of all signals.
     shown : sequence of str
         Signals that are drawn at first; all of them if it is empty.
+    bands : mapping of str to two arrays of shape (m,)
+        By signal the lower and the upper end of a band of an ensemble around it, which
+        comparisons of two pages draw.
 
     Raises
     ------
     ParameterError
-        If the times do not increase, a signal is not as long as they are, or a name in `shown`
-        is that of no signal.
+        If the times do not increase, a signal or an end of a band is not as long as they are, or
+        a name in `shown` or `bands` is that of no signal.
 
     Examples
     --------
@@ -172,16 +165,18 @@ class History:
     signals: Mapping[str, Sequence[float] | np.ndarray]
     unit: str = ""
     shown: Sequence[str] = ()
+    bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        wanted = checked_times(self.time).shape
-        for name, samples in self.signals.items():
-            if np.shape(samples) != wanted:
+        shape = checked_times(self.time).shape
+        ends = ((name, end) for name, band in self.bands.items() for end in band)
+        for name, samples in (*self.signals.items(), *ends):
+            if np.shape(samples) != shape:
                 raise ParameterError(
                     f"signal '{name}' of history '{self.key}' has shape {np.shape(samples)}, "
-                    f"its time {wanted}"
+                    f"its time {shape}"
                 )
-        for name in self.shown:
+        for name in (*self.shown, *self.bands):
             if name not in self.signals:
                 raise unknown("signal", name, self.signals)
 
@@ -333,11 +328,11 @@ class Report:
         Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
         (``doi 10...``) becomes a link, the only kind that leads out of the page.
     files : mapping
-        Name and SHA-256 of each data file beside the page (`nlctl.analysis.report.file_hashes`).
+        Name and SHA-256 of each data file next to the page (`nlctl.analysis.report.file_hashes`).
     question : str
-        What was asked; it stands before the verdict.
+        The question that the report answers; it precedes the verdict.
     lead : Figure, optional
-        The picture beside the verdict that tells the story.
+        The picture next to the verdict that shows the main result.
     author, revision, date : str
         Below the title.  They are only what is given: a report that is made twice is the same to
         the byte.
@@ -382,6 +377,6 @@ PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib
 
 def versions(*others: str) -> dict[str, str]:
     """Return the machine, Python, and the versions of the packages that every report needs."""
-    own = {"system": f"{platform.system()} {platform.machine()}"}
-    own["Python"] = platform.python_version()
-    return own | {name: version(name) for name in (*PACKAGES, *others)}
+    platform_ = {"system": f"{platform.system()} {platform.machine()}"}
+    platform_["Python"] = platform.python_version()
+    return platform_ | {name: version(name) for name in (*PACKAGES, *others)}

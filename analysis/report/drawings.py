@@ -6,8 +6,6 @@ import hashlib
 import re
 from pathlib import Path
 
-__all__ = ["drawings"]
-
 _SHAPE = re.compile(
     r'<(?:path|g) id="(g:\d+)"(.*?)(?=<(?:path|g) id="g:|</defs>)', re.DOTALL
 )  # letters, words and marks that all figures of a page share, numbered as they came
@@ -35,7 +33,7 @@ def drawings(page: Path) -> dict[str, str]:
 
 
 def _with_shapes(drawn: str, shapes: dict[str, str]) -> str:
-    return _USED.sub(lambda found: f'"{shapes.get(found[1], "")}"', drawn)
+    return _USED.sub(lambda match: f'"{shapes.get(match[1], "")}"', drawn)
 
 
 def _digest(text: str) -> str:

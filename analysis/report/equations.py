@@ -9,8 +9,6 @@ from nlctl.upstream.systems import System
 
 from .document import Equation, Item, Paragraph
 
-__all__ = ["block_items", "equations_of"]
-
 
 def equations_of(diagram: System, blocks: Collection[str], number: str = "") -> list[Item]:
     """Return the equations of some blocks of a diagram, with values in the places of parameters."""

@@ -20,8 +20,6 @@ from .page import check_gallery_folder, fill, write_files
 from .svg import shapes_svg, svg, svg_files
 from .trends import Revision, Trend, trends
 
-__all__ = ["Entry", "entries", "write_gallery"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
@@ -34,7 +32,7 @@ class Entry:
     title: str
     verdict: str
     light: str
-    told: str
+    tally: str
     readable: bool = False
     revision: str = ""
     requirements: Sequence[tuple[str, str, str]] = ()
@@ -47,7 +45,7 @@ class Entry:
 
 
 def _unchecked(folder: Path) -> None:
-    """Believe a report as it stands."""
+    """Accept a report without a check."""
 
 
 def entries(
@@ -55,7 +53,7 @@ def entries(
 ) -> list[Entry]:
     """Return the reports below a folder, by the names of their folders.
 
-    A ``report.json`` that cannot be read, has no page beside it, or that `check` refuses is listed
+    A ``report.json`` that cannot be read, has no page next to it, or that `check` refuses is listed
     as such.
     """
     folder = Path(folder)
@@ -73,18 +71,18 @@ def _entry(folder: Path, name: str, check: Callable[[Path], object]) -> Entry:
         report = read_report(folder)
         claims = [Claim(**claim) for claim in report["claims"]]
         headline = report.get("headline")
-        light, told = summary(claims, None if headline is None else Headline(**headline))
+        light, text = summary(claims, None if headline is None else Headline(**headline))
         if not (folder / "index.html").is_file():
             raise UsageError("a page is missing")
     except (UsageError, OSError, TypeError):
         reason = "The report is damaged, was edited, or its page is missing."
-        return Entry(folder=name, title=name, verdict=reason, light="fail", told="Cannot be read.")
+        return Entry(folder=name, title=name, verdict=reason, light="fail", tally="Cannot be read.")
     return Entry(
         folder=name,
         title=str(report["title"]),
         verdict=str(report["verdict"]),
         light=light,
-        told=told,
+        tally=text,
         readable=True,
         revision=", ".join(filter(None, (report.get("revision", ""), report.get("date", "")))),
         requirements=_requirements(claims),
@@ -94,13 +92,13 @@ def _entry(folder: Path, name: str, check: Callable[[Path], object]) -> Entry:
 
 def _requirements(claims: Sequence[Claim]) -> list[tuple[str, str, str]]:
     """Return each requirement once, with look and status of the worst claim that answers it."""
-    found: dict[str, tuple[str, str]] = {}
+    worst: dict[str, tuple[str, str]] = {}
     for claim in claims:
         status, look = claim_status(claim)
         for one in claim.ids:
-            if one not in found or STATUS_RANK[look] > STATUS_RANK[found[one][0]]:
-                found[one] = (look, status)
-    return [(one, *ended) for one, ended in found.items()]
+            if one not in worst or STATUS_RANK[look] > STATUS_RANK[worst[one][0]]:
+                worst[one] = (look, status)
+    return [(one, *ended) for one, ended in worst.items()]
 
 
 @as_annotated
@@ -125,7 +123,7 @@ def write_gallery(
     check : callable, optional
         Takes the folder of a report, and raises UsageError where it is not to be believed.
     draw : callable, optional
-        Takes what became of one study, and returns the figure of it; without it there are tables.
+        Takes the trend of one study, and returns its figure; without it there are tables.
 
     Returns
     -------
@@ -143,19 +141,19 @@ def write_gallery(
     --------
     See `write_report`.
     """
-    found = entries(folder, check)
+    listed = entries(folder, check)
     if not force:
         check_gallery_folder(folder)
-    page = fill("gallery.html", entries=found, **_history(found, draw))
+    page = fill("gallery.html", entries=listed, **_history(listed, draw))
     write_files(Path(folder), {"index.html": page})
     return Path(folder) / "index.html"
 
 
-def _history(found: Sequence[Entry], draw: Callable[[Trend], Figure] | None) -> dict[str, Any]:
+def _history(listed: Sequence[Entry], draw: Callable[[Trend], Figure] | None) -> dict[str, Any]:
     """Return what the page shows of studies with several reports."""
     several = trends(
         Revision(folder=e.folder, label=e.revision or e.folder, content=e.content)
-        for e in found
+        for e in listed
         if e.readable
     )
     pictures = [] if draw is None else [draw(trend) for trend in several]

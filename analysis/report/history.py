@@ -11,36 +11,35 @@ from ..json_values import as_json
 from .document import History, Report
 from .outline import place_anchors
 
-__all__ = ["SIGNALS_FILE", "chart", "signals_json", "thinned"]
-
 SIGNALS_FILE = "signals.json"
-"""File beside a page with the time histories of the page, for comparisons."""
+"""File next to a page with the time histories of the page, for comparisons."""
 
 _COUNT = 2000  # samples of each signal on the page
 DIGITS = 6
 
 
-def chart(history: History) -> dict[str, Any]:
+def chart(history: History, bands: bool = False) -> dict[str, Any]:
     """Return what ``history.js`` draws a time history from, as JSON can hold it.
 
-    What is not finite becomes null, which is drawn as a gap.
+    What is not finite becomes null, which is drawn as a gap.  Its bands are for comparisons.
     """
     time = np.asarray(history.time, dtype=float)
     rows = [np.asarray(samples, dtype=float) for samples in history.signals.values()]
     signals = np.array(rows).reshape(len(rows), len(time))
     kept = thinned(signals)
+    ends = {name: [_rounded(end[kept]) for end in band] for name, band in history.bands.items()}
     return {
         "names": list(history.signals),
         "shown": [not history.shown or name in history.shown for name in history.signals],
         "unit": history.unit,
         "data": [_rounded(row[kept]) for row in (time, *signals)],
-    }
+    } | ({"bands": ends} if bands and ends else {})
 
 
 def signals_json(report: Report) -> str:
     """Return the time histories of a report by their anchors; nothing if it has none."""
     charts = {
-        anchor: chart(item)
+        anchor: chart(item, bands=True)
         for part in place_anchors(report)
         for anchor, _, item in part.items
         if isinstance(item, History)
@@ -67,8 +66,8 @@ def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
         part, known = signals[:, places], finite[:, places]
         lowest = np.where(known, part, np.inf).argmin(axis=1)
         highest = np.where(known, part, -np.inf).argmax(axis=1)
-        for found in (lowest, highest, known.argmin(axis=1)):
-            kept |= {*places[found].tolist()}
+        for indices in (lowest, highest, known.argmin(axis=1)):
+            kept |= {*places[indices].tolist()}
     return np.array(sorted(kept))
 
 

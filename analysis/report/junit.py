@@ -11,8 +11,6 @@ from nlctl.annotations import as_annotated
 from .document import Claim
 from .outline import claim_status
 
-__all__ = ["junit"]
-
 _NO_XML = re.compile("[^\\t\\n\\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -56,12 +54,12 @@ def junit(title: str, claims: Sequence[Claim]) -> bytes:
             known = ElementTree.SubElement(case, "properties")
             for one in claim.ids:
                 ElementTree.SubElement(known, "property", name="requirement", value=_text(one))
-        found = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
+        evidence = f"{claim_status(claim)[0]}: measured {claim.measured}, limit {claim.limit}"
         if verdict:
-            told = ElementTree.SubElement(case, verdict, message=_text(found))
-            told.text = _text(f"evidence: {claim.evidence}") if claim.evidence else None
+            failure = ElementTree.SubElement(case, verdict, message=_text(evidence))
+            failure.text = _text(f"evidence: {claim.evidence}") if claim.evidence else None
         else:
-            ElementTree.SubElement(case, "system-out").text = _text(found)
+            ElementTree.SubElement(case, "system-out").text = _text(evidence)
     ElementTree.indent(suite)
     return ElementTree.tostring(suite, encoding="utf-8", xml_declaration=True) + b"\n"
 

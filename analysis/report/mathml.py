@@ -18,19 +18,6 @@ from markupsafe import Markup
 
 from .document import Equation
 
-__all__ = [
-    "ATTRIBUTES",
-    "CHARACTERS",
-    "ELEMENTS",
-    "FAMILY",
-    "font_face",
-    "inline",
-    "italic",
-    "mathml",
-    "spoken",
-    "subset",
-]
-
 ELEMENTS = frozenset(
     (
         *("math", "mfrac", "mi", "mn", "mo", "mover", "mpadded", "mphantom", "mroot", "mrow"),
@@ -85,8 +72,8 @@ def _letters(element: ElementTree.Element) -> str:
     if element.tag in ("msub", "msup", "msubsup") and len(parts) > 1:
         marks = {"msub": "_", "msup": "^", "msubsup": "_^"}[element.tag]
         scripts = (p.strip() if len(p.strip()) < 4 else f"({p.strip()})" for p in parts[1:])
-        told = (mark + script for mark, script in zip(marks, scripts, strict=True))
-        return f"{parts[0].rstrip()}{''.join(told)}"
+        letters = (mark + script for mark, script in zip(marks, scripts, strict=True))
+        return f"{parts[0].rstrip()}{''.join(letters)}"
     if element.tag == "mspace":
         return " "
     if element.tag == "mfrac":
@@ -136,7 +123,7 @@ def _check(element: ElementTree.Element) -> None:
             raise NotMathError(f"'{name}' is not an attribute of a formula")
     if element.text:
         element.text = re.sub(
-            "&#x([0-9A-F]{4,6});", lambda found: chr(int(found[1], 16)), element.text
+            "&#x([0-9A-F]{4,6});", lambda match: chr(int(match[1], 16)), element.text
         )
     if element.tag in ("mi", "mo") and (element.text or "").startswith("\\"):
         raise NotMathError(f"{element.text} is an unknown command")

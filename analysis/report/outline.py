@@ -16,24 +16,6 @@ from nlctl.wording import counted, some_of
 
 from .document import Claim, Figure, Headline, History, Item, Live, Report, Section, Table
 
-__all__ = [
-    "Placed",
-    "TableCell",
-    "_shown",
-    "cells",
-    "claim_status",
-    "evidence_anchors",
-    "is_long",
-    "is_short",
-    "kind",
-    "light",
-    "meanings",
-    "numeric",
-    "place_anchors",
-    "sort_key",
-    "summary",
-]
-
 SHELL = frozenset(
     ["claims", "contents", "provenance", "files", "lead", "lead-title", "lead-desc"]
 )  # anchors of the page itself
@@ -59,19 +41,19 @@ LIGHTS = {
     "fail": ("fail", "fails", "failed", "violated", "missed", "diverged"),
 }
 MEANINGS = {  # of the statuses of claims, as the page explains them
-    "holds": "what was measured is within the limit",
-    "proved": "for everything that the claim speaks of, by rigorous computation",
+    "holds": "the result is within the limit",
+    "proved": "for all cases of the claim, by rigorous computation",
     "computed": "in closed form",
-    "checked": "at every sample of one simulated run, which proves nothing of others",
+    "checked": "at every sample of one simulated run, which proves nothing about others",
     "sampled": "found by simulated runs, at most with a stated confidence, which is not proof",
     "shown": "by simulated runs, at most with a stated confidence, which is not proof",
     "refuted": "there is a run that contradicts it, or many with a stated confidence; the claim "
     "is wrong, and nothing of this report failed",
-    "not shown yet": "what was run neither shows nor refutes it",
-    "undecided": "what was run does not tell",
+    "not shown yet": "the runs neither show nor refute it",
+    "undecided": "the runs do not decide it",
     "not confirmed": "a violation was found, but not by other integrators",
     "violated": "there is a counterexample",
-    "fails": "what was measured is beyond the limit",
+    "fails": "the result is beyond the limit",
 }
 ANSWERS = ("shown", "refuted", "not shown yet")  # to the claims of studies
 _LIGHT_OF = {status: light for light, statuses in LIGHTS.items() for status in statuses}
@@ -106,10 +88,9 @@ def place_anchors(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            wanted = (
-                item.key if isinstance(item, Figure | History | Live) else f"{heading}-{kind(item)}"
-            )
-            anchor = _anchor(wanted, taken, ("-title", "-desc")) if _has_anchor(item) else ""
+            drawn = isinstance(item, Figure | History | Live)
+            proposed = item.key if drawn else f"{heading}-{kind(item)}"
+            anchor = _anchor(proposed, taken, ("-title", "-desc")) if _has_anchor(item) else ""
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)
         placed.append(Placed(anchor=heading, level=level, section=section, items=items))
@@ -238,7 +219,7 @@ def claim_status(claim: Claim) -> tuple[str, str]:
 def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
     """Return what the statuses of the claims mean, as far as they are the usual ones."""
     used = {claim_status(claim)[0] for claim in claims}
-    return {status: told for status, told in MEANINGS.items() if status in used}
+    return {status: meaning for status, meaning in MEANINGS.items() if status in used}
 
 
 def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[str, str]:
@@ -280,7 +261,7 @@ def _known(claims: Sequence[Claim], before: str, after: str = "") -> str:
 
 
 def _refuted(claims: Sequence[Claim]) -> str:
-    """Return what became of the claims where some are refuted; somebody's and ours apart."""
+    """Return how many claims hold where some are refuted; somebody's and ours apart."""
     whose = {claim.by for claim in claims if claim_status(claim)[1] == "refuted"}
     by = whose.pop() if len(whose) == 1 else None
     theirs = [claim for claim in claims if claim.by == by] if by else claims
@@ -290,9 +271,9 @@ def _refuted(claims: Sequence[Claim]) -> str:
     waiting = [f"{open_} {'is' if open_ == 1 else 'are'} {_waiting(claims)}"] * bool(open_)
     are = "is" if refuted == 1 else "are"
     if by:
-        told = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
-        told += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
-        return f"{', '.join(told)}{_ours([claim for claim in claims if claim.by != by])}."
+        parts = [f"{counted(refuted, 'claim')} of {by} {are} refuted", *waiting]
+        parts += [f"{held} {'holds' if held == 1 else 'hold'}"] * bool(held)
+        return f"{', '.join(parts)}{_ours([claim for claim in claims if claim.by != by])}."
     first = f"{counted(refuted, 'claim')} {are} refuted"
     if by is not None:
         first = f"{some_of(refuted, len(claims), 'claim', 'is', 'are')} refuted"
@@ -301,14 +282,14 @@ def _refuted(claims: Sequence[Claim]) -> str:
 
 
 def _ours(claims: Sequence[Claim]) -> str:
-    """Return what became of our own claims, of which none fails or is refuted."""
+    """Return how many of our own claims hold, of which none fails or is refuted."""
     held = [claim for claim in claims if claim_status(claim)[1] != "caution"]
     left = len(claims) - len(held)
-    told = []
+    parts = []
     if held:
         every = "all " if not left and len(held) > 1 else ""
         verb = "holds" if len(held) == 1 else "hold"
-        told.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
+        parts.append(f"{every}{len(held)} {verb}{_known(held, ' (', ')')}")
     if left:
-        told.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
-    return f"; of ours {', '.join(told)}" if told else ""
+        parts.append(f"{left} {'is' if left == 1 else 'are'} {_waiting(claims)}")
+    return f"; of ours {', '.join(parts)}" if parts else ""

@@ -22,16 +22,6 @@ from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric
 from .typography import pieces, plain_text
 
-__all__ = [
-    "PARTS",
-    "check_gallery_folder",
-    "check_report_folder",
-    "fill",
-    "generator",
-    "to_bytes",
-    "write_files",
-]
-
 UPLOT = "vendor/uplot"
 CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code) not in "\t\n\r"}
 
@@ -120,7 +110,7 @@ HEAD = 4096  # bytes of a page in which its generator stands
 
 
 def generator(template: str) -> str:
-    """Return what the page of a template says of who made it."""
+    """Return the generator that a page names."""
     return f"nlctl {Path(template).stem}"
 
 
@@ -131,7 +121,7 @@ def check_report_folder(folder: str | os.PathLike[str]) -> None:
         folder / n for n in ("index.html", "report.json", "report.pdf", "signals.json")
     )
     is_own = _maker(page) == generator("report.html")
-    others = [p for p, own in ((page, is_own), (content, _is_report(content))) if not own]
+    others = [p for p, is_ours in ((page, is_own), (content, _is_report(content))) if not is_ours]
     others += [] if is_own else others_of_page
     _refuse([path for path in others if path.exists()], "take another folder with --out")
 
@@ -155,10 +145,10 @@ def _maker(page: Path) -> str:
     """Return who made a page; nothing if it does not say, or cannot be read."""
     try:
         with page.open("rb") as file:
-            found = MADE.search(file.read(HEAD).decode(errors="replace"))
+            match = MADE.search(file.read(HEAD).decode(errors="replace"))
     except OSError:
         return ""
-    return found[1] if found else ""
+    return match[1] if match else ""
 
 
 def _is_report(path: Path) -> bool:

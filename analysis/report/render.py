@@ -1,4 +1,4 @@
-"""Report -> one self-contained HTML file, and ``report.json`` beside it.
+"""Report -> one self-contained HTML file, and ``report.json`` next to it.
 
 Text is escaped by Jinja2.  The only markup that passes unescaped is what this package makes
 itself: figures (`svg`), formulas through a whitelist (`formula`), the page's own style and
@@ -29,15 +29,13 @@ from .page import check_report_folder, fill, to_bytes, write_files
 from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
 from .typography import plain_text
 
-__all__ = ["Framed", "file_hashes", "framed", "render_html", "render_json", "write_report"]
-
 RARE = ("ids", "links")
-DRAWN = ("figure", "time", "signals", "program")  # curves are on the page only
+DRAWN = ("figure", "time", "signals", "bands", "program")  # curves are on the page only
 _TITLES = {
-    "methods": "How it was found",
+    "methods": "Methods",
     "limits": "Limits of validity",
     "references": "References",
-    "provenance": "How to make this report again",
+    "provenance": "Reproducing this report",
 }
 
 
@@ -72,7 +70,7 @@ def render_html(
     See `Report`.
     """
     placed = place_anchors(report)
-    light, told = summary(report.claims, report.headline)
+    light, text = summary(report.claims, report.headline)
     items = {anchor: item for part in placed for anchor, _, item in part.items}
     figures = {} if report.lead is None else {"lead": report.lead}
     figures |= {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
@@ -84,7 +82,7 @@ def render_html(
     }
     shown = items.items() if interactive else ()
     charts = {anchor: chart(item) for anchor, item in shown if isinstance(item, History)}
-    own = _own_files(report)
+    data_files = _own_files(report)
     return fill(
         "report.html",
         interactive=bool(charts),
@@ -98,15 +96,15 @@ def render_html(
         evidence=evidence_anchors(placed),
         extra={k: t for k, t in _TITLES.items() if getattr(report, k) or k == "provenance"},
         light=light,
-        told=told,
+        tally=text,
         margins=any(claim.margin for claim in report.claims),
         meanings=meanings(report.claims),
-        has_signals=SIGNALS_FILE in own,
+        has_signals=SIGNALS_FILE in data_files,
         made_by=_pairs("What made it.", ("what", "version or value"), report.provenance),
         beside=_pairs(
             "Files that belong to this page, with their places as seen from it.",
             ("file", "SHA-256"),
-            own | dict(report.files),
+            data_files | dict(report.files),
         ),
     )
 
@@ -331,7 +329,7 @@ def file_hashes(paths: Iterable[str | os.PathLike[str]]) -> dict[str, str]:
     OSError
         If a file cannot be read.
     ParameterError
-        If two files have one name: they could not both lie beside the page.
+        If two files have one name: they could not both lie next to the page.
 
     Examples
     --------

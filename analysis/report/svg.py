@@ -22,8 +22,6 @@ from nlctl.plotting import axes
 from .document import Figure, Section
 from .typography import plain_text
 
-__all__ = ["compact", "draw_ahead", "shapes_svg", "shared_shape", "short_path", "svg", "svg_files"]
-
 # Colours of the figures that follow the page's theme, by the page's own names for them.
 THEME = {
     "#000000": "currentColor",
@@ -53,9 +51,7 @@ NONE_DRAWN: Drawn = MappingProxyType({})
 
 
 def svg_files(
-    figures: Sequence[MatplotlibFigure],
-    pool: Executor | None = None,
-    drawn: Drawn = NONE_DRAWN,
+    figures: Sequence[MatplotlibFigure], pool: Executor | None = None, drawn: Drawn = NONE_DRAWN
 ) -> list[bytes]:
     """Return figures as SVG files; this process and those of a pool share the work.
 
@@ -171,9 +167,9 @@ def _rename(
         target = attributes.pop("href")[1:]
         if target in shared:
             attributes["href"] = f"#{shared[target]}"
-    own = attributes.pop("id", None)
-    if own in referred:
-        attributes["id"] = f"{key}-{own}"
+    identifier = attributes.pop("id", None)
+    if identifier in referred:
+        attributes["id"] = f"{key}-{identifier}"
     for name, value in attributes.items():
         attributes[name] = URL.sub(rf"url(#{key}-\1)", value)
 
@@ -306,18 +302,18 @@ def short_path(path: str) -> str:
     if CURVED.search(path):
         return DECIMALS.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), path)
     here = (0, 0)
-    told = ""
+    short = ""
     for part in re.findall(r"[MLz][^MLz]*", path):
         numbers = [round(10 * float(n)) for n in _NUMBER.findall(part)]
-        told += {"M": "m", "L": "l" if told.endswith("z") else "", "z": "z"}[part[0]]
+        short += {"M": "m", "L": "l" if short.endswith("z") else "", "z": "z"}[part[0]]
         for x, y in zip(numbers[::2], numbers[1::2], strict=True):
-            told += _tenths(x - here[0], told) + _tenths(y - here[1], "0")
+            short += _tenths(x - here[0], short) + _tenths(y - here[1], "0")
             here = (x, y)
         if part[0] == "M":
             start = here
         elif part[0] == "z":
             here = start
-    return told
+    return short
 
 
 def _tenths(number: int, before: str) -> str:

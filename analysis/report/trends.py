@@ -10,15 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from .changes import claim_changes
+from .compare import placed_values
 from .document import Claim, Table
 from .outline import claim_status, sort_key
-
-__all__ = ["Revision", "Trend", "trends"]
 
 NUMBERS = 8  # that are followed
 _PARTS = re.compile(
     r"\b(tables|running estimate|quantities|requirements|metrics|seed|rows|witness)\b"
 )
+
+_FINDING = re.compile(r"^study\.findings\[([^\]]*)\]")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,7 +42,7 @@ class Revision:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trend:
-    """What became of the claims and main numbers of one study.
+    """Claims and main numbers of one study over its revisions.
 
     Attributes
     ----------
@@ -88,7 +89,7 @@ class Trend:
 
 
 def trends(revisions: Iterable[Revision]) -> list[Trend]:
-    """Return a trend for each study of which there are several reports, which are told by title."""
+    """Return a trend for each study of which there are several reports, found by title."""
     by_title: dict[str, list[Revision]] = {}
     for revision in revisions:
         by_title.setdefault(str(revision.content["title"]), []).append(revision)
@@ -112,8 +113,8 @@ def _claims_over(these: Sequence[Revision]) -> dict[str, list[Claim | None]]:
     """Return each claim at each revision: from one to the next they are matched as in compare."""
     rows: list[list[Claim | None]] = [[Claim(**c)] for c in these[0].content["claims"]]
     for place, (one, other) in enumerate(itertools.pairwise(these), 1):
-        found = claim_changes(one.content["claims"], other.content["claims"])
-        for change in found:
+        changes = claim_changes(one.content["claims"], other.content["claims"])
+        for change in changes:
             row = next((r for r in rows if change.first is not None and r[-1] == change.first
                         and len(r) == place), None)  # fmt: skip
             if row is not None:
@@ -150,25 +151,14 @@ def _spread(row: Sequence[float]) -> float:
 
 def _main(content: Mapping[str, Any]) -> dict[str, float]:
     """Return margins of claims and the numbers of a report that are not lines of its tables."""
-    found = {
+    numbers = {
         f"margin: {claim['text']}": float(sort_key(claim["margin"]))
         for claim in content["claims"]
         if sort_key(claim.get("margin", ""))
     }
-    return found | {
-        name: value for name, value in _leaves("", content["numbers"]) if not _PARTS.search(name)
-    }
-
-
-def _leaves(where: str, value: Any) -> list[tuple[str, float]]:
-    """Return the numbers in nested records with their places; findings by their keys."""
-    if isinstance(value, Mapping):
-        return [leaf for key, part in value.items() for leaf in _leaves(f"{where}{key}.", part)]
-    if isinstance(value, list):
-        keys = [p.get("key", i) if isinstance(p, Mapping) else i for i, p in enumerate(value)]
-        parts = zip(keys, value, strict=True)
-        return [leaf for key, part in parts for leaf in _leaves(f"{where}{key}.", part)]
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return []
-    short = re.sub(r"^study\.findings\.|\bnumbers\.", "", where.rstrip("."))
-    return [(short, float(value))]
+    for place, value in placed_values("", content["numbers"]).items():
+        name = re.sub(r"\bnumbers\.", "", _FINDING.sub(r"\1", place.removeprefix(".")))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number and not _PARTS.search(name):
+            numbers[name] = float(value)
+    return numbers

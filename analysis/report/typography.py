@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 
 from .mathml import spoken
 
-__all__ = ["Piece", "in_print", "pieces", "plain_text"]
-
 NO_BREAK = "\u00a0"
 UNITS = (
     "%|‰|°C|°|s|ms|µs|min|h|m|mm|cm|µm|km|g|kg|N|kN|Nm|rad|mrad|deg|Hz|kHz|V|mV|A|mA|W|kW|K|Pa|kPa"
@@ -55,7 +53,7 @@ def in_print(text: str) -> str:
     99 %, t = 3 and Example 1 do not break.
     """
     text = _POWER_OF_TEN.sub(_scientific, text)
-    text = _POWER.sub(lambda found: found[1].translate(RAISED), text)
+    text = _POWER.sub(lambda match: match[1].translate(RAISED), text)
     text = _MINUS.sub("−", text)
     for typed, sign in _SIGNS:
         text = text.replace(typed, sign)
@@ -79,22 +77,22 @@ def _scientific(number: re.Match[str]) -> str:
 
 def pieces(text: str) -> list[Piece]:
     """Split a text at its formulas and DOIs; what is between them is set as in print."""
-    found = []
+    parts = []
     for number, part in enumerate(FORMULA.split(text)):
         if number % 2:
-            found.append(Piece(latex=part))
+            parts.append(Piece(latex=part))
             continue
-        if found and (tail := _TAIL.match(part)):
-            found[-1] = replace(found[-1], tail=tail[0])
+        if parts and (tail := _TAIL.match(part)):
+            parts[-1] = replace(parts[-1], tail=tail[0])
             part = part[tail.end() :]
         words, *rest = DOI.split(part)
         for doi, after in zip(rest[0::2], rest[1::2], strict=True):
-            found += [Piece(text=f"{in_print(words)}doi "), Piece(doi=doi)]
+            parts += [Piece(text=f"{in_print(words)}doi "), Piece(doi=doi)]
             words = after
-        found.append(Piece(text=in_print(words)))
-    return [piece for piece in found if piece != Piece()]
+        parts.append(Piece(text=in_print(words)))
+    return [piece for piece in parts if piece != Piece()]
 
 
 def plain_text(text: str) -> str:
     """Return a text whose formulas are written in letters, for titles and descriptions."""
-    return in_print(FORMULA.sub(lambda found: spoken(found[1]), text))
+    return in_print(FORMULA.sub(lambda match: spoken(match[1]), text))

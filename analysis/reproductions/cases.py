@@ -1,4 +1,4 @@
-"""Cases of a paper: a diagram of its, a start, an input, and what became of them."""
+"""Cases of a paper: a diagram, a start, an input, and how they ended."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import pandas as pd
 
 from nlctl.diagrams import state_names
 from nlctl.response import input_output_response
-
-__all__ = ["PaperCase", "PaperRun", "simulate_case", "simulate_cases"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,8 +9,6 @@ from matplotlib.figure import Figure
 
 from nlctl.plotting.axes import STYLES, TIME, legend_above, stacked_axes
 
-__all__ = ["paths_figure", "rows_over_time"]
-
 
 def paths_figure(paths: Mapping[str, tuple[Any, Any]], across: str, up: str) -> Figure:
     """Draw up to four paths in a plane; those of a label that ends in "read" as points."""

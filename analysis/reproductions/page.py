@@ -23,17 +23,6 @@ from .sections import (
     source_section,
 )
 
-__all__ = [
-    "Composed",
-    "ProgressWatch",
-    "Reproduction",
-    "claims_of",
-    "compose_paper",
-    "paper_page",
-    "report_of",
-    "verdict_of",
-]
-
 ProgressWatch = Callable[[str, float], AbstractContextManager[Callable[[float], object]]]
 """``watch(what, total)`` is entered around a part of the work; what it gives is called with how
 much more of `total` is done."""
@@ -72,7 +61,7 @@ class Reproduction:
     ----------
     paper : Paper
     compose : callable
-        ``compose(folder, whole=, threads=, beside=, watch=, tell=) -> Composed``.
+        ``compose(folder, whole=, threads=, beside=, watch=, notify=) -> Composed``.
     clear : callable
         ``clear(folder, force=)`` removes what an earlier page has left in its folder.
     """
@@ -110,40 +99,40 @@ def report_of(
 
 def paper_page(paper: Paper, runs: PaperRuns) -> Report:
     """Compose the page of a paper from its runs."""
-    found = found_numbers(paper, runs)
-    parts = [section for part in paper.parts for section in part_sections(paper, part, runs, found)]
+    checked = found_numbers(paper, runs)
+    parts = [s for part in paper.parts for s in part_sections(paper, part, runs, checked)]
     sections = [model_section(paper), *parts, open_section(paper), source_section(paper)]
-    numbers = {f"{f.statement.case}: {f.statement.quantity}": f.value for f in found}
+    numbers = {f"{f.statement.case}: {f.statement.quantity}": f.value for f in checked}
     return report_of(
         paper,
-        verdict=verdict_of(paper, found),
-        claims=claims_of(paper, found),
+        verdict=verdict_of(paper, checked),
+        claims=claims_of(paper, checked),
         sections=sections,
         lead=None if paper.lead is None else drawn_figure(paper.lead, runs),
         numbers={paper.key: numbers},
     )
 
 
-def verdict_of(paper: Paper, found: Sequence[FoundNumber]) -> str:
+def verdict_of(paper: Paper, numbers: Sequence[FoundNumber]) -> str:
     """Return how many statements hold, which do not, and what is not reproduced at all."""
-    missed = [f for f in found if not f.holds]
+    missed = [f for f in numbers if not f.holds]
     names = "; ".join(
         f"{f.statement.quantity} is {f.value:.4g}, not {f.statement.asked}" for f in missed
     )
-    held = some_of(len(found) - len(missed), len(found), "statement", "holds", "hold")
+    held = some_of(len(numbers) - len(missed), len(numbers), "statement", "holds", "hold")
     return f"{held}{f' ({names})' if missed else ''}. Not reproduced: {paper.not_reproduced}"
 
 
-def claims_of(paper: Paper, found: Sequence[FoundNumber]) -> list[Claim]:
+def claims_of(paper: Paper, numbers: Sequence[FoundNumber]) -> list[Claim]:
     """Return one claim for each question, with the numbers that answer it."""
     asked: dict[str, list[FoundNumber]] = {}
-    for each in found:
-        asked.setdefault(each.statement.claim, []).append(each)
+    for number in numbers:
+        asked.setdefault(number.statement.claim, []).append(number)
     return [_claim(paper, text, answers) for text, answers in asked.items()]
 
 
 def _claim(paper: Paper, text: str, answers: Sequence[FoundNumber]) -> Claim:
-    missed = [each for each in answers if not each.holds]
+    missed = [answer for answer in answers if not answer.holds]
     shown = (missed or answers)[0]
     measured = f"{shown.statement.quantity}: {shown.value:{paper.digits}}"
     limit = shown.statement.asked

@@ -11,8 +11,6 @@ from matplotlib.figure import Figure as MatplotlibFigure
 
 from ..report.document import Item
 
-__all__ = ["FoundNumber", "Paper", "PaperFigure", "PaperSource", "Part", "Statement"]
-
 PaperRuns = Mapping[str, Any]
 """Simulated cases of a paper by key."""
 
@@ -50,7 +48,7 @@ class Statement:
     value : callable
         ``value(runs) -> float``.
     relation : {"=", "≤", "≥"}
-        What is said of the value.
+        How the value relates to it.
     tolerance : float
         For "=", how far it may be off; of what is printed exactly, rounding.
     read : str

@@ -13,15 +13,6 @@ from ..report.document import Figure, Item, Paragraph, Section, Table
 from ..report.equations import equations_of
 from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part
 
-__all__ = [
-    "drawn_figure",
-    "found_numbers",
-    "model_section",
-    "open_section",
-    "part_sections",
-    "source_section",
-]
-
 
 def found_numbers(paper: Paper, runs: PaperRuns) -> list[FoundNumber]:
     """Return every statement of a paper with the value that the runs give it."""
@@ -37,11 +28,11 @@ def model_section(paper: Paper) -> Section:
 
 
 def part_sections(
-    paper: Paper, part: Part, runs: PaperRuns, found: Sequence[FoundNumber]
+    paper: Paper, part: Part, runs: PaperRuns, numbers_found: Sequence[FoundNumber]
 ) -> list[Section]:
     """Return one example: its loop and its figures, then what is folded below them."""
     diagram = part.make()
-    key, own = part.key, [each for each in found if each.statement.part == part.key]
+    key, printed = part.key, [one for one in numbers_found if one.statement.part == part.key]
     drawn = [(figure.folded, drawn_figure(figure, runs)) for figure in part.figures]
     shown: list[Item] = [
         *equations_of(diagram, part.blocks, part.number),
@@ -50,11 +41,11 @@ def part_sections(
         *(part.items(runs) if part.items else ()),
     ]
     parameters = [parameter_table(part, diagram)] if part.parameters else []
-    numbers = [number_table(paper, own)] if own else []
+    numbers = [number_table(paper, printed)] if printed else []
     folded: tuple[tuple[str, str, Sequence[Item]], ...] = (
         ("signals", part.more, [figure for folded, figure in drawn if folded]),
         ("parameters", "Parameters as printed and as used", parameters),
-        (paper.numbers_key, paper.numbers_title.format(count=len(own)), numbers),
+        (paper.numbers_key, paper.numbers_title.format(count=len(printed)), numbers),
     )
     return [
         Section(key=key, title=part.title, items=shown),
@@ -68,8 +59,8 @@ def part_sections(
 
 def drawn_figure(figure: PaperFigure, runs: PaperRuns) -> Figure:
     """Return a figure of a paper, drawn."""
-    told = figure.description
-    text = told(runs) if isinstance(told, Callable) else told
+    description = figure.description
+    text = description(runs) if isinstance(description, Callable) else description
     return Figure(
         key=figure.key,
         caption=figure.caption,
@@ -93,22 +84,22 @@ def parameter_table(part: Part, diagram: ct.InterconnectedSystem) -> Table:
     )
 
 
-def number_table(paper: Paper, found: Sequence[FoundNumber]) -> Table:
+def number_table(paper: Paper, numbers: Sequence[FoundNumber]) -> Table:
     """Return numbers as found and as printed; where they were read, if that is known of any."""
-    is_read = any(each.statement.read for each in found)
+    is_read = any(number.statement.read for number in numbers)
     columns = ("case", "quantity", "found", paper.asked, "difference", "tolerance", "status")
     rows = [
         (
-            each.statement.case,
-            each.statement.quantity,
-            f"{each.value:{paper.digits}}",
-            each.statement.asked,
-            f"{each.error:.1e}",
-            f"{each.statement.tolerance:.0e}",
-            "pass" if each.holds else ("refuted" if each.statement.by else "fail"),
-            *([each.statement.read] if is_read else []),
+            number.statement.case,
+            number.statement.quantity,
+            f"{number.value:{paper.digits}}",
+            number.statement.asked,
+            f"{number.error:.1e}",
+            f"{number.statement.tolerance:.0e}",
+            "pass" if number.holds else ("refuted" if number.statement.by else "fail"),
+            *([number.statement.read] if is_read else []),
         )
-        for each in found
+        for number in numbers
     ]
     return Table(
         caption=paper.numbers_caption,

@@ -7,7 +7,8 @@ from .file.schema import Study
 from .file.shipped import shipped
 from .finding import Finding
 from .folder import load_result
-from .kind import Ground, Kind, Setup, made
+from .integrity import Integrity, verify
+from .kind import Ground, Kind, Setup, finding_of
 from .kinds import KINDS
 from .plan import Plan, plan
 from .reading.parse import StudyFile, read_study
@@ -16,13 +17,13 @@ from .replay import Replay, replay, replay_figure
 from .result import Result
 from .run import run
 from .sealed import RunFolderError
-from .wholeness import Wholeness, verify
 
 __all__ = [
     "KINDS",
     "Asked",
     "Finding",
     "Ground",
+    "Integrity",
     "Kind",
     "Plan",
     "Problem",
@@ -34,10 +35,9 @@ __all__ = [
     "StudyError",
     "StudyFile",
     "Varied",
-    "Wholeness",
+    "finding_of",
     "from_toml",
     "load_result",
-    "made",
     "origin_differences",
     "plan",
     "read_study",

@@ -36,19 +36,6 @@ from ..robustness.stl.text import parse_formula
 from .file.schema import Choices, Faulty, Rows, Study
 from .resolve import DEFAULT, loop_function, option, uncertain
 
-__all__ = [
-    "choice",
-    "experiment",
-    "faults_of",
-    "inputs_of",
-    "labels",
-    "loop",
-    "main_design",
-    "metrics_of",
-    "requirement",
-    "times",
-]
-
 _MOST_SAMPLES = 10_000_000
 METRIC = ("key", "signals", "unit", "meaning", "function", "start", "end")
 SIGNALS = ("error", "control", "actuated", "weights", "gain")

@@ -19,8 +19,6 @@ from .origin import loop_differences, version_differences
 from .result import LISTED, Result
 from .sealed import read_json
 
-__all__ = ["long_table_differences", "origin_differences", "run_differences"]
-
 _CLOCK = "wall_time"  # differs between any two runs
 
 

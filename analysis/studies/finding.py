@@ -10,8 +10,6 @@ import pandas as pd
 
 from .sealed import as_json
 
-__all__ = ["Finding"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Finding:
@@ -41,7 +39,7 @@ class Finding:
 
     Examples
     --------
-    See `made`.
+    See `finding_of`.
     """
 
     key: str
@@ -62,7 +60,7 @@ class Finding:
         return self.answer == "shown" if self.answer else None
 
     @property
-    def told(self) -> str:
+    def outcome(self) -> str:
         """The answer in words, ``not shown yet (needs ...)``."""
         return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
 

@@ -6,7 +6,7 @@ rows/                the main table, see `nlctl.analysis.robustness.runs.store`
 KEY/finding.json     what one analysis found, its tables next to it in Parquet
 KEY/rows/            the rows that it ran itself, where their number is known in advance
 results.json         everything but the tables, for other programs
-contents.json        which files there are, with a key of each and of the page, see `whole`;
+contents.json        which files there are, with a key of each and of the page, see `intact`;
                      written last
 
 Every file of JSON carries a key of its content, and every part the key of its origin: what is
@@ -37,6 +37,8 @@ from .code.rule import Grant
 from .file.schema import Study, keyed
 from .file.toml import read_toml, study_text
 from .finding import Finding
+from .intact.contents import CONTENTS, check_intact
+from .intact.shapes import FindingFile, ResultsFile, RunFile, shaped
 from .kind import Kind
 from .origin import plain_study
 from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
@@ -54,21 +56,6 @@ from .sealed import (
     origin_key,
     write_json,
 )
-from .whole.contents import CONTENTS, check_whole
-from .whole.shapes import FindingFile, ResultsFile, RunFile, shaped
-
-__all__ = [
-    "METRIC_COLUMNS",
-    "checked",
-    "load_finding",
-    "load_result",
-    "load_rows",
-    "load_run",
-    "load_study",
-    "received",
-    "remove_run",
-    "save_finding",
-]
 
 _OWN = ("study.toml", "run.json", "results.json", CONTENTS, "rows", ".lock", ".owner")
 _OWN += ("index.html", "report.json", "signals.json", "report.pdf")
@@ -76,7 +63,7 @@ METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
 def save_finding(folder: Path, finding: Finding, origin: str) -> None:
-    """Write a finding into ``folder / key``, its tables first: with the file it is whole.
+    """Write a finding into ``folder / key``, its tables first: the file completes it.
 
     `origin` is the key of what it was computed from.
     """
@@ -165,9 +152,9 @@ def load_rows(folder: Path, origin: str, design: Design | None = None) -> Sweep 
 
 
 def checked(folder: Path) -> None:
-    """Refuse a folder that is not whole, before anything of it is believed."""
+    """Refuse a folder that is not intact, before anything of it is believed."""
     try:
-        check_whole(folder)
+        check_intact(folder)
     except RunFolderError:
         read_through(folder)
         raise
@@ -218,7 +205,7 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
 
 
 def _result_in(folder: Path, kinds: Mapping[str, Kind], gone: Sequence[str]) -> Result:
-    """Return what is in a folder that is whole, or say why its parts do not go together."""
+    """Return what is in a folder that is intact, or say why its parts do not go together."""
     study, run = load_study(folder, kinds), load_run(folder)
     content = shaped(folder / "results.json", ResultsFile, "continue with --resume")
     origin = origin_key(run["origin"])
@@ -309,7 +296,7 @@ def received(folder: Path, *, trust: bool = False) -> Grant:
 
 
 def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
-    """Return the own kinds that the study of a run names, and what is said of the others."""
+    """Return the own kinds that the study of a run names, and notes on the others."""
     kinds, problems = own_kinds(plain_study(load_study(folder)), received(folder, trust=trust))
     return kinds, [f"what it found is reported without its figures: {p}" for p in problems]
 

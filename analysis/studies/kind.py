@@ -39,18 +39,6 @@ from .result import Result
 if TYPE_CHECKING:
     from ..report.document import Item
 
-__all__ = [
-    "Ground",
-    "Kind",
-    "RunDesign",
-    "Setup",
-    "answer",
-    "column",
-    "made",
-    "tagged",
-    "unanswered",
-]
-
 _NAME = re.compile(r"[a-z][a-z0-9]*([ -][a-z0-9]+)*")
 
 
@@ -181,7 +169,7 @@ class Kind:
         The keys of its table, each with a description, as a pydantic model; its property ``claim``
         is what the study claims with them.
     run : callable
-        ``run(asked, ground)`` returns a `Finding`, see `made`; None if its rows are incomplete.
+        ``run(asked, ground)`` returns a `Finding` (`finding_of`); None if its rows are incomplete.
     title : str
         Its heading in the report.
     answers, claims : str
@@ -243,7 +231,7 @@ class Kind:
     >>> from pathlib import Path
     >>> from nlctl.analysis.studies import read_study, run
     >>> code = '''
-    ... from nlctl.analysis.studies import Asked, Kind, made
+    ... from nlctl.analysis.studies import Asked, Kind, finding_of
     ...
     ... class Failures(Asked):
     ...     pass
@@ -251,7 +239,8 @@ class Kind:
     ... def count(asked, ground):
     ...     design, margins = ground.main
     ...     found = int((margins <= 0).sum())
-    ...     return made(asked, f"{found} of {design.size} rows fail.", numbers={"failing": found})
+    ...     sentence = f"{found} of {design.size} rows fail."
+    ...     return finding_of(asked, sentence, numbers={"failing": found})
     ...
     ... failures = Kind(
     ...     name="failures", schema=Failures, run=count, title="Failing rows", needs_rows=True
@@ -360,7 +349,7 @@ def column(rows: Sweep, name: str) -> np.ndarray:
 
 
 @as_annotated
-def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
+def finding_of(asked: Asked, sentence: str, **parts: Any) -> Finding:
     """Return a finding, whose key and title `answer` fills in.
 
     Parameters
@@ -380,13 +369,13 @@ def made(asked: Asked, sentence: str, **parts: Any) -> Finding:
 
     Examples
     --------
-    >>> from nlctl.analysis.studies import Asked, made
+    >>> from nlctl.analysis.studies import Asked, finding_of
     >>> asked = Asked(kind="spread")
-    >>> found = made(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
+    >>> found = finding_of(asked, "The spread is 0.5.", runs=100, numbers={"spread": 0.5})
     >>> found.kind, found.numbers["spread"], found.holds
     ('spread', 0.5, None)
-    >>> claimed = made(asked, "The spread is 0.5.", claim="at most 1", answer="shown")
-    >>> claimed.holds, claimed.told
+    >>> claimed = finding_of(asked, "The spread is 0.5.", claim="at most 1", answer="shown")
+    >>> claimed.holds, claimed.outcome
     (True, 'shown')
     """
     parts = {"claim": asked.claim} | parts
@@ -406,7 +395,7 @@ def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Find
 
     What the study claims of it is neither shown nor refuted.
     """
-    finding = made(
+    finding = finding_of(
         asked,
         f"Not answered: {error}.",
         claim=asked.claim or "the analysis has an answer",

@@ -1,8 +1,8 @@
 """What results are computed from: study, equations, wiring, values, versions.
 
 The record is kept with a run (``run.json``), a key of it with every finding and all rows.  Whatever
-adds to a run or draws from it compares first: nothing is said of one loop next to the numbers of
-another one.
+adds to a run or draws from it compares first: no statement about one loop appears next to the
+numbers of another one.
 """
 
 from __future__ import annotations
@@ -24,16 +24,6 @@ from ..robustness import Prepared, diagrams
 from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
 from .file.schema import Study, keyed
 from .kind import Setup
-
-__all__ = [
-    "compared_differences",
-    "diagram_differences",
-    "loop_differences",
-    "origin_of",
-    "plain_study",
-    "unseen_notes",
-    "version_differences",
-]
 
 
 def origin_of(setup: Setup, prepared: Prepared) -> dict[str, Any]:

@@ -16,8 +16,6 @@ from .file.schema import keyed
 from .kind import Setup
 from .reading.parse import StudyFile
 
-__all__ = ["Plan", "plan"]
-
 _TIMED = 32
 """Rows that are run to see how long one takes."""
 _NUMBER = 8

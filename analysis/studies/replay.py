@@ -25,8 +25,6 @@ from .reading.parse import StudyFile
 from .run import reopened
 from .sealed import RunFolderError, as_json, origin_key
 
-__all__ = ["Replay", "replay", "replay_figure"]
-
 _MOST = 8  # panels of a figure
 
 
@@ -205,14 +203,14 @@ def _signals(prepared: Prepared, row: pd.DataFrame) -> tuple[np.ndarray, dict[st
 
 
 @as_annotated
-def replay_figure(made: Replay) -> Figure:
+def replay_figure(replayed: Replay) -> Figure:
     """Draw the signals that requirements look at, with their bounds, above the other outputs.
 
     The bounds are drawn over the whole time; when they count, the titles say.
 
     Parameters
     ----------
-    made : Replay
+    replayed : Replay
         As `replay` returns it.
 
     Returns
@@ -226,17 +224,17 @@ def replay_figure(made: Replay) -> Figure:
     """
     bounds: dict[str, set[float]] = {}
     texts: dict[str, list[str]] = {}
-    for requirement in made.experiment.spec.requirements:
+    for requirement in replayed.experiment.spec.requirements:
         for band in parts_of(requirement.formula):
             if isinstance(band, Band):
                 ends = {end for end in (band.lower, band.upper) if np.isfinite(end)}
                 bounds.setdefault(band.signal, set()).update(ends)
         for signal in requirement.signals:
             texts.setdefault(signal, []).append(f"{requirement.key}: {requirement.formula}")
-    names = [*bounds, *(name for name in made.signals if name not in bounds)][:_MOST]
+    names = [*bounds, *(name for name in replayed.signals if name not in bounds)][:_MOST]
     figure, axes = stacked_axes(rows=len(names), height=1.7)
     for ax, name in zip(axes, names, strict=True):
-        ax.plot(made.time, made.signals[name], color=BLUE, linewidth=1.2)
+        ax.plot(replayed.time, replayed.signals[name], color=BLUE, linewidth=1.2)
         for end in bounds.get(name, ()):
             ax.axhline(end, color=ORANGE, linestyle="--", linewidth=1.0)
         ax.set_ylabel(name)

@@ -23,18 +23,6 @@ from .code.rule import Grant, check_defined, check_function, check_loop_function
 from .file.schema import Law
 from .kind import Kind
 
-__all__ = [
-    "DEFAULT",
-    "check_complete",
-    "checked_definition",
-    "loop_function",
-    "named",
-    "named_function",
-    "named_kind",
-    "option",
-    "uncertain",
-]
-
 DEFAULT = "default"
 """The option that leaves a keyword of the loop as it is."""
 

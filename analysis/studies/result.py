@@ -18,8 +18,6 @@ from .file.schema import Study, keyed
 from .finding import Finding
 from .sealed import as_json, origin_key
 
-__all__ = ["LISTED", "Result"]
-
 LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
 

@@ -25,6 +25,7 @@ from .build import main_design
 from .file.schema import Study, keyed
 from .finding import Finding
 from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
+from .intact.contents import seal, unseal
 from .kind import Ground, Setup, answer, unanswered
 from .origin import (
     compared_differences,
@@ -37,9 +38,6 @@ from .reading.parse import StudyFile, read_study
 from .reading.written import remember_run, to_toml
 from .result import Result
 from .sealed import RunFolderError, origin_key, write_json
-from .whole.contents import seal, unseal
-
-__all__ = ["Reopened", "Watch", "reopened", "rerun_file", "run"]
 
 _OWN = (
     ".lock",

@@ -15,20 +15,6 @@ from nlctl.host.files import replace_file
 
 from ..json_values import as_json, from_json
 
-__all__ = [
-    "ANEW",
-    "RUN_FORMAT",
-    "RunFolderError",
-    "as_json",
-    "as_written",
-    "digest_of",
-    "file_bytes",
-    "file_digest",
-    "origin_key",
-    "read_json",
-    "write_json",
-]
-
 RUN_FORMAT = 4
 """Of all files of a run folder; others are refused."""
 SEAL = "sha256"

@@ -45,19 +45,19 @@ def heading(title, sign="="):
 def group_page(group, lines):
     """Return the page of a group: links with what each is, and the pages below it."""
     page = heading(TITLES.get(group, group.capitalize()))
-    for name, told in lines.items():
-        page += [f":doc:`{name} <../{name}>`", f"    {escaped(told)}", ""]
+    for name, caption in lines.items():
+        page += [f":doc:`{name} <../{name}>`", f"    {escaped(caption)}", ""]
     page += [".. toctree::", "   :hidden:", ""]
     return page + [f"   ../{name}" for name in lines]
 
 
-def figure(folder, name, drawing, told):
+def figure(folder, name, drawing, caption):
     """Save a drawing next to the page; return the lines that show it."""
     import matplotlib as mpl
 
     with mpl.rc_context({"svg.hashsalt": "nlctl", "svg.fonttype": "path"}):
         drawing.savefig(folder / f"{name}.svg", metadata={"Date": None}, bbox_inches="tight")
-    return [f".. image:: {name}.svg", f"   :alt: {told}", "   :class: block-picture", ""]
+    return [f".. image:: {name}.svg", f"   :alt: {caption}", "   :class: block-picture", ""]
 
 
 def signals(made):

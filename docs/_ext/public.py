@@ -27,11 +27,11 @@ def entry(module, name):
         return [f".. autoexception:: {full}"]
     if hasattr(thing, "feedthrough"):  # its equations are in its docstring
         return [f".. autoclass:: {full}"]
-    methods = [key for key, value in vars(thing).items() if _is_told(thing, key, value)]
+    methods = [key for key, value in vars(thing).items() if _is_texts(thing, key, value)]
     return [f".. autoclass:: {full}", *([f"   :members: {', '.join(methods)}"] if methods else [])]
 
 
-def _is_told(thing, key, value):
+def _is_texts(thing, key, value):
     """Whether it is a method or property of this class, not the default of a field."""
     if key.startswith("_") or key in thing.__dict__.get("__dataclass_fields__", {}):
         return False
@@ -88,8 +88,8 @@ class Controllers(SphinxDirective):
         for guide in GUIDES:
             lines += [guide.name, "-" * len(guide.name), ""]
             lines += [".. code-block:: python", "", f"   {guide.code}", ""]
-            told = {key: words for key, words in rows_of(guide).items() if key != "code"}
-            lines += [f":{key}: {_text(words)}" for key, words in told.items()]
+            texts = {key: words for key, words in rows_of(guide).items() if key != "code"}
+            lines += [f":{key}: {_text(words)}" for key, words in texts.items()]
             lines.append("")
         return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
 

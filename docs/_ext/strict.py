@@ -4,7 +4,7 @@ import warnings
 
 
 def warnings_are_errors(gallery_conf, script):
-    """Set the filter anew before each script."""
+    """Set the filter again before each script."""
     from nlctl.errors import EngineWarning
 
     warnings.simplefilter("error", EngineWarning)

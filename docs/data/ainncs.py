@@ -1,7 +1,7 @@
 """Four neural controllers that sample (ARCH competition, category AINNCS), as diagrams.
 
 Plants, boxes of initial states and specifications are those of the repository
-verivital/ARCH-COMP2020 (the pendulum's smaller box is of a later year); README.md beside this file
+verivital/ARCH-COMP2020 (the pendulum's smaller box is of a later year); README.md next to this file
 says where the weights are from.
 """
 

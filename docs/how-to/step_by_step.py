@@ -2,7 +2,7 @@ r"""
 Step by step: reinforcement learning, predictive control
 ========================================================
 
-``nlctl.stepper`` makes of a diagram a run that goes on whenever it is given inputs for another step. Memories, clocks,
+``nlctl.stepper`` makes of a diagram a run that continues whenever it is given inputs for another step. Memories, clocks,
 delays and the integrator's own steps are kept between two calls: n steps are one run with ``hold="zoh"``, here bit
 for bit.
 """

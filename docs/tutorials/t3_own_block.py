@@ -85,5 +85,5 @@ plt.xlabel("t (s)")
 assert np.abs(response.outputs - np.maximum.accumulate(u)).max() < 1e-3
 
 # %%
-# Either is an actuator of any loop, ``nlctl.interconnect({..., "actuator": Lag(T=0.01)})``, and of a study file beside it,
+# Either is an actuator of any loop, ``nlctl.interconnect({..., "actuator": Lag(T=0.01)})``, and of a study file next to it,
 # ``options.lag = { function = "arm.py:Lag", T = 0.01 }``: see :doc:`/studies`.

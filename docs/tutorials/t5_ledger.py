@@ -2,7 +2,7 @@ r"""
 5. Reading the proof's ledger
 =============================
 
-``ledger`` goes through the paper's proof line by line, along a run, and says of each what became of it.
+``ledger`` goes through the paper's proof line by line, along a run, and says whether each holds.
 The same from a terminal: ``nlctl check example-1``.
 """
 

@@ -2,7 +2,7 @@ r"""
 6. From python-control
 ======================
 
-nlctl's diagrams are python-control's. What you have works as it stands, and may be mixed.
+nlctl's diagrams are python-control's. What you have works unchanged, and may be mixed.
 """
 
 import control as ct

@@ -59,7 +59,7 @@ pendulum = nlctl.block(Pendulum(), "pendulum")
 print(pendulum)
 
 # %%
-# One run, and one with another length: nothing is built anew.
+# One run, and one with another length: nothing is built again.
 t = np.linspace(0, 10, 1001)
 for params in ({}, {"pendulum.l": 1.0}):
     theta = nlctl.input_output_response(pendulum, t, 0, [1.0, 0.0], params=params).outputs[0]

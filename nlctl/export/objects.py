@@ -98,8 +98,8 @@ def object_code(controller: ExportedController, target: str) -> bytes:
 def _machine(target: str) -> Any:
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    made, which = llvm.Target.from_triple(target), TARGETS[target]
-    return made.create_target_machine(
+    triple, which = llvm.Target.from_triple(target), TARGETS[target]
+    return triple.create_target_machine(
         cpu=which.cpu, features=which.features, opt=2, abiname=which.abi
     )
 

@@ -17,8 +17,6 @@ from importlib.machinery import ModuleSpec
 from importlib.util import spec_from_file_location
 from types import ModuleType
 
-__all__ = ["SOURCES", "find_analysis"]
-
 ANALYSIS = "nlctl.analysis"
 NLCTL_FOLDER = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 NEXT_TO_IT = os.path.join(os.path.dirname(NLCTL_FOLDER), "analysis")

@@ -20,8 +20,6 @@ from typing import Any
 
 from .checkout import ANALYSIS, NLCTL_FOLDER
 
-__all__ = ["FORMER", "is_former", "present_name", "use_former_name", "warn_of_it"]
-
 FORMER = "analysis"
 GONE_IN = "0.2"
 

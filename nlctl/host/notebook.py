@@ -5,8 +5,6 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
-__all__ = ["table_html"]
-
 
 def table_html(heading: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a heading and a table as HTML; every text is escaped."""

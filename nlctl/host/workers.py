@@ -8,8 +8,6 @@ import threading
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import wait
 
-__all__ = ["end_with_parent", "process_pool"]
-
 ORPHANED = 1  # exit code that nobody reads
 _WATCHED = threading.Event()
 
@@ -21,9 +19,7 @@ def process_pool(jobs: int) -> ProcessPoolExecutor:
     work would otherwise wait for ever, since it holds both ends of the queue that it waits at.
     """
     return ProcessPoolExecutor(
-        jobs,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=end_with_parent,
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=end_with_parent
     )
 
 

@@ -15,8 +15,6 @@ from ..errors import ParameterError
 from ..params import param, record
 from .signals import estimate_names, set_names
 
-__all__ = ["HighGainObserver"]
-
 
 @equation
 def nothing_known(x, u):

@@ -16,8 +16,6 @@ from ..expressions.jacobian_source import jacobian_function
 from ..params import as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
-__all__ = ["ExtendedKalmanFilter"]
-
 _MOST = 8  # states
 
 
@@ -191,13 +189,13 @@ class ExtendedKalmanFilter:
 
 def _numbers(name: str, given: Any, otherwise: np.ndarray) -> Any:
     """Return finite numbers of a shape as tuples, those of `otherwise` if there are none."""
-    found = otherwise if not np.size(given) else as_numbers(given)
-    if found is None or found.shape != otherwise.shape or not np.all(np.isfinite(found)):
+    matrix = otherwise if not np.size(given) else as_numbers(given)
+    if matrix is None or matrix.shape != otherwise.shape or not np.all(np.isfinite(matrix)):
         shape = " x ".join(map(str, otherwise.shape))
         raise ParameterError(
             f"ExtendedKalmanFilter needs finite numbers of shape {shape} for {name}, got {given!r}"
         )
-    return nested_tuple(found.tolist())
+    return nested_tuple(matrix.tolist())
 
 
 def _check_covariance(name: str, rows: Any, *, definite: bool = False) -> None:

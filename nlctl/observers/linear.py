@@ -14,8 +14,6 @@ from ..params import param, record
 from ..wording import counted
 from .signals import estimate_names, set_names
 
-__all__ = ["LuenbergerObserver", "luenberger"]
-
 _NEAR = 1e-6  # of the largest pole: how far those that were placed may lie from those wanted
 
 
@@ -66,10 +64,10 @@ class LuenbergerObserver:
         """Matrices that fit each other, and a name for each signal."""
         shapes = {key: np.shape(getattr(self, key)) for key in "ABCDL"}
         n, m, k = shapes["A"][0], shapes["B"][1], shapes["C"][0]
-        wanted = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m), "L": (n, k)}
+        needed = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m), "L": (n, k)}
         for key, shape in shapes.items():
-            if shape != wanted[key]:
-                rows, columns = wanted[key]
+            if shape != needed[key]:
+                rows, columns = needed[key]
                 raise ParameterError(
                     f"LuenbergerObserver needs {key} of shape {rows} x {columns} for "
                     f"{counted(n, 'state')}, {counted(m, 'input')} and {counted(k, 'output')}, got "
@@ -115,7 +113,7 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     poles : array_like of shape (n,), optional
         Eigenvalues of A - L C (1/s), complex ones with their conjugates.
     L : array_like of shape (n, k), optional
-        The gain in the place of poles, from `control.lqe` for example.
+        The gain instead of poles, from `control.lqe` for example.
 
     Returns
     -------
@@ -156,26 +154,26 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
 
 def _placed(plant: ct.StateSpace, poles: Any) -> np.ndarray:
     """Return the gain that gives the error these poles."""
-    wanted = np.sort_complex(np.atleast_1d(poles))
-    if wanted.size != plant.nstates:
+    desired = np.sort_complex(np.atleast_1d(poles))
+    if desired.size != plant.nstates:
         raise ParameterError(
             f"luenberger needs {counted(plant.nstates, 'pole')} for '{plant.name}', got "
-            f"{wanted.size}"
+            f"{desired.size}"
         )
     A, C = np.asarray(plant.A), np.asarray(plant.C)
-    equal = np.unique(wanted).size < wanted.size and plant.noutputs == 1
+    equal = np.unique(desired).size < desired.size and plant.noutputs == 1
     try:
-        dual = (ct.acker if equal else ct.place)(A.T, C.T, wanted)
+        dual = (ct.acker if equal else ct.place)(A.T, C.T, desired)
         gain = np.reshape(dual, (plant.noutputs, plant.nstates)).T
-        found = np.sort_complex(np.linalg.eigvals(A - gain @ C))
-        off = np.max(np.abs(np.poly(found) - np.poly(wanted)))
+        placed = np.sort_complex(np.linalg.eigvals(A - gain @ C))
+        off = np.max(np.abs(np.poly(placed) - np.poly(desired)))
     except (ValueError, np.linalg.LinAlgError) as error:
         raise ParameterError(
             f"luenberger cannot place {poles} for '{plant.name}': {error}"
         ) from None
-    if not off <= _NEAR * np.max(np.abs(np.poly(wanted))):
+    if not off <= _NEAR * np.max(np.abs(np.poly(desired))):
         raise ParameterError(
             f"luenberger needs an observable plant, got '{plant.name}': with the gain that was "
-            f"found the error has the poles {np.round(found, 6)}, not {wanted}"
+            f"found the error has the poles {np.round(placed, 6)}, not {desired}"
         )
     return gain

@@ -20,6 +20,6 @@ def set_names(spec: Any, key: str, count: int | None, at_least: int = 1) -> None
     if not are_names(names) or len(set(names)) < len(names):
         raise ParameterError(f"{who} needs different names in {key}, got {names}")
     if len(names) < at_least or count not in (None, len(names)):
-        wanted = f"{count}" if count is not None else f"at least {at_least}"
-        raise ParameterError(f"{who} needs {wanted} in {key}, got {len(names)}: {names}")
+        number = f"{count}" if count is not None else f"at least {at_least}"
+        raise ParameterError(f"{who} needs {number} in {key}, got {len(names)}: {names}")
     object.__setattr__(spec, key, names)

@@ -59,16 +59,16 @@ class PositionControl:
     @equation
     def update(t, x, u, p):
         """The integral of the error."""
-        position, _, wanted = u
-        return (position - wanted,)
+        position, _, desired = u
+        return (position - desired,)
 
     @staticmethod
     @equation
     def output(t, x, u, p):
         """The force."""
         (integral,) = x
-        position, velocity, wanted = u
-        return (-p.K_v * velocity - p.K_p * (position - wanted) - p.K_i * integral,)
+        position, velocity, desired = u
+        return (-p.K_v * velocity - p.K_p * (position - desired) - p.K_i * integral,)
 
 
 def _mass() -> ct.InputOutputSystem:
@@ -189,6 +189,6 @@ def example_4(*, name: str = "example_4") -> ct.InterconnectedSystem:
     >>> nlctl.papers.canudas_de_wit_1995.example_4().output_labels
     ['position', 'velocity', 'force', 'applied']
     """
-    wanted = block(FunctionReference(order=0, function=step), "reference", outputs=["wanted"])
-    parts = [wanted, block(PositionControl(), "control"), _mass(), block(LuGre(), "friction")]
+    steps = block(FunctionReference(order=0, function=step), "reference", outputs=["wanted"])
+    parts = [steps, block(PositionControl(), "control"), _mass(), block(LuGre(), "friction")]
     return interconnect(parts, outputs=[*_OUTPUTS, "applied"], name=name)

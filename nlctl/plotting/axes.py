@@ -10,24 +10,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-__all__ = [
-    "BLUE",
-    "GREEN",
-    "GREY",
-    "LINE",
-    "ORANGE",
-    "PURPLE",
-    "SHORT_LINE",
-    "STYLES",
-    "TEXT_INK",
-    "TIME",
-    "WIDTH",
-    "draw_lines",
-    "legend_above",
-    "set_style",
-    "stacked_axes",
-]
-
 # Okabe-Ito, with a darker purple: distinguishable for colour-blind readers; line styles, markers or
 # hatches distinguish as well.  One colour has one meaning in all figures:
 #   BLUE           what a figure is about: the output, what was found, after a change

@@ -15,8 +15,6 @@ from ..annotations import as_annotated
 from .axes import BLUE, ORANGE, STYLES, TEXT_INK, TIME, legend_above, stacked_axes
 from .labels import plain
 
-__all__ = ["LIMIT", "Limit", "bands", "most_frequent", "quantile", "upper_envelope"]
-
 BANDS = ((0.0, 1.0, 0.2), (0.05, 0.95, 0.35), (0.25, 0.75, 0.6))  # quantiles, opacity
 LINES = ("-", "--", "-.", ":")  # of single runs
 LIMIT = "limit of the spec"
@@ -45,9 +43,9 @@ def bands(
     figure, axes = stacked_axes(rows=len(signals), height=height, figure=figure)
     nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
     for ax, (name, samples) in zip(axes, signals.items(), strict=True):
-        own = tuple(limits.get(name, ()))
+        bounds = tuple(limits.get(name, ()))
         drawn = [samples, *(np.atleast_2d(line[name]) for line in lines.values())]
-        low, high = _range(np.concatenate(drawn), [value for value, *_ in own])
+        low, high = _range(np.concatenate(drawn), [value for value, *_ in bounds])
         if groups:
             _kinds(ax, time, samples, groups, (low, high), nodes)
         else:
@@ -67,7 +65,7 @@ def bands(
                 linewidth=1.2,
                 label=label,
             )
-        for value, start, end in own:
+        for value, start, end in bounds:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)
         unit = units.get(name, "")
         ax.set_ylabel(plain(name) + (f" ({plain(unit)})" if unit else ""), parse_math=False)
@@ -87,10 +85,10 @@ def _kinds(
     """Draw a band and a median for each of the kinds that there are most runs of."""
     kinds = np.asarray(groups, dtype=object)
     for name, (colour, style) in zip(most_frequent(groups), STYLES, strict=False):
-        own = samples[kinds == name]
-        band = np.clip(_band(own, 0.05, 0.95, nodes), *ends)
+        rows = samples[kinds == name]
+        band = np.clip(_band(rows, 0.05, 0.95, nodes), *ends)
         ax.fill_between(time[nodes], *band, color=colour, alpha=0.25, linewidth=0)
-        middle = np.clip(quantile(own, 0.5, np.inf)[nodes], *ends)
+        middle = np.clip(quantile(rows, 0.5, np.inf)[nodes], *ends)
         ax.plot(time[nodes], middle, style, color=colour, linewidth=1.3, label=plain(name))
 
 

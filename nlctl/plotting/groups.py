@@ -16,8 +16,6 @@ import numpy as np
 
 from ..blocks import Block, memory_states, within
 
-__all__ = ["Wires", "groups_of", "wires_of"]
-
 _MOST = 4  # signals in one row: as many as there are line styles
 _COMPARED = 40  # signals of which sums are looked for: their pairs are
 _SAMPLES = 64
@@ -47,9 +45,9 @@ def wires_of(system: Any) -> Wires:
     offsets = np.cumsum([0, *(part.noutputs or 0 for part in system.syslist)])
     shown: dict[int, str] = {}  # by number among the outputs of all blocks
     for label, row in zip(system.output_labels, np.asarray(system.output_map), strict=True):
-        found = np.flatnonzero(row)
-        if found.size == 1 and found[0] < offsets[-1]:
-            shown.setdefault(int(found[0]), label)
+        wires = np.flatnonzero(row)
+        if wires.size == 1 and wires[0] < offsets[-1]:
+            shown.setdefault(int(wires[0]), label)
     owner = np.repeat(np.arange(len(system.syslist)), np.diff(offsets))
     blocks = {label: system.syslist[owner[k]].name for k, label in shown.items()}
     return Wires(blocks=blocks, pairs=tuple(_pairs(system, offsets, shown)))
@@ -75,9 +73,9 @@ def _is_actuator(part: Any) -> bool:
     """
     if (part.ninputs, part.noutputs) != (1, 1) or isinstance(part, ct.StateSpace):
         return False
-    made = within(part)
-    if isinstance(made, Block):
-        spec = made.spec
+    inner = within(part)
+    if isinstance(inner, Block):
+        spec = inner.spec
         from_u_to_v = (tuple(spec.inputs), tuple(spec.outputs)) == (("u",), ("v",))
         return from_u_to_v or set(spec.states) == set(memory_states(spec))
     return not part.nstates or (part.input_labels, part.output_labels) == (["u"], ["v"])
@@ -101,13 +99,13 @@ def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list
     for name, key in kind.items():
         alone = sizes[key] == 1
         rows.setdefault((alone, wires.blocks.get(name, "") if alone else key), []).append(name)
-    found: dict[str, list[str]] = {}
+    groups: dict[str, list[str]] = {}
     for (alone, key), names in rows.items():
         for k in range(0, len(names), _MOST):
             part = names[k : k + _MOST]
             title = key if alone and key else ", ".join(part)
-            found[title if title not in found else f"{title} ({k // _MOST + 1})"] = part
-    return found
+            groups[title if title not in groups else f"{title} ({k // _MOST + 1})"] = part
+    return groups
 
 
 def _sums(signals: Mapping[str, np.ndarray], wires: Wires) -> Iterator[list[str]]:
@@ -135,5 +133,5 @@ def _is_sum(signals: Mapping[str, np.ndarray], name: str, parts: Sequence[str]) 
     y, first = signals[name], signals[parts[0]]
     rest = signals[parts[1]] if len(parts) > 1 else np.zeros_like(y)
     scale = max(np.abs(part).max() for part in (y, first, rest))
-    each = (first + rest, first - rest)
-    return any(np.abs(y - sign * s).max() <= _CLOSE * scale for s in each for sign in (1, -1))
+    sums = (first + rest, first - rest)
+    return any(np.abs(y - sign * s).max() <= _CLOSE * scale for s in sums for sign in (1, -1))

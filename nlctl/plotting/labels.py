@@ -7,8 +7,6 @@ from functools import cache
 
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-__all__ = ["plain"]
-
 _LONGEST = 30
 
 

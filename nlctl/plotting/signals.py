@@ -12,8 +12,6 @@ from matplotlib.figure import Figure
 from .axes import STYLES, TIME, legend_above, stacked_axes
 from .labels import plain
 
-__all__ = ["rows_figure"]
-
 
 def rows_figure(
     time: np.ndarray,

@@ -61,8 +61,8 @@ def rates_and_outputs_now(
 
 
 def _is_plain_diagram(system: Any) -> bool:
-    own = tuple(getattr(each, "__func__", None) for each in (system._rhs, system._out))
-    return own == (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out)
+    methods = tuple(getattr(method, "__func__", None) for method in (system._rhs, system._out))
+    return methods == (ct.InterconnectedSystem._rhs, ct.InterconnectedSystem._out)
 
 
 def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -86,10 +86,10 @@ def _signals_now(
     try:
         return system._compute_static_io(t, x, u)
     except RuntimeError:
-        found = _signals_by_passes(system, t, x, u)
-        if found is None:
+        signals = _signals_by_passes(system, t, x, u)
+        if signals is None:
             raise
-        return found
+        return signals
 
 
 def _signals_by_passes(

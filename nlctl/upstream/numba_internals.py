@@ -1,7 +1,7 @@
 """numba's private names; ``tests/upstream/test_numba_internals.py`` has a test of each.
 
 - ``Dispatcher._cache`` with ``load_overload`` and ``save_overload``: asked before a signature is
-  compiled, and told afterwards.
+  compiled, and reported afterwards.
 - ``CompileResult._reduce`` and ``_rebuild``: compiled code as plain data.
 - ``library.has_dynamic_globals`` and ``lifted``: code that holds addresses of this process.
 - ``codegen().magic_tuple()``: the processor that code is made for.
@@ -54,12 +54,12 @@ SETTINGS += ("DEBUGINFO_DEFAULT", "LLVM_REFPRUNE_PASS", "LLVM_REFPRUNE_FLAGS")
 
 
 def is_jit_disabled() -> bool:
-    """Whether numba leaves functions as they stand (NUMBA_DISABLE_JIT=1)."""
+    """Whether numba compiles nothing (NUMBA_DISABLE_JIT=1)."""
     return bool(getattr(config, "DISABLE_JIT", False))
 
 
 def checks_indices() -> bool:
-    """Whether numba is told to check all indices (NUMBA_BOUNDSCHECK=1)."""
+    """Whether numba checks all indices (NUMBA_BOUNDSCHECK=1)."""
     return bool(getattr(config, "BOUNDSCHECK", False))
 
 
@@ -111,14 +111,14 @@ def _rebuilt(data: Any, target_context: Any) -> CompileResult | None:
 
 def address_of(code: Any, signature: Any) -> int:
     """Return the address of a compiled function as a C function; it holds as long as the code."""
-    made = code.overloads[signature.args]
-    return made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
+    compiled = code.overloads[signature.args]
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
 def name_and_library(code: Any) -> tuple[str, Any]:
     """Return what LLVM calls a function of one signature, and the library that has it."""
-    (made,) = code.overloads.values()
-    return made.fndesc.llvm_func_name, made.library
+    (compiled,) = code.overloads.values()
+    return compiled.fndesc.llvm_func_name, compiled.library
 
 
 def called_libraries(library: Any) -> list[Any]:

@@ -7,8 +7,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-__all__ = ["System", "SystemResponse"]
-
 
 class System(Protocol):
     """A block or a diagram: a `control.NonlinearIOSystem`, and whatever answers as it does.

@@ -38,7 +38,7 @@ def folder(tmp_path_factory):
 def test_runs_of_any_study_are_a_part(folder):
     """Its verdict, and what each analysis found, without a word of what is missing."""
     told = []
-    part, *others = robustness([folder / "run"], tell=told.append)
+    part, *others = robustness([folder / "run"], notify=told.append)
     assert (part.title, told) == ("Robustness", [])
     assert next(section.title for section in others if section.level == 3) == "A lag"
     (row,) = part.items[1].rows
@@ -51,7 +51,7 @@ def test_what_a_part_lacks_is_told(folder, tmp_path):
     run(read_study(study), tmp_path / "run")
     (tmp_path / "loop.py").unlink()
     told = []
-    assert robustness([tmp_path / "run"], tell=told.append)
+    assert robustness([tmp_path / "run"], notify=told.append)
     assert len(told) == 1
     assert told[0].startswith("the report has no fans and no diagram: ")
 

@@ -60,10 +60,9 @@ def test_options_and_single_runs_differ_from_the_limit():
 def test_what_was_before_is_grey_and_what_is_after_is_blue():
     """In tuning and in comparisons."""
     signals = {"y": np.sin(T)}
-    tuned = figures.before_and_after(T, signals, {"y": np.cos(T)})
     compared = figures.overlaid((T, signals), (T, {"y": np.cos(T)}))
     margins = figures.margins_of_both(np.sin(T), np.cos(T))
-    for figure in (tuned, compared, margins):
+    for figure in (compared, margins):
         found = colours_of(figure)
         assert (found["before"], found["after"]) == (axes.GREY.upper(), axes.BLUE)
 

@@ -7,9 +7,8 @@ from test_layers import MODULES
 
 EXCEPTIONS = {
     "AHEAD": "the step from a standstill, of either method; the integrators are compiled from it",
-    "interpolate": "what each integrator offers in the place of the other's",
+    "interpolate": "what each integrator offers instead of the other's",
     "evaluate": "rows of an experiment, in README; and a right-hand side within the integrators",
-    "made": "what a kind of analysis returns, in docs/studies.md; and what a run returns",
     "main": "what a script or a command calls",
     "Spec": "the contract of a block, and a specification of a response: both are public",
     "example_1": "that of each paper, and the same with controllers that studies compare",

@@ -313,7 +313,7 @@ def test_the_first_screen_tells_the_story(visit):
     assert verdict["x"] + verdict["width"] < picture["x"]
     assert abs(verdict["y"] - picture["y"]) < 60
     assert claims["y"] < 600
-    assert page.locator(".verdict").inner_text().startswith("Asked:")
+    assert page.locator(".verdict").inner_text().startswith("Question:")
 
 
 def luminance(page, element, what):

@@ -31,10 +31,14 @@ def drawn(slope):
     return figure
 
 
-def report(claims, slope=1.0, shift=0.0, caption="A line", **numbers):
+def report(claims, slope=1.0, shift=0.0, caption="A line", band=0.0, **numbers):
     picture = Figure(key="line", caption=caption, description="d", figure=drawn(slope))
     signals = {"y": np.sin(T) + shift, "u": np.cos(T)}
-    history = History(key="run-history", caption="c", description="d", time=T, signals=signals)
+    y = signals["y"]
+    history = History(
+        key="run-history", caption="c", description="d", time=T, signals=signals,
+        bands={"y": (y - band, y + band)} if band else {},
+    )  # fmt: skip
     return Report(
         title="Arm",
         verdict="v",
@@ -125,6 +129,21 @@ def test_signals_of_both_are_overlaid_with_their_largest_difference(compared):
     (y, u) = table.rows
     assert (y[0], u[0], u[1]) == ("y", "u", 0.0)
     assert y[1] == pytest.approx(0.25, abs=2e-5)
+
+
+def test_bands_of_both_are_drawn_around_their_signals(compared):
+    """Bands of a half around y on both pages; where only one page has one there is none."""
+    one, two, bare = (report([], shift=s, band=b) for s, b in ((0, 0.5), (0.25, 0.5), (0.25, 0.0)))
+    (figure, _) = next(s for s in compared(one, two).sections if s.key == "signal_changes").items
+    ax = figure.figure.axes[0]
+    for band, line in zip(ax.collections, ax.get_lines(), strict=True):
+        low, high = band.get_paths()[0].get_extents().intervaly
+        assert (low, high) == pytest.approx(
+            (line.get_ydata().min() - 0.5, line.get_ydata().max() + 0.5), abs=2e-5
+        )
+    assert "Bands" in figure.caption
+    (figure, _) = next(s for s in compared(one, bare).sections if s.key == "signal_changes").items
+    assert len(figure.figure.axes[0].collections) == 0
 
 
 @given(st.floats(-3, 3), st.floats(0.1, 2.0), st.integers(3, 40), st.integers(3, 40))

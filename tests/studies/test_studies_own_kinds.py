@@ -64,7 +64,7 @@ from pydantic import Field
 
 from nlctl.analysis.figures import margins_figure
 from nlctl.analysis.report.document import Figure
-from nlctl.analysis.studies import Asked, Kind, made
+from nlctl.analysis.studies import Asked, Kind, finding_of
 
 
 class Spread(Asked):
@@ -84,7 +84,7 @@ def run(asked, ground):
     answer = ""
     if asked.limit is not None:
         answer = "shown" if spread <= asked.limit else "refuted"
-    return made(
+    return finding_of(
         asked,
         f"'{asked.of}' has the standard deviation {spread:.4g} in {values.size} runs.",
         runs=values.size,

@@ -239,7 +239,7 @@ def test_a_received_folder_executes_nothing(home, tmp_path, place):
 
 
 KIND = '''
-from nlctl.analysis.studies import Asked, Kind, made
+from nlctl.analysis.studies import Asked, Kind, finding_of
 
 
 class Rows(Asked):
@@ -247,7 +247,7 @@ class Rows(Asked):
 
 
 def run(asked, ground):
-    return made(asked, "There are rows.", numbers={"rows": len(ground.rows.table)})
+    return finding_of(asked, "There are rows.", numbers={"rows": len(ground.rows.table)})
 
 
 rows = Kind(name="rows", schema=Rows, run=run, title="Rows", needs_rows=True)

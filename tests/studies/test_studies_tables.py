@@ -14,8 +14,8 @@ from studies_example import HEAD, write
 from nlctl.analysis.report import write_gallery
 from nlctl.analysis.robustness.runs.parquet import read_parquet
 from nlctl.analysis.studies import RunFolderError, read_study, run, verify
+from nlctl.analysis.studies.intact.page import check_page, recorded_print
 from nlctl.analysis.studies.sealed import file_digest, read_json, write_json
-from nlctl.analysis.studies.whole.page import check_page, recorded_print
 from nlctl.errors import UsageError
 
 EVERY_KIND = """
@@ -154,7 +154,7 @@ def test_an_edited_page_is_named_and_made_again(copied, name):
         return
     assert nlctl_here("report", copied, "--force").returncode == 1
     (copied / "report.pdf").unlink(missing_ok=True)
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
 
 
 def test_a_page_stays_that_of_a_run_as_long_as_nothing_changes(copied, paged):
@@ -162,7 +162,7 @@ def test_a_page_stays_that_of_a_run_as_long_as_nothing_changes(copied, paged):
     assert verify(copied).has_page
     study = read_study(paged.parent / "study.toml")
     run(study, copied, resume=True, threads=1)
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
     assert verify(copied).has_page
     shutil.rmtree(copied / "rows")  # run again: other wall times, another state of the folder
     run(study, copied, resume=True, threads=1)
@@ -174,10 +174,10 @@ def test_a_page_elsewhere_is_not_in_the_record(copied, tmp_path):
     """Also where that is the folder of another run: whose page it then is not."""
     other = shutil.copytree(copied, tmp_path / "other")
     assert nlctl_here("report", copied, "--out", tmp_path / "elsewhere").returncode == 1
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
     assert not (tmp_path / "elsewhere" / "contents.json").exists()
     assert nlctl_here("report", copied, "--out", other).returncode == 1
-    assert not verify(other).is_whole
+    assert not verify(other).is_intact
 
 
 def test_a_print_belongs_to_its_page(copied):
@@ -185,9 +185,9 @@ def test_a_print_belongs_to_its_page(copied):
     nlctl_here("report", copied)  # the command on it names the folder
     with recorded_print(copied):
         (copied / "report.pdf").write_bytes(b"%PDF of this page")
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
     assert nlctl_here("report", copied).returncode == 1  # the same page
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
     assert nlctl_here("report", copied, "--interactive").returncode == 1
     (problem,) = verify(copied).problems
     assert "report.pdf" in problem
@@ -217,7 +217,7 @@ def test_a_page_of_data_alone_says_the_same(copied, paged, tmp_path, monkeypatch
     """Who received the folder without its code finds no difference to the sender's page."""
     monkeypatch.setenv("NLCTL_CONFIG_DIR", str(tmp_path / "another user"))
     assert "no fans" in nlctl_here("report", copied).stderr
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
     told = nlctl_here("compare", copied, paged)
     assert (told.returncode, told.stdout) == (0, "no difference\n")
 

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nlctl.errors import UsageError
 
 from ...report.document import Claim
 from ...robustness.statistics.guarantee import check_iid
+from ...studies.file.asked import Asked
+from ...studies.finding import Finding
 from ...studies.page.text import without_assumptions
+from ...studies.result import Result
 
-if TYPE_CHECKING:
-    from ...studies.file.asked import Asked
-    from ...studies.finding import Finding
-    from ...studies.result import Result
-
-__all__ = ["claims", "refusal", "verdict"]
-
-TOLD_AT_ONCE = 2
-"""So many findings are told at once where nothing is claimed."""
+AT_ONCE = 2
+"""So many findings are in the verdict where nothing is claimed."""
 
 
 def verdict(result: Result) -> str:
     """Return the report's first sentences: what is refuted, what is not shown yet, and the
     statement with its assumptions."""
-    told = []
+    sentences = []
     if not result.complete:
-        told.append(result.verdict)
+        sentences.append(result.verdict)
     for answer in ("refuted", "not shown yet"):
         these = [finding for finding in result.claims if finding.answer == answer]
         claimed = [f.claim + (f" (needs {f.needs})" if f.needs else "") for f in these]
         if these and result.complete:
-            told.append(f"{answer.capitalize()}: {'; '.join(claimed)}.")
+            sentences.append(f"{answer.capitalize()}: {'; '.join(claimed)}.")
     asked = result.asked
     statements = [f.sentence for f in result.findings if asked[f.key].definition.is_statement]
     if statements:
-        told.append(statements[0])
+        sentences.append(statements[0])
     elif refused := refusal(result):
-        told.append(f"There is no statement about a probability: {refused}.")
-    elif not result.claims and (found := [f for f in result.findings if f.is_answered]):
-        told += [without_assumptions(finding.sentence) for finding in found[:TOLD_AT_ONCE]]
+        sentences.append(f"There is no statement about a probability: {refused}.")
+    elif not result.claims and (answered := [f for f in result.findings if f.is_answered]):
+        sentences += [without_assumptions(finding.sentence) for finding in answered[:AT_ONCE]]
     else:
-        told.append("The study asks for no statement about a probability.")
-    return " ".join(told)
+        sentences.append("The study asks for no statement about a probability.")
+    return " ".join(sentences)
 
 
 def refusal(result: Result) -> str:
@@ -81,8 +75,8 @@ def _measured(finding: Finding, asked: Asked) -> dict[str, str]:
         return {"measured": finding.sentence, "limit": "an answer"}
     measured = asked.definition.measured
     if measured is None:
-        told = {"measured": without_assumptions(finding.sentence), "limit": ""}
+        cells = {"measured": without_assumptions(finding.sentence), "limit": ""}
     else:
-        told = dict(measured(finding, asked))
+        cells = dict(measured(finding, asked))
     needs = f"; needs {finding.needs}" if finding.needs else ""
-    return told | {"measured": told["measured"] + needs}
+    return cells | {"measured": cells["measured"] + needs}

@@ -17,8 +17,6 @@ from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
 from ...robustness.search.evaluation import as_table, margins_of
 from ...robustness.uncertainty.space import nominal
 
-__all__ = ["Histories", "histories"]
-
 _MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
     *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
@@ -45,7 +43,7 @@ class Histories:
     limits : mapping
         By signal what the spec always requires: value, and from when to when (s).
     units : mapping
-        By signal, as far as a metric of the study tells.
+        By signal, as far as a metric of the study has a unit.
     groups : tuple of str
         Options of each row, where the study chooses between some; else empty.
     """
@@ -109,10 +107,10 @@ def _kept(
     kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
     status = np.full(len(rows), "", dtype=object)
     for loop, same in by_diagram(prepared, rows):
-        found = simulate_rows(study, loop, same, keep=names, threads=threads)
-        status[same.index] = found.table["status"].to_numpy()
+        runs = simulate_rows(study, loop, same, keep=names, threads=threads)
+        status[same.index] = runs.table["status"].to_numpy()
         for name in names:
-            kept[name][same.index] = found.signals[name]
+            kept[name][same.index] = runs.signals[name]
     return kept, status
 
 

@@ -18,8 +18,6 @@ from ...studies.result import Result
 from ..diagram import diagram_sections
 from . import text as text
 
-__all__ = ["Published", "StudyLoop", "loop_of", "loop_sections"]
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyLoop:
@@ -75,15 +73,15 @@ def loop_of(prepared: Prepared) -> StudyLoop:
         build = build.func
     build = inspect.unwrap(build)
     module = str(getattr(build, "__module__", ""))
-    found = StudyLoop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
+    named = StudyLoop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
     try:
         path = Path(inspect.getsourcefile(build) or "")
         content = path.read_bytes()
     except (OSError, TypeError):  # a callable object, or made where there is no file
-        return found
+        return named
     return StudyLoop(
-        diagram=found.diagram,
-        maker=found.maker,
+        diagram=named.diagram,
+        maker=named.maker,
         file=path.name,
         source=content.decode(errors="replace") if module.partition(".")[0] != "nlctl" else "",
         sha256=hashlib.sha256(content).hexdigest(),
@@ -93,9 +91,9 @@ def loop_of(prepared: Prepared) -> StudyLoop:
 def loop_sections(loop: StudyLoop, result: Result) -> Iterator[Section]:
     """Yield the loop as it was run, its parameters with what was varied, and its source."""
     from_file = f" in {loop.file} (SHA-256 {loop.sha256})" if loop.file else ""
-    made = Paragraph(text=f"The loop is made by {loop.maker}{from_file}.")
+    origin = Paragraph(text=f"The loop is made by {loop.maker}{from_file}.")
     laws = result.quantities["law"].to_dict()
-    yield from diagram_sections(loop.diagram, ("study_loop", "study_equations"), [made], laws)
+    yield from diagram_sections(loop.diagram, ("study_loop", "study_equations"), [origin], laws)
     if loop.source:
         yield Section(
             key="study_source",

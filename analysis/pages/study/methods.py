@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nlctl.wording import counted
 
-if TYPE_CHECKING:
-    from ...studies.result import Result
-    from .loop import Published
-
-__all__ = ["limits", "methods"]
+from ...studies.result import Result
+from .loop import Published
 
 DONZE = (
     "A. Donzé, O. Maler: Robust satisfaction of temporal logic over real-valued signals. FORMATS "
@@ -34,10 +29,10 @@ def methods(result: Result, published: Published | None = None) -> tuple[list[st
         )
     answered = [f.key for f in result.findings if f.is_answered]
     kinds = dict.fromkeys(result.asked[key].definition for key in answered)
-    told = [kind.method for kind in kinds if kind.method]
+    texts = [kind.method for kind in kinds if kind.method]
     sources = [text for kind in kinds for text in kind.sources]
     loop = [published.citation] if published else []
-    return [first, *told], list(dict.fromkeys([*loop, DONZE, *sources]))
+    return [first, *texts], list(dict.fromkeys([*loop, DONZE, *sources]))
 
 
 def limits(result: Result) -> list[str]:
@@ -48,9 +43,9 @@ def limits(result: Result) -> list[str]:
     if count > 1:
         varied = f"the {count} quantities listed above were"
         law = "laws given there, which are assumed, and taken to be independent of each other"
-    found = [
+    texts = [
         f"Only {varied} varied, within the box given there unless an analysis says otherwise, and "
-        f"by the {law}. What happens with other laws was not looked at.",
+        f"by the {law}. Other laws were not examined.",
         f"Runs end at {study.time.end:g} s. Nothing follows for later times.",
         "All this was sampled, nothing is proved: a search that finds no violation does not show "
         "that there is none, and a bound of a probability is not a bound of a single run.",
@@ -58,8 +53,8 @@ def limits(result: Result) -> list[str]:
         f"and integrated to rtol {study.solver.rtol:g}. The model is taken to be the real loop.",
     ]
     if len(result.claims) > 1:
-        found.append(
+        texts.append(
             "Each bound and interval holds with its own confidence, unless it says otherwise; that "
             "all of them hold together is less likely."
         )
-    return found
+    return texts

@@ -12,11 +12,9 @@ from ...studies.run import reopened
 from ...studies.sealed import RunFolderError, as_written
 from .histories import Histories, histories
 
-__all__ = ["loop_again", "rows_again"]
-
 
 def loop_again(
-    result: Result, *, trust: bool = False, tell: Callable[[str], object]
+    result: Result, *, trust: bool = False, notify: Callable[[str], object]
 ) -> Prepared | None:
     """Return the loop of a run again; None if it has gone."""
     try:
@@ -24,11 +22,13 @@ def loop_again(
     except RunFolderError:
         raise
     except UsageError as error:  # what was found is shown all the same
-        tell(f"the report has no fans and no diagram: {error}")
+        notify(f"the report has no fans and no diagram: {error}")
         return None
     if run.versions:
-        told = f"computed with other versions ({run.versions}): fans are drawn with those of today"
-        tell(f"'{result.folder}' was {told}")
+        notify(
+            f"'{result.folder}' was computed with other versions ({run.versions}): fans are drawn "
+            "with those of today"
+        )
     return run.prepared
 
 
@@ -39,10 +39,10 @@ def rows_again(
     if prepared is None or result.rows is None or not result.rows.done:
         return None
     with as_written(f"'{result.folder}'"):
-        told = [
+        witnesses = [
             look(f)
             for f in result.findings
             if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
         ]
-    witness = min(told, key=lambda pair: pair[1], default=None)
+    witness = min(witnesses, key=lambda pair: pair[1], default=None)
     return histories(prepared, result.rows.table, witness, threads=threads)

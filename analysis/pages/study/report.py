@@ -6,17 +6,18 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.asked import Varied
+from ...studies.finding import Finding
 from ...studies.kinds import KINDS
 from ...studies.page.running import running
 from ...studies.page.text import ASSUMED, assumptions_in, without_assumptions
 from ...studies.reading.own_kinds import STAND_IN
-from ...studies.result import LISTED
+from ...studies.result import LISTED, Result
 from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text
@@ -25,12 +26,6 @@ from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
 from .traceability import traceability
-
-if TYPE_CHECKING:
-    from ...studies.finding import Finding
-    from ...studies.result import Result
-
-__all__ = ["study_part", "study_report", "study_sections"]
 
 OUTCOMES = {  # by the light
     "pass": "shown",
@@ -50,7 +45,7 @@ def study_report(
     if any(":" in a.kind and a.definition.name != STAND_IN for a in result.study.analysis):
         return _composed(
             result, kept, command, loop, published
-        )  # errors of theirs are told as such
+        )  # their errors are reported as such
     with as_written(f"'{result.folder}'"):
         return _composed(result, kept, command, loop, published)
 
@@ -100,9 +95,7 @@ def study_sections(
 ) -> list[Section]:
     """Compose the sections of a study."""
     table = None if result.rows is None or not result.rows.done else result.rows.table
-    asked = [
-        Section(key="study_asked", title="What was asked", items=[*setup_items(result, published)])
-    ]
+    asked = [Section(key="study_asked", title="Setup", items=[*setup_items(result, published)])]
     asked += traceability(result, prefix)
     if published is not None and published.items:
         items = [*published.items]
@@ -116,7 +109,7 @@ def study_sections(
     if table is not None:
         key = "study_rows"  # no analysis is called that: keys of these have hyphens only
         rows = [*row_items(result, table, f"{prefix}{key}")]
-        asked.append(Section(key=key, title="How the runs ended", items=rows))
+        asked.append(Section(key=key, title="Outcomes of the runs", items=rows))
         asked += [
             _section(f, result, without_assumptions(f.sentence), prefix)
             for f in _statements(result)
@@ -124,10 +117,11 @@ def study_sections(
     asked += _findings(result, prefix)
     asked += _assumed(result)
     if limits:
-        told: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
-        asked.append(Section(key="study_limits", title="What this study does not show", items=told))
+        limits: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
+        asked.append(Section(key="study_limits", title="Limitations", items=limits))
     return [
-        replace(made, key=f"{prefix}{made.key}", level=made.level - 2 + level) for made in asked
+        replace(section, key=f"{prefix}{section.key}", level=section.level - 2 + level)
+        for section in asked
     ]
 
 
@@ -150,9 +144,9 @@ def _lead(result: Result, kept: Histories | None) -> Figure | None:
 
 def _assumed(result: Result) -> list[Section]:
     """Return the assumptions of all statements, each once; nothing if there are none."""
-    found = assumptions_in(finding.sentence for finding in result.findings)
-    items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in found]
-    return [Section(key="study_assumed", title=ASSUMED, items=items)] if found else []
+    assumptions = assumptions_in(finding.sentence for finding in result.findings)
+    items = [Paragraph(text=f"{words[:1].upper()}{words[1:]}.") for words in assumptions]
+    return [Section(key="study_assumed", title=ASSUMED, items=items)] if assumptions else []
 
 
 def study_part(
@@ -163,8 +157,8 @@ def study_part(
     """Compose several studies, in short, as a part of another report: first the verdicts."""
     rows = []
     for result, _ in studies:
-        look, told = summary(claims(result))
-        words = f"{told} {without_assumptions(verdict(result))}"
+        look, counts = summary(claims(result))
+        words = f"{counts} {without_assumptions(verdict(result))}"
         asked = result.study.study.question
         rows.append((result.study.study.title, asked, OUTCOMES.get(look, look), words))
     overview = Table(
@@ -199,20 +193,20 @@ def _brief(
 ) -> Iterator[Section]:
     """Yield a study in short: what each analysis found, runs over time, and what it rests on."""
     asked = result.asked
-    found = Table(
+    answers = Table(
         caption=text.FOUND,
         columns=("asked", "found"),
-        rows=[(_title(f, result), _told(f, asked[f.key])) for f in result.findings],
+        rows=[(_title(f, result), _sentence(f, asked[f.key])) for f in result.findings],
     )
     fans = () if kept is None else fan_items(kept, key)
-    yield Section(key=key, title=result.study.study.title, items=[found, *fans], level=3)
+    yield Section(key=key, title=result.study.study.title, items=[answers, *fans], level=3)
     setup = [*setup_items(result, published)]
     if result.rows is not None and result.rows.done:
         setup += margin_items(result, result.rows.table, key)
-    title = "What was asked, and of which runs"
+    title = "Setup, and outcomes of the runs"
     yield Section(key=f"{key}-asked", title=title, items=setup, level=4, folded=True)
-    for made in _assumed(result):
-        yield replace(made, key=f"{key}-assumed", level=4, folded=True)
+    for section in _assumed(result):
+        yield replace(section, key=f"{key}-assumed", level=4, folded=True)
     for finding in result.findings:
         one = asked[finding.key]
         if one.definition.in_brief and finding.is_answered:
@@ -222,7 +216,7 @@ def _brief(
             )
 
 
-def _told(finding: Finding, asked: Any) -> str:
+def _sentence(finding: Finding, asked: Any) -> str:
     """Return what was found, and what was varied if that is not everything."""
     sentence = without_assumptions(finding.sentence)
     if not (isinstance(asked, Varied) and asked.quantities):
@@ -246,18 +240,18 @@ def _findings(result: Result, prefix: str) -> list[Section]:
     places = {kind: place for place, kind in enumerate(KINDS)}
     others = [f for f in _answered(result) if not asked[f.key].definition.is_statement]
     others.sort(key=lambda f: places.get(asked[f.key].definition, len(places)))
-    return [_section(f, result, _told(f, asked[f.key]), prefix) for f in others] + [
+    return [_section(f, result, _sentence(f, asked[f.key]), prefix) for f in others] + [
         Section(key=f.key, title=_title(f, result), items=[Paragraph(text=f.sentence)])
         for f in result.findings
         if not f.is_answered
     ]
 
 
-def _section(finding: Finding, result: Result, told: str, prefix: str) -> Section:
+def _section(finding: Finding, result: Result, sentence: str, prefix: str) -> Section:
     """Return what an analysis found, in words, with figures and tables of its kind."""
     asked = result.asked[finding.key]
     shown = asked.definition.items(finding, result, asked, f"{prefix}{finding.key}")
-    items = [Paragraph(text=told), *shown]
+    items = [Paragraph(text=sentence), *shown]
     return Section(key=finding.key, title=_title(finding, result), items=items)
 
 
@@ -271,7 +265,7 @@ def _answered(result: Result) -> list[Finding]:
 
 
 def numbers(result: Result) -> dict[str, Any]:
-    """Return every number of a study for ``report.json``; long tables are files beside it."""
+    """Return every number of a study for ``report.json``; long tables are files next to it."""
     tables = {
         finding.key: {
             name: table.reset_index().to_dict("records")
@@ -294,10 +288,10 @@ def data_files(folder: Path) -> dict[str, str]:
 
     The chunks of the rows hold wall times: their hash without them is in the provenance.
     """
-    own = [folder / "study.toml", folder / "results.json", *sorted(folder.glob("*/*.parquet"))]
+    paths = [folder / "study.toml", folder / "results.json", *sorted(folder.glob("*/*.parquet"))]
     return {
         path.relative_to(folder).as_posix(): file_hashes([path])[path.name]
-        for path in own
+        for path in paths
         if path.is_file()
     }
 

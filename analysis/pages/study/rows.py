@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,26 +11,17 @@ import pandas as pd
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, History, Item, Paragraph, Table
+from ...report.document import History, Item, Paragraph, Table, captioned
 from ...robustness.search.evaluation import margins_of
 from ...robustness.stl.spec import violates
 from ...studies.page.tables import known
 from ...studies.page.text import clipped, margin_text, status_text, violate
+from ...studies.result import Result
 from . import text as text
 from .claims import refusal
 from .histories import Histories
+from .loop import Published
 from .traceability import has_ids
-
-if TYPE_CHECKING:
-    from ...studies.result import Result
-    from .loop import Published
-
-__all__ = [
-    "fan_items",
-    "margin_items",
-    "row_items",
-    "setup_items",
-]
 
 WORST = 10  # rows that are listed
 _PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics
@@ -69,10 +59,10 @@ def row_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item]:
     """Yield how the rows of the main table ended, and the worst of them."""
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
-    told = violate(violated, len(table))
+    sentence = violate(violated, len(table))
     if refused := refusal(result):
-        told += f". That is not an estimate of a probability: {refused}"
-    yield Paragraph(text=f"{told}.")
+        sentence += f". That is not an estimate of a probability: {refused}"
+    yield Paragraph(text=f"{sentence}.")
     statuses = table["status"].astype(str)
     counts = statuses.value_counts().sort_index()
     yield Table(
@@ -95,12 +85,12 @@ def margin_items(result: Result, table: pd.DataFrame, key: str) -> Iterator[Item
     margins = table["spec"].to_numpy(dtype=float)
     violated = int(np.sum(violates(margins)))
     caption = text.MARGINS_CAPTION + text.VIOLATIONS * bool(violated) + clipped(margins)
-    yield Figure(
-        key=f"{key}-margins",
-        caption=caption,
-        description=f"{caption} {violate(violated, margins.size)}; the median margin is "
+    yield captioned(
+        f"{key}-margins",
+        caption,
+        f"{violate(violated, margins.size)}; the median margin is "
         f"{margin_text(float(figures.quantile(margins, 0.5, -np.inf)))}.",
-        figure=figures.margins_figure(margins),
+        figures.margins_figure(margins),
     )
 
 
@@ -145,10 +135,7 @@ def _worst_rows(result: Result, table: pd.DataFrame) -> Iterator[Table]:
     )
     values = worst[names].itertuples(name=None)
     yield Table(
-        caption="The values of these rows.",
-        columns=("row", *names),
-        rows=list(values),
-        folded=True,
+        caption="The values of these rows.", columns=("row", *names), rows=list(values), folded=True
     )
 
 
@@ -183,26 +170,28 @@ def fan_items(kept: Histories, key: str) -> Iterator[Item]:
         f"the worst run that is known (margin {worst}).{_limits(kept)}{ended} What leaves the "
         "picture is cut off."
     )
-    yield Figure(
-        key=f"{key}-fans",
-        caption=caption,
-        description=f"{caption} {_peaks(kept)}",
-        figure=figures.fans(
-            kept.time, kept.signals, kept.nominal, kept.worst,
-            limits=kept.limits, units=kept.units, groups=kept.groups,
-        ),
+    drawn = figures.fans(
+        kept.time, kept.signals, kept.nominal, kept.worst,
+        limits=kept.limits, units=kept.units, groups=kept.groups,
     )  # fmt: skip
+    yield captioned(f"{key}-fans", caption, _peaks(kept), drawn)
     runs = {"nominal": kept.nominal, "worst": kept.worst}
     both = {f"{name}, {run}": runs[run][name] for name in kept.nominal for run in runs}
     yield History(
         key=f"{key}-history",
         caption=f"The nominal run and the worst one that is known (margin {worst}).",
         description=f"Chart of {', '.join(kept.nominal)} in the nominal and in the worst run; the "
-        "figure above shows the same runs, the slider below tells their values.",
+        "figure above shows the same runs, the slider below shows their values.",
         time=kept.time,
         signals=both,
         shown=list(both)[: len(runs)],
+        bands={} if kept.groups else {f"{n}, nominal": _most(y) for n, y in kept.signals.items()},
     )
+
+
+def _most(samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the band that holds 90 % of the rows at each time."""
+    return figures.quantile(samples, 0.05, -np.inf), figures.quantile(samples, 0.95, np.inf)
 
 
 def _bands(kept: Histories) -> str:
@@ -221,14 +210,14 @@ def _limits(kept: Histories) -> str:
 
 def _peaks(kept: Histories) -> str:
     """Say how large each signal becomes; a run that has ended counts as infinite."""
-    told = []
+    sentences = []
     for name, samples in kept.signals.items():
         largest = [
             float(np.max(np.where(np.isnan(y), np.inf, np.abs(y))))
             for y in (kept.nominal[name], samples, kept.worst[name])
         ]
-        told.append(
+        sentences.append(
             f"Largest magnitude of {name}: nominal {largest[0]:.4g}, of all {largest[1]:.4g}, of "
             f"the worst run {largest[2]:.4g}."
         )
-    return " ".join(told)
+    return " ".join(sentences)

@@ -1,8 +1,8 @@
 """What the page of a study says: captions."""
 
 SPEC = (
-    "What is required of every run. A margin tells by how much a requirement holds, in multiples "
-    "of its bound: 0.2 means that 20 % of the bound are left; a run violates the spec unless the "
+    "What is required of every run. A margin is the distance to the bound of a requirement, as a "
+    "share of that bound: 0.2 means that 20 % of it are left; a run violates the spec unless the "
     "least of its margins is above 0."
 )
 SPACE = (
@@ -24,5 +24,5 @@ PART = (
     "the paper's. nlctl report STUDY.toml makes a whole report on one, and on longer studies; the "
     "files reports/*.toml of nlctl are such studies."
 )
-FOUND = "What was asked of the loop, and what was found."
+FOUND = "Analyses of the loop, and their results."
 SOURCE = "As it was when this page was made:"

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...report.document import Section, Table
 from ...studies.file.schema import keyed
-
-if TYPE_CHECKING:
-    from ...studies.result import Result
-
-__all__ = ["has_ids", "traceability"]
+from ...studies.result import Result
 
 CAPTION = (
     "From requirement to evidence. No claim: no analysis answers the requirement; without an id: "
@@ -57,7 +53,7 @@ def _other_rows(result: Result, prefix: str) -> Iterator[tuple[str, ...]]:
 
 def _claim_cells(result: Result, key: str, asked: Any, prefix: str) -> tuple[str, str, str]:
     """Return the claim of an analysis, its verdict, and the key of its evidence."""
-    found = {finding.key: finding for finding in result.findings}.get(key)
-    if found is None:
+    answered = {finding.key: finding for finding in result.findings}.get(key)
+    if answered is None:
         return asked.claim, "not run yet", ""
-    return found.claim, found.answer, f"{prefix}{key}"
+    return answered.claim, answered.answer, f"{prefix}{key}"

@@ -19,7 +19,7 @@ ACTUATED = ("1", "2", "1-backlash", "2-dead-zone")  # cases: both examples, both
 def paper_verdict(
     runs: Mapping[str, CaseRun], compared: Sequence[Check], far: Mapping[str, LongRun]
 ) -> str:
-    """Return the report's first sentence, and what became of the loops far beyond 20 s."""
+    """Return the report's first sentence, and how the loops end far beyond 20 s."""
     total = len(compared)
     missed = [c for c in compared if not c.passed]
     if missed:
@@ -27,20 +27,20 @@ def paper_verdict(
         worst = missed[int(np.argmax(apart))]
         are = "is" if len(missed) == 1 else "are"
         return (
-            f"Not reproduced: {len(missed)} of {total} numbers {are} missed, most of all "
+            f"Not reproduced: {len(missed)} of {total} numbers {are} off, most of all "
             f"{worst.metric.meaning} of case {worst.expectation.case} "
             f"({worst.value:.8g} instead of {worst.expectation.printed})."
         )
     reproduced = (
-        f"{_tracking(runs)}, and all {total} numbers of an independent computation are reached."
+        f"{_tracking(runs)}, and all {total} numbers agree with an independent computation."
     )
     bursts = [f"{_loop(run)} loses the sign of its gain at {run.burst:.0f} s" for run in _lost(far)]
     if not bursts:
         return reproduced
     return (
-        f"{reproduced} The proof of the theorem does not hold: Lemma 1, on which it rests, is "
-        f"false. Whether all signals stay bounded for all time is open; {', '.join(bursts)}. With "
-        "a law that knows the sign of the gain, a bound for all time is proved."
+        f"{reproduced} The proof of the theorem is not valid: it depends on Lemma 1, which is "
+        f"false. Whether all signals stay bounded for all time is open; {', '.join(bursts)}. If "
+        "the law knows the sign of the gain, a bound for all time is proved."
     )
 
 
@@ -59,10 +59,10 @@ def _tracking(runs: Mapping[str, CaseRun]) -> str:
 def paper_claims(runs: Mapping[str, CaseRun]) -> list[Claim]:
     """Return what the paper claims and these runs can show, with what was found."""
     asked = (
-        ("1", "Example 1: does the output follow its reference through the dead zone?"),
-        ("2", "Example 2: does the output follow its reference through backlash?"),
-        ("1-backlash", "Does Example 1's controller, unchanged, drive backlash as well?"),
-        ("2-dead-zone", "Does Example 2's controller, unchanged, drive the dead zone as well?"),
+        ("1", "Example 1: the output tracks the reference despite the dead zone"),
+        ("2", "Example 2: the output tracks the reference despite backlash"),
+        ("1-backlash", "Example 1: the same controller copes with backlash"),
+        ("2-dead-zone", "Example 2: the same controller copes with the dead zone"),
     )
     return [
         Claim(
@@ -83,7 +83,7 @@ def number_claims(compared: Sequence[Check]) -> list[Claim]:
     reached = sum(c.passed for c in compared)
     return [
         Claim(
-            text="Are all numbers of an independent computation reached?",
+            text="All numbers agree with an independent computation",
             measured=f"{reached} of {len(compared)}",
             limit=f"all {len(compared)}",
             holds=reached == len(compared),
@@ -113,20 +113,20 @@ def theorem_claims(
     proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None = None
 ) -> list[Claim]:
     """Return what the paper claims for all time."""
-    found = [_theorem()] if proofs else []
-    return found + [_bounded(run, burst) for run in _lost(far)]
+    claims = [_theorem()] if proofs else []
+    return claims + [_bounded(run, burst) for run in _lost(far)]
 
 
 def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
     """Return what was found of the proof's steps, and what nlctl proves in its place."""
-    found = []
+    claims = []
     for number, one in proofs.items():
         lines, bound = one.ledger, one.certificate.C_0
         checked = [line for line in lines.lines if line.reading == "corrected"]
-        found += [
+        claims += [
             Claim(
-                text=f"Example {number}: do the proof's steps, corrected where they can be, hold "
-                f"along a run of {HORIZON:g} s?",
+                text=f"Example {number}: the steps of the proof, corrected where possible, hold "
+                f"along a run of {HORIZON:g} s",
                 measured=f"{len(checked) - len(lines.violated)} of {len(checked)} lines",
                 limit=f"all {len(checked)}",
                 holds=lines.holds,
@@ -134,8 +134,8 @@ def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
                 status="checked" if lines.holds else "violated",
             ),
             Claim(
-                text=f"Example {number} with a law that knows the sign of the gain: is there a "
-                "bound for all time from where it starts?",
+                text=f"Example {number}, with the sign of the gain known: |r| is bounded for all "
+                "time from the initial state",
                 measured=f"|r| ≤ {bound:.3f}; a run reaches {one.certified_max_r:.3f}",
                 limit="any bound, proved",
                 holds=bool(np.isfinite(bound)),
@@ -143,13 +143,13 @@ def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
                 status="proved" if np.isfinite(bound) else "undecided",
             ),
         ]
-    return found
+    return claims
 
 
 def _theorem() -> Claim:
     return Claim(
-        text="The paper's theorem: does its proof show that all signals stay bounded for all time?",
-        measured="no: Lemma 1 is false, and (33) to (36) rest on it",
+        text="The theorem's proof shows that all signals stay bounded for all time",
+        measured="no: Lemma 1 is false, and (33) to (36) depend on it",
         limit="proved for all t",
         holds=False,
         evidence="proof-lemma",
@@ -162,10 +162,10 @@ def _bounded(run: LongRun, burst: Burst | None) -> Claim:
     carried = ""
     if burst is not None:
         peak, _ = burst.peaks
-        carried = f"; averaged, |r| peaks at {peak:.2g} and the loop is calm again at ζ = "
+        carried = f"; averaged, |r| peaks at {peak:.2g} and the loop tracks again at ζ = "
         carried += f"{burst.rest:.2f}"
     return Claim(
-        text=f"{_loop(run)}: do all signals stay bounded for all time?",
+        text=f"{_loop(run)}: all signals stay bounded for all time",
         measured=f"the gain loses its sign at {run.burst:.0f} s{carried}",
         limit="bounded for all t",
         holds=False,

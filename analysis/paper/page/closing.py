@@ -10,8 +10,6 @@ import pandas as pd
 from ...report.document import Paragraph, Section, Table
 from .. import HORIZON, METRICS, TAIL, CaseRun
 
-__all__ = ["closing_sections", "metric_table"]
-
 _Runs = Mapping[str, CaseRun]
 
 
@@ -38,7 +36,7 @@ def _choices(runs: _Runs) -> Section:
     shown = [r for r in runs.values() if r.case.group in ("published", "choice")]
     return Section(
         key="choices",
-        title="What the paper leaves open",
+        title="Choices that the paper does not specify",
         folded=True,
         items=[
             Paragraph(
@@ -60,7 +58,7 @@ def _same_verdict(shown: Sequence[CaseRun]) -> bool:
     return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
 
 
-def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
+def _numerics(runs: _Runs, residuals: pd.DataFrame | None) -> Section:
     return Section(
         key="numerics",
         title="Numerics",
@@ -75,22 +73,22 @@ def _numerics(runs: _Runs, found: pd.DataFrame | None) -> Section:
             ),
             Paragraph(
                 text="The backlash is the play operator itself: within a step its memory stands "
-                "still or is carried along, and a step ends where it reverses or touches, in both "
+                "still or is driven, and a step ends where it reverses or touches, in both "
                 "engines. (In plain python-control, which has no hook for accepted steps, its "
                 "memory relaxes onto the play at 1000 1/s; the figures then hold to 5e-5.)"
             ),
-            *([] if found is None else [_apart(found)]),
+            *([] if residuals is None else [_apart(residuals)]),
         ],
     )
 
 
-def _apart(found: pd.DataFrame) -> Table:
+def _apart(residuals: pd.DataFrame) -> Table:
     return Table(
-        caption="The published cases again with other tolerances, and with a stiff method in the "
-        "place of the explicit pair: largest difference over 20 s from tsit5 at 1e-10. The "
+        caption="The published cases with other tolerances, and with a stiff method instead of "
+        "the explicit pair: largest difference over 20 s from tsit5 at 1e-10. The "
         "absolute tolerance is a hundredth of the relative one.",
         columns=("example", "method", "relative tolerance", "difference in e₁", "difference in ζ"),
-        rows=[tuple(row) for row in found.itertuples(index=False)],
+        rows=[tuple(row) for row in residuals.itertuples(index=False)],
     )
 
 
@@ -98,7 +96,7 @@ def _limits(runs: _Runs) -> Section:
     drift = {n: _drift(runs[str(n)]) for n in (1, 2)}
     return Section(
         key="limits",
-        title="What this does not show",
+        title="Limitations",
         items=[
             Paragraph(
                 text=f"The runs end at {HORIZON:g} s, as the paper's do. They show that all "

@@ -10,37 +10,34 @@ from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...pages.notation import formulas
 from ...pages.proof import ledger_section
-from ...report.document import Figure, Item, Paragraph, Section, Table
+from ...report.document import Figure, Item, Paragraph, Section, Table, captioned
 from ..burst import Burst
-from ..evidence import FAR_HORIZONS, LOOK, Evidence, evidence
+from ..evidence import FAR_HORIZONS, LOOK, Evidence
 from ..figures import after_burst
 from . import proof_text as text
-from .proof_text import LONG_RUN
-
-__all__ = ["LONG_RUN", "Evidence", "evidence", "lyapunov_sections"]
 
 
 def lyapunov_sections(
-    found: Mapping[int, Evidence],
+    proofs: Mapping[int, Evidence],
     far: Mapping[str, LongRun] | None = None,
     burst: Burst | None = None,
 ) -> list[Section]:
     """Compose the part from what was found."""
-    if not found:
+    if not proofs:
         return []
-    parts = [section for number, one in found.items() for section in _example(number, one)]
-    return [_finding(found, far or {}, burst), _lemma(), *parts]
+    parts = [section for number, one in proofs.items() for section in _example(number, one)]
+    return [_finding(proofs, far or {}, burst), _lemma(), *parts]
 
 
 def _finding(
-    found: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
+    proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
 ) -> Section:
     return Section(
         key="proof",
-        title="The proof, and what happens far beyond 20 s",
+        title="The stability proof, and simulations far beyond 20 s",
         items=[
             *_burst(far, burst),
-            _slow_drift_table(found),
+            _slow_drift_table(proofs),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
     )
@@ -74,12 +71,12 @@ def _burst(far: Mapping[str, LongRun], burst: Burst | None) -> Iterator[Item]:
 
 
 def _after(run: LongRun, burst: Burst) -> Iterator[Item]:
-    told = text.after_text(run, burst)
-    yield Paragraph(text=told)
+    sentence = text.after_text(run, burst)
+    yield Paragraph(text=sentence)
     yield Figure(
         key="proof-after",
         caption=text.AFTER,
-        description=f"{told} {text.AFTER}",
+        description=f"{sentence} {text.AFTER}",
         figure=after_burst(burst),
     )
 
@@ -87,7 +84,7 @@ def _after(run: LongRun, burst: Burst) -> Iterator[Item]:
 def _far_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FAR_CAPTION,
-        columns=("loop", "rtol", "runs until (s)", "max |e₁| before", "happened"),
+        columns=("loop", "rtol", "simulated until (s)", "max |e₁| before", "outcome"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
@@ -104,7 +101,7 @@ def _far_table(far: Mapping[str, LongRun]) -> Table:
 def _forecast_table(far: Mapping[str, LongRun]) -> Table:
     return Table(
         caption=text.FORECASTS,
-        columns=("loop", "from the first (s)", "forecast", "range", "happened", "outcome"),
+        columns=("loop", "from the first (s)", "prediction", "range", "observed", "outcome"),
         rows=[
             (
                 FAR_HORIZONS[key][0],
@@ -120,9 +117,9 @@ def _forecast_table(far: Mapping[str, LongRun]) -> Table:
     )
 
 
-def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
+def _slow_drift_table(proofs: Mapping[int, Evidence]) -> Table:
     rows = []
-    for number, one in found.items():
+    for number, one in proofs.items():
         c = one.slow_drift
         burst = f"{c.burst:.4g} s" if np.isfinite(c.burst) else "none"
         rest = "none" if c.rest is None else f"{c.rest:.4g}"
@@ -132,7 +129,7 @@ def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
         rows.append((f"Example {number}", f"{c.zeta:.5g}", spent, c.verdict, rest, burst))
     return Table(
         caption=f"The drift of ζ, judged after {LOOK:g} s. {text.SLOW_DRIFT}",
-        columns=("loop", "ζ", "budget spent", "verdict", "ζ comes to rest at", "burst at"),
+        columns=("loop", "ζ", "budget used", "verdict", "ζ settles at", "burst at"),
         rows=rows,
     )
 
@@ -140,7 +137,7 @@ def _slow_drift_table(found: Mapping[int, Evidence]) -> Table:
 def _lemma() -> Section:
     return Section(
         key="proof-lemma",
-        title="What Lemma 1 gives, and what it does not",
+        title="Lemma 1: a counterexample, and what remains",
         level=3,
         items=[Paragraph(text=words) for words in text.LEMMA],
     )
@@ -152,21 +149,21 @@ def _example(number: int, one: Evidence) -> list[Section]:
         ledger_section(one.ledger, key, f"Example {number}: the proof line by line", level=3),
         Section(
             key=f"{key}-bound",
-            title=f"Example {number}: V, its bound, and how far the bound is from what happens",
+            title=f"Example {number}: V, its bounds, and their conservatism",
             level=3,
             folded=True,
             items=[*_bound(key, one)],
         ),
         Section(
             key=f"{key}-steps",
-            title=f"Example {number}: every margin over time",
+            title=f"Example {number}: margins of all steps over time",
             level=3,
             folded=True,
             items=[*_margins(key, one)],
         ),
         Section(
             key=f"{key}-constants",
-            title=f"Example {number}: the constants of the proof",
+            title=f"Example {number}: constants of the proof",
             level=3,
             folded=True,
             items=[_constants(one)],
@@ -176,11 +173,11 @@ def _example(number: int, one: Evidence) -> list[Section]:
 
 def _bound(key: str, one: Evidence) -> Iterator[Item]:
     c = one.conservatism
-    yield Figure(
-        key=f"{key}-V",
-        caption=text.V_CAPTION,
-        description=f"{text.V_CAPTION} C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
-        figure=figures.lyapunov_bound(one.t, one.curves),
+    yield captioned(
+        f"{key}-V",
+        text.V_CAPTION,
+        f"C₀ is {c.C_0:.4g}, max |r| is {c.max_r:.4g}.",
+        figures.lyapunov_bound(one.t, one.curves),
     )
     for caption, group in (
         (text.shares_caption(c), c.shares),
@@ -219,11 +216,11 @@ def _margins(key: str, one: Evidence) -> Iterator[Item]:
         )
     equalities = [m for m in one.margins if m.kind == "equality"]
     worst = max(-m.least / m.scale for m in equalities)
-    yield Figure(
-        key=f"{key}-equations",
-        caption=text.EQUATIONS,
-        description=f"{text.EQUATIONS} The largest is {worst:.2g}.",
-        figure=figures.equality_residuals(equalities),
+    yield captioned(
+        f"{key}-equations",
+        text.EQUATIONS,
+        f"The largest is {worst:.2g}.",
+        figures.equality_residuals(equalities),
     )
 
 

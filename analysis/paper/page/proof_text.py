@@ -34,17 +34,17 @@ CALM = (
     "predicted to stop; the list below says whether it did."
 )
 AFTER = (
-    "Example 2 through its burst, with the ripple of the gain averaged. Left: the filtered error r "
+    "Example 2 beyond its burst, with the ripple of the gain averaged. Left: the filtered error r "
     "and the input u over ζ; between the dashed lines N(ζ) has the wrong sign. Right: the tracking "
-    "error after the burst, with a large constant in the place of |N|, which no longer matters."
+    "error after the burst, with a large constant instead of |N|, which no longer matters."
 )
 FORECASTS = (
-    "What was forecast from the beginning of each run, and what became of it. Held: the burst lies "
-    "in the range, or ζ rests within 0.01 of its place. Failed: there was no burst in the range, "
-    "or ζ has gone past that place. Open: the run does not tell."
+    "What was predicted from the beginning of each run, and what happened. Held: the burst lies "
+    "in the range, or ζ settles within 0.01 of the prediction. Failed: there was no burst in the "
+    "range, or ζ has passed the prediction. Open: the run does not show it."
 )
 FAR_CAPTION = (
-    "Runs of this report far beyond 20 s. "
+    "Simulations far beyond 20 s. "
     "max |e₁|: from 200 s on, until a second before the burst. What comes "
     "after 1000 s of Example 2 is a record of the same computation, kept with the program and "
     "continued from where today's run ends, unless the command at the end of this page has "
@@ -52,7 +52,7 @@ FAR_CAPTION = (
 )
 SLOW_DRIFT = (
     "While ζ crosses an interval between two zeros of N, a lobe, it uses up the lobe's budget, the "
-    "integral of |N|. Drifts: by the fitted balance of the drift it goes on until the budget is "
+    "integral of |N|. Drifts: by the fitted balance of the drift it continues until the budget is "
     "used up, and the gain changes its sign. Settles: by all fits the drift stops before. "
     "Undecided: the fits disagree, or the chirp of Example 1 has not shown enough."
 )
@@ -60,10 +60,10 @@ LEMMA = (
     r"The paper bounds \(V\), \(\zeta\) and \(\int k\,G\,N\,d\zeta\) by its Lemma 1, for all time. "
     r"The lemma is false on [0, ∞): with \(\dot\zeta = c_1 c_2/(2 + e^{\zeta^2})\) and \(V = c_1 + "
     r"I\) its premise holds and \(\zeta\) grows without bound. The reason is the constant "
-    r"\(\alpha_0\) of (31): it pays for a slow drift of \(\zeta\) for ever. So the steps (33) to "
+    r"\(\alpha_0\) of (31): it permits a slow drift of \(\zeta\) for ever. So the steps (33) to "
     r"(36), and that the loop is uniformly ultimately bounded, do not follow from the paper's "
     r"argument.",
-    r"What does follow: over any time that a run was seen to stay in the box, every step up to "
+    r"What remains valid: as long as a run stays in the box, every step up to "
     r"(32) holds, and \(|r| \le C_0\) with \(Q = \sup I(t)\) taken from the run. Without the "
     r"lemma, (31) gives line (c) of the lists below, \(V \le V(0) + \alpha_0 t + \zeta - \zeta(0) "
     r"+ l_+ E_+ - l_- E_-\), with \(l_-\) and \(l_+\) the bounds of \(k\,G\) and \(E_+\), \(E_-\) "
@@ -101,7 +101,7 @@ CONSTANTS = "Every constant of the proof, with how it was obtained. They hold ov
 
 
 def burst_text(run: LongRun) -> str:
-    """Return what a long run came to, in one paragraph."""
+    """Return how a long run ended, in one paragraph."""
     early, *_ = run.predictions
     late = run.predictions[-1]
     sure = "The command below prints the time at another tolerance."
@@ -109,32 +109,32 @@ def burst_text(run: LongRun) -> str:
         sure = f"At a relative tolerance of {run.again[0]:g} it is {run.again[1]:.1f} s."
     r, u = (abs(float(run.signals[name][-1])) for name in ("r", "u"))
     return (
-        "Example 2 as published loses the sign of its gain. It tracks calmly for "
-        f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f} from {min(LOOKS):g} s on; all "
-        f"the while the Nussbaum argument ζ drifts upwards, and at t = {run.burst:.1f} s (relative "
+        "Example 2 as published loses the sign of its gain. It tracks for "
+        f"{run.burst / 3600:.1f} hours, max |e₁| = {run.calm:.3f} from {min(LOOKS):g} s on; "
+        f"meanwhile the Nussbaum argument ζ drifts upwards, and at t = {run.burst:.1f} s (relative "
         f"tolerance {run.rtol:g}) it reaches {run.lobe.high:g}, where the gain N(ζ) changes to "
         "the wrong sign: r and the input grow by orders of magnitude within milliseconds, to "
-        f"{r:.2g} and {u:.2g}, and the integrator's steps shrink to nothing. {sure} That the "
-        "signals are unbounded is not shown by that. The drift told of it long before: from the "
-        f"first {early.time:g} s the burst was forecast for {early.burst:.0f} s, from the first "
+        f"{r:.2g} and {u:.2g}, and the integrator's steps shrink to 0. {sure} This does not show "
+        "that the signals are unbounded. The drift predicts the burst long before: from the "
+        f"first {early.time:g} s it was predicted for {early.burst:.0f} s, from the first "
         f"{late.time:g} s for {late.burst:.0f} s."
     )
 
 
 def after_text(run: LongRun, burst: Burst) -> str:
-    """Return what became of Example 2 after its burst, in one paragraph."""
+    """Return how Example 2 continues after its burst, in one paragraph."""
     peak, largest_input = burst.peaks
     bounds, late = burst.bounds, burst.late_time[-1]
     years = bounds.right.budget / (run.lobe.budget / run.burst) / (365.25 * 86_400)
     gains = " and ".join(f"−{K:g}" for K in burst.late)
     return (
-        "Carried on through the burst with the ripple sin² v averaged and without the gap of the "
+        "Continued through the burst, with the ripple sin² v averaged and without the gap of the "
         f"backlash, |r| reaches {peak:.2g} and |u| {largest_input:.2g} within "
-        f"{1e6 * burst.lasted:.0f} µs, and ζ comes to rest at {burst.rest:.3f}, where N(ζ) has "
-        "the right sign again. By the integral of N alone, whatever the gain does within its "
-        f"bounds, max |r| is at most {bounds.peak[1]:.3g}, and ζ rests between "
-        f"{bounds.rest[0]:.3f} and {bounds.rest[1]:.3f}. Then the loop is calm: |e₁| ≤ "
-        f"{burst.calm:.4f} over {late:.0f} s, found with constants {gains} in the place of N, "
+        f"{1e6 * burst.lasted:.0f} µs, and ζ settles at {burst.rest:.3f}, where N(ζ) has "
+        "the right sign again. By the integral of N alone, for any gain within its "
+        f"bounds, max |r| is at most {bounds.peak[1]:.3g}, and ζ settles between "
+        f"{bounds.rest[0]:.3f} and {bounds.rest[1]:.3f}. Then the loop tracks again: |e₁| ≤ "
+        f"{burst.calm:.4f} over {late:.0f} s, found with constants {gains} instead of N, "
         f"which agree to {100 * burst.apart:.1g} %. At the rate of the drift so far the budget of "
         f"the next lobe lasts for {years:.0e} years. So by this computation the signals stay "
         "finite; that they stay bounded for all time is neither proved nor refuted."
@@ -142,7 +142,7 @@ def after_text(run: LongRun, burst: Burst) -> str:
 
 
 def calm(run: LongRun) -> str:
-    """Return what became of a long run that did not burst."""
+    """Return how a long run ended that did not burst."""
     return f"No burst within {run.time[-1]:.0f} s: ζ ends at {run.signals['zeta'][-1]:.3f}."
 
 

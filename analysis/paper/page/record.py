@@ -13,26 +13,24 @@ from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expec
 from .. import figures as histories
 from . import text as text
 
-__all__ = ["LV_2017", "found_of"]
-
 _CASES = {case.key: case for case in CASES}
 _METRICS = {metric.key: metric for metric in METRICS}
 
 _PLOTS = (
     ("tracking", histories.tracking, r"Output \(y\) and reference \(y_d\)."),
-    (
-        "input",
-        histories.control_input,
-        r"Control input \(u\), and output \(v\) of the actuator.",
-    ),
+    ("input", histories.control_input, r"Control input \(u\), and output \(v\) of the actuator."),
     (
         "error",
         histories.tracking_error,
-        r"Tracking error \(e_1\); the band holds it for "
+        r"Tracking error \(e_1\); it stays in the band for "
         f"t ≥ {TAIL:g} s.",
     ),
     ("states", histories.upper_states, "The other states of the plant."),
-    ("actuator", histories.actuator_path, "The part of the actuator's characteristic in use."),
+    (
+        "actuator",
+        histories.actuator_path,
+        "The part of the actuator's characteristic that is used.",
+    ),
     (
         "nussbaum",
         histories.nussbaum_gain,
@@ -48,14 +46,14 @@ _SHOWN = ("tracking", "input")  # the other figures are folded
 
 
 def found_of(check: Check) -> FoundNumber:
-    """Return a figure that was reached or missed as a statement and what was found."""
+    """Return a number that agrees or does not as a statement and its value."""
     return FoundNumber(statement=_statement(check.expectation), value=check.value)
 
 
 def _statement(expected: Expectation) -> Statement:
     case = _CASES[expected.case]
     return Statement(
-        claim="Are all numbers of an independent computation reached?",
+        claim="All numbers agree with an independent computation",
         part=f"example-{case.example}",
         case=case.title,
         quantity=_METRICS[expected.metric].meaning,
@@ -110,7 +108,7 @@ def _interactive(number: int, run: CaseRun) -> History:
         caption=f"{text.TITLES[number]}: output y, reference yd, tracking error e, control input "
         "u, output of the actuator v, argument of the Nussbaum gain zeta.",
         description=f"Chart of {', '.join(names)} over {HORIZON:g} s; the figures above show the "
-        "same signals, the slider below tells their values.",
+        "same signals, the slider below shows their values.",
         time=run.time,
         signals={name: run.signals[name] for name in names},
         shown=("y", "yd", "e", "zeta"),
@@ -133,16 +131,16 @@ LV_2017 = Paper(
     cases=len(CASES),
     statements=lambda: [_statement(expected) for expected in expectations()],
     reproduced="both examples over 20 s, with either actuator",
-    not_reproduced="the theorem: the lemma that its proof rests on is false",
+    not_reproduced="the theorem: the lemma on which its proof depends is false",
     methods=text.METHODS_TEXT,
     references=text.REFERENCES,
-    numbers_title="The {count} numbers to reach",
+    numbers_title="Comparison with {count} reference values",
     numbers_caption=(
-        "Found by nlctl's engine from the python-control diagrams; to reach: converged digits "
-        "of an independent event-located integration."
+        "Computed by nlctl's engine from the python-control diagrams; reference: converged digits "
+        "of an independent integration that locates events."
     ),
     numbers_key="figures",
-    asked="to reach",
+    asked="reference",
     digits=".10f",
     command="nlctl report",
     packages=("python-flint", "clarabel", "cma"),

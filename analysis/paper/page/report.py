@@ -9,7 +9,7 @@ import pandas as pd
 
 from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
-from ...report.document import Figure, Paragraph, Report, Section
+from ...report.document import Figure, Paragraph, Report, Section, captioned
 from ...reproductions.page import report_of
 from ...reproductions.sections import model_section, part_sections
 from .. import TAIL, CaseRun, checks
@@ -22,8 +22,6 @@ from .proof import Evidence, lyapunov_sections
 from .record import LV_2017, found_of
 from .rivals import rivals_section
 from .sampling import sampling_section
-
-__all__ = ["paper_report", "paper_sections"]
 
 _Runs = Mapping[str, CaseRun]
 
@@ -73,13 +71,13 @@ def paper_sections(
     burst: Burst | None = None,
 ) -> list[Section]:
     """Return the sections of `paper_report` up to those on studies; the arguments are the same."""
-    found = [found_of(check) for check in checks(runs)]
+    numbers = [found_of(check) for check in checks(runs)]
     return [
         model_section(LV_2017),
         *(
             section
             for part in LV_2017.parts
-            for section in part_sections(LV_2017, part, runs, found)
+            for section in part_sections(LV_2017, part, runs, numbers)
         ),
         _exchange(runs),
         *lyapunov_sections(proofs or {}, far, burst),
@@ -89,14 +87,14 @@ def paper_sections(
 def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     """Return the picture at the top: Example 2 follows its reference, and zeta drifts."""
     run = runs["2"]
-    told = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
+    caption = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
     if long is not None and np.isfinite(long.burst):
-        told = f"{told} {text.LEAD_BURST.format(hours=long.burst / 3600)}"
-    return Figure(
-        key="lead",
-        caption=told,
-        description=f"{told} max |e₁| for t ≥ {TAIL:g} s is {run.metrics['tail_max_e']:.5g}.",
-        figure=figures.story(run.time, run.signals["y"], run.signals["yd"], long),
+        caption = f"{caption} {text.LEAD_BURST.format(hours=long.burst / 3600)}"
+    return captioned(
+        "lead",
+        caption,
+        f"max |e₁| for t ≥ {TAIL:g} s is {run.metrics['tail_max_e']:.5g}.",
+        figures.story(run.time, run.signals["y"], run.signals["yd"], long),
     )
 
 
@@ -104,12 +102,12 @@ def _exchange(runs: _Runs) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",
-        title="Exchange of actuators",
+        title="Both controllers with either actuator",
         items=[
             Paragraph(
-                text="The paper's second claim: the controller need not know which actuator it "
-                "drives. Each example runs with the other one's actuator; the controller and its "
-                "parameters stay the same."
+                text="The paper's second claim is that the controller need not know which actuator "
+                "it drives. Each example is simulated with the actuator of the other one; the "
+                "controller and its parameters are unchanged."
             ),
             metric_table(
                 "With its own and with the other actuator.",
@@ -117,16 +115,16 @@ def _exchange(runs: _Runs) -> Section:
             ),
             *(
                 Figure(
-                    key=f"exchange-{own}",
-                    caption=f"Example {own}: tracking error with its own and the other actuator.",
-                    description=f"Example {own}: max |e₁| for t ≥ {TAIL:g} s is "
-                    f"{runs[own].metrics['tail_max_e']:.5g} with its own actuator and "
+                    key=f"exchange-{n}",
+                    caption=f"Example {n}: tracking error with its own and the other actuator.",
+                    description=f"Example {n}: max |e₁| for t ≥ {TAIL:g} s is "
+                    f"{runs[n].metrics['tail_max_e']:.5g} with its own actuator and "
                     f"{runs[other].metrics['tail_max_e']:.5g} with the other one.",
                     figure=histories.error_comparison(
-                        [runs[own], runs[other]], ["own actuator", "other actuator"]
+                        [runs[n], runs[other]], ["own actuator", "other actuator"]
                     ),
                 )
-                for own, other in pairs
+                for n, other in pairs
             ),
         ],
     )

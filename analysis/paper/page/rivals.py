@@ -11,8 +11,6 @@ from .. import TAIL
 from ..rival_record import RIVAL_ACTUATORS, beaten_by, failed_text
 from ..rivals import KNOWLEDGE
 
-__all__ = ["rivals_section"]
-
 _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 
 
@@ -20,26 +18,26 @@ def rivals_section(record: pd.DataFrame) -> Section:
     """Return the section on the paper's controller and its rivals."""
     return Section(
         key="rivals",
-        title="Rivals",
+        title="Comparison with other controllers",
         items=[
             Paragraph(
-                text="The plants of both examples with other controllers, each with gains found by "
-                "the same budget on the same training samples of the example's own actuator, and "
-                "compared on fresh samples, the same for all. Every rival takes the sign of the "
-                "input gain as known; the paper's controller finds it. That is the price of each "
-                "of them, and the last table has the rest."
+                text="The plants of both examples with other controllers. The gains of each were "
+                "found with the same budget on the same training samples of the example's own "
+                "actuator; they are compared on fresh samples, the same for all. All others need "
+                "to know the sign of the input gain, which the paper's controller finds; the last "
+                "table lists what else each needs to know."
             ),
             *(Paragraph(text=_sentence(record, example)) for example in _TITLES),
             _winners(record),
             *(_table(record, example) for example in _TITLES),
             Table(
-                caption="What each controller has to know.",
+                caption="What each controller needs to know.",
                 columns=("controller", "knowledge"),
                 rows=list(KNOWLEDGE.items()),
                 folded=True,
             ),
             Paragraph(
-                text="These are medians of a kept record. The studies behind it, with all pairs, "
+                text="These are medians of a recorded campaign. Its studies, with all pairs, "
                 "differences and intervals, are run by nlctl run reports/rivals-1.toml and "
                 "reports/rivals-2.toml; the command that makes the record again, in a checkout:",
                 code="python campaign/rival_runs.py",
@@ -49,28 +47,28 @@ def rivals_section(record: pd.DataFrame) -> Section:
 
 
 def _sentence(record: pd.DataFrame, example: str) -> str:
-    """Say who beats the paper's controller behind every actuator, and whom it beats."""
-    found, alone = beaten_by(record, example).values(), "no single controller"
+    """Say what is better than the paper's controller with every actuator, and what is worse."""
+    tallies, alone = beaten_by(record, example).values(), "no single controller"
     beaten, beats = (
-        tuple(x for x in KNOWLEDGE if all(x in each[key] for each in found))
+        tuple(x for x in KNOWLEDGE if all(x in tally[key] for tally in tallies))
         for key in ("beaten by", "beats")
     )
     return (
-        f"{_TITLES[example]}: behind all of the actuators alike, the paper's controller as printed "
-        f"is beaten by {_listed(beaten, alone)}, and better than {_listed(beats, alone)}."
+        f"{_TITLES[example]}: with every one of the actuators, the paper's controller as printed "
+        f"is worse than {_listed(beaten, alone)}, and better than {_listed(beats, alone)}."
     )
 
 
 def _winners(record: pd.DataFrame) -> Table:
     return Table(
-        caption="Who beats the paper's controller as printed, and whom it beats: with no more "
-        f"violations and a smaller RMS of e for t ≥ {TAIL:g} s, the exact interval of the median "
-        "difference on the same samples on one side of 0.",
-        columns=("example", "actuator", "beaten by", "better than"),
+        caption="Controllers that are better than the paper's as printed, and those that are "
+        f"worse: no more violations and a smaller RMS of e for t ≥ {TAIL:g} s, with the exact "
+        "interval of the median difference on the same samples on one side of 0.",
+        columns=("example", "actuator", "worse than", "better than"),
         rows=[
-            (title, RIVAL_ACTUATORS[name], _listed(each["beaten by"]), _listed(each["beats"]))
+            (title, RIVAL_ACTUATORS[name], _listed(tally["beaten by"]), _listed(tally["beats"]))
             for example, title in _TITLES.items()
-            for name, each in beaten_by(record, example).items()
+            for name, tally in beaten_by(record, example).items()
         ],
     )
 
@@ -80,10 +78,10 @@ def _listed(labels: tuple[str, ...], nobody: str = "none") -> str:
 
 
 def _table(record: pd.DataFrame, example: str) -> Table:
-    own: Any = record[record["example"] == example]
+    rows: Any = record[record["example"] == example]
     return Table(
         caption=f"{_TITLES[example]}: violations of |e| ≤ 0.15 for t ≥ {TAIL:g} s or |u| ≤ 15 in "
-        f"{own['samples'].iloc[0]} runs (in brackets those that did not reach their end), and "
+        f"{rows['samples'].iloc[0]} runs (in brackets those that did not reach their end), and "
         "medians of the RMS of e, of the largest |u|, and of the energy of u. Less than the "
         "paper: median difference in the RMS of e on the same samples, with its exact interval.",
         columns=(
@@ -97,7 +95,7 @@ def _table(record: pd.DataFrame, example: str) -> Table:
                     "late_rms", "peak_u", "energy", "less", "less_low", "less_high",
                 )),
             )
-            for row in own.to_dict("records")
+            for row in rows.to_dict("records")
         ],
         folded=True,
     )  # fmt: skip

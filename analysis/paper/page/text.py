@@ -1,4 +1,4 @@
-"""What the paper prints: its equations in LaTeX, and its parameters beside the ones used.
+"""What the paper prints: its equations in LaTeX, and its parameters next to the ones used.
 
 Text only.  The numbers in use are filled in from the blocks themselves.
 """
@@ -16,9 +16,9 @@ CITATION = (
 )
 
 QUESTION = (
-    "do both examples do what the paper says, over 20 s and for all time, and does its proof hold?"
+    "are the paper's examples reproducible, and is its proof of boundedness for all time valid?"
 )
-LEAD = "Example 2, top: the output follows its reference through backlash."
+LEAD = "Example 2, top: the output tracks the reference despite backlash."
 LEAD_DRIFT = (
     r"Bottom, the same loop over hours: the argument \(\zeta\) of the Nussbaum gain drifts upwards."
 )
@@ -30,8 +30,8 @@ LEAD_BURST = (
 METHODS_TEXT = (
     "Plant, actuator, reference and controller are blocks of python-control, connected by their "
     "signals; each equation is written once, as in the paper, and compiled to machine code. The "
-    "numbers to reach are validated against an independent computation, to the "
-    "tolerances printed there.",
+    "reference values are those of an independent computation, to the tolerances printed next to "
+    "them.",
     "The proof is taken as a list of numbered statements. Those about all states of a box are "
     "proved by ball arithmetic on the same equations; those about a run are evaluated along it, "
     "with \\(\\dot V\\) as the gradient of V times the right-hand side, and are called checked. "

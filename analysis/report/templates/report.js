@@ -102,9 +102,9 @@ const enlarge = (drawing) => {
   if (home) return;
   home = drawing.parentElement;
   const caption = make("p", "", dialog);
-  const told = home.querySelector("figcaption").cloneNode(true);
-  told.querySelector("button").remove();
-  caption.append(...told.childNodes);
+  const copy = home.querySelector("figcaption").cloneNode(true);
+  copy.querySelector("button").remove();
+  caption.append(...copy.childNodes);
   dialog.insertBefore(drawing, caption);
   dialog.showModal();
 };

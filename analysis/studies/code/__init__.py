@@ -1,1 +1,1 @@
-"""Code that a study names: which of it may run, whose word that is, and how it is loaded."""
+"""Code that a study names: which of it may run, who trusts it, and how it is loaded."""

@@ -21,8 +21,6 @@ import cloudpickle
 from nlctl.errors import ParameterError
 from nlctl.host.former_name import FORMER, is_former
 
-__all__ = ["Admits", "load_file", "loaded_with"]
-
 Admits = Callable[[Path], str]
 """Returns why a file may not be run; nothing if it may."""
 
@@ -68,7 +66,7 @@ def _loaded(name: str, path: Path, admits: Admits | None) -> ModuleType:
     top = path.parents[name.count(".") + (path.name == "__init__.py")]
     module.__dict__["__builtins__"] = vars(builtins) | {"__import__": _importer(name, top, admits)}
     try:
-        content = path.read_bytes()  # never what __pycache__ says of it, which others may have made
+        content = path.read_bytes()  # never __pycache__, which others may have made
         _FILES[name] = path, content
         exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
     except BaseException:

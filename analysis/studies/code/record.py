@@ -20,8 +20,6 @@ from nlctl.host.files import replace_file
 
 from ...json_values import as_json
 
-__all__ = ["record_file", "remember", "remembered", "statement", "study_digest"]
-
 _FORMAT = 1
 
 

@@ -42,18 +42,6 @@ from ..file.schema import Study
 from .loading import loaded_with
 from .record import remember, remembered, statement
 
-__all__ = [
-    "Grant",
-    "Reach",
-    "check_defined",
-    "check_function",
-    "check_loop_function",
-    "check_place",
-    "named_in",
-    "remember_code",
-    "untrusted",
-]
-
 Reach = Literal["nlctl", "study", "all"]
 """What may run unasked: nlctl's own code, the study's folder and packages as well, or anything."""
 

@@ -1,1 +1,1 @@
-"""What a study file may hold: TOML within limits, its shapes, and what is said of mistakes."""
+"""What a study file may contain: TOML within limits, its schema, and messages on mistakes."""

@@ -1,4 +1,4 @@
-"""What a study file says of every analysis, whatever its kind."""
+"""Keys of a study file that every kind of analysis has."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator, Field
 
 from .field_types import Id, Names, Strict
-
-__all__ = ["Asked", "Varied"]
 
 
 def _listed(value: object) -> Any:
@@ -19,7 +17,7 @@ Ids = Annotated[tuple[Id, ...], BeforeValidator(_listed)]
 
 
 class Asked(Strict):
-    """What a study file says of every analysis; the schema of a kind adds its own keys.
+    """Keys of every analysis in a study file; the schema of a kind adds its own.
 
     Examples
     --------

@@ -14,16 +14,6 @@ from nlctl.names import unknown
 
 from .toml import statements
 
-__all__ = [
-    "KeyPath",
-    "Problem",
-    "StudyError",
-    "line_numbers",
-    "located",
-    "place_text",
-    "schema_problems",
-]
-
 KeyPath = tuple[str | int, ...]
 _LONGEST = 600  # characters of a mistake
 OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"

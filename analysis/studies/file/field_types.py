@@ -6,8 +6,6 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-__all__ = ["Confidence", "Flag", "Id", "Names", "Number", "Pair", "Size", "Strict", "Whole"]
-
 # strict: "0.3" and true are no numbers
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Whole = Annotated[int, Field(strict=True)]

@@ -13,20 +13,6 @@ from nlctl.arguments import ATOL, RTOL
 from .asked import Asked
 from .field_types import Id, Number, Pair, Size, Strict, Whole
 
-__all__ = [
-    "About",
-    "Choices",
-    "Faulty",
-    "Law",
-    "Measured",
-    "Rows",
-    "Rule",
-    "SolverTable",
-    "Study",
-    "Times",
-    "keyed",
-]
-
 RESERVED = {"rows"}
 """Keys that no analysis has: the folder of the main table."""
 

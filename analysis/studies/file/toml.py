@@ -7,8 +7,6 @@ import tomllib
 from collections.abc import Iterator
 from typing import Any
 
-__all__ = ["check_depth", "read_toml", "statements", "study_text"]
-
 _LARGEST = 200_000  # characters of a file
 _LONGEST = 8_000  # characters of a line; a key takes the square of its dots to be read
 DEEPEST = 20  # tables and lists inside of each other

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -16,7 +16,7 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...figures.labels import plain
-from ...report.document import Figure
+from ...report.document import Figure, Item, captioned
 from ...robustness import (
     Choice,
     Experiment,
@@ -35,17 +35,12 @@ from ..file.asked import Asked
 from ..file.field_types import Confidence, Names, Whole
 from ..file.schema import Choices
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..resolve import option
+from ..result import Result
 from .context import CLOPPER, HOLM
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["COMPARE"]
 
 MOST_PAIRS = 30  # rows of a table of pairs; of more, only those with the first option are shown
 RANKING = (
@@ -196,7 +191,7 @@ def _run(asked: Compare, ground: Ground) -> Finding | None:
         return None
     table = done.table.astype({c.name: str for c in space.choices})
     comparison = compare(design, options, table, asked.metrics, confidence=asked.confidence)
-    return made(
+    return finding_of(
         asked,
         _sentence(asked, comparison),
         **_answer(asked, comparison),
@@ -246,14 +241,6 @@ def _answer(asked: Compare, comparison: Comparison) -> dict[str, str]:
     return vars(better_verdict(won, lost, adjusted, level, adjusted / p))
 
 
-def _runs(asked: Compare, setup: Setup) -> int:
-    return asked.runs * len(_options(asked, setup).options)
-
-
-def _largest(asked: Compare, quantities: int) -> int:
-    return asked.runs * len(asked.options)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     a, b = asked.better
     metric = next(iter(asked.metrics))
@@ -276,11 +263,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     t, confidence = finding.tables, 100 * finding.numbers["confidence"]
     ranking = t["ranking"]
     caption = RATES.format(confidence=confidence)
-    yield Figure(
-        key=f"{key}-rates",
-        caption=caption,
-        description=f"{caption} {column_in_words(ranking['rate'])}.",
-        figure=figures.violation_rates(ranking),
+    yield captioned(
+        f"{key}-rates",
+        caption,
+        f"{column_in_words(ranking['rate'])}.",
+        figures.violation_rates(ranking),
     )
     titles = {"rate": "share", "rate_low": "from", "rate_high": "to", "failed": "did not end"}
     titles = {c: titles.get(c) or c.replace("rank ", "mean rank ", 1) for c in ranking.columns}
@@ -318,11 +305,11 @@ def _medians(differences: pd.DataFrame, units: Mapping[Any, str], key: str) -> I
             f"{other}: {middle:.4g}"
             for other, middle in zip(others, with_first["median"], strict=True)
         )
-        yield Figure(
-            key=f"{key}-medians-{number}",
-            caption=caption,
-            description=f"{caption} {words}.",
-            figure=figures.paired_differences(with_first, list(others), _axis(metric, units)),
+        yield captioned(
+            f"{key}-medians-{number}",
+            caption,
+            f"{words}.",
+            figures.paired_differences(with_first, list(others), _axis(metric, units)),
         )
 
 
@@ -344,16 +331,11 @@ COMPARE = Kind(
         "(Efron 1987), which is approximate and marked where it is not to be trusted; p-values are "
         "adjusted for the number of pairs (Holm 1979)."
     ),
-    sources=(
-        MCNEMAR_1947,
-        EFRON,
-        HOLM,
-        CLOPPER,
-    ),
+    sources=(MCNEMAR_1947, EFRON, HOLM, CLOPPER),
     keywords=("keyword",),
     check=_check,
-    runs=_runs,
-    largest=_largest,
+    runs=lambda asked, setup: asked.runs * len(_options(asked, setup).options),
+    largest=lambda asked, quantities: asked.runs * len(asked.options),
     experiment=_experiment,
     measured=_measured,
     items=_items,

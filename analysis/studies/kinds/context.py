@@ -15,18 +15,6 @@ from ...robustness.runs.sweep import Sweep
 from ...robustness.statistics.sensitivity import censored
 from ..kind import Ground, column
 
-__all__ = [
-    "AUGER",
-    "CLOPPER",
-    "HANSEN",
-    "HOLM",
-    "HOWARD",
-    "ROBBINS",
-    "SEARCHED",
-    "response",
-    "statement_numbers",
-]
-
 CLOPPER = (
     "C. J. Clopper, E. S. Pearson: The use of confidence or fiducial limits illustrated in the "
     "case of the binomial. Biometrika 26 (1934), pp. 404–413. doi 10.1093/biomet/26.4.404."

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field, model_validator
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Table
+from ...report.document import Item, Table, captioned
 from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Flag, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.text import margin_text
+from ..result import Result
 from .context import CLOPPER
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["DEGRADATION"]
 
 _CAPTION = (
     "Share of violations with all deviations from nominal scaled by a factor; bars: intervals with "
@@ -79,7 +74,7 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     assumed = "; ".join(design_assumptions(independent(space, asked.runs, ground.seed)))
     limit = asked.limit
     verdict = {} if limit is None else vars(bound_verdict(bounds[asked.at], limit))
-    return made(
+    return finding_of(
         asked,
         f"Violations with all deviations scaled: {counts}. The bounds hold with confidence "
         f"{100 * asked.confidence:g} %, {together}. Assumed: "
@@ -89,14 +84,6 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
         numbers={"confidence": asked.confidence, "simultaneous": asked.simultaneous},
         tables={"curve": curve.table},
     )
-
-
-def _runs(asked: AskedDegradation, setup: Setup) -> int:
-    return len(asked.factors) * asked.runs
-
-
-def _largest(asked: AskedDegradation, quantities: int) -> int:
-    return asked.runs * len(asked.factors)
 
 
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
@@ -115,12 +102,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"
     caption = _CAPTION.format(confidence=100 * n["confidence"], together=together)
-    yield Figure(
-        key=f"{key}-curve",
-        caption=caption,
-        description=f"{caption} "
-        + "; ".join(f"{size:g}: {row['rate']:.4g}" for size, row in curve.iterrows()),
-        figure=figures.degradation(curve, asked.at, asked.limit),
+    yield captioned(
+        f"{key}-curve",
+        caption,
+        "; ".join(f"{size:g}: {row['rate']:.4g}" for size, row in curve.iterrows()),
+        figures.degradation(curve, asked.at, asked.limit),
     )
     yield Table(
         caption=f"{text.SAME}.",
@@ -152,9 +138,9 @@ DEGRADATION = Kind(
     ),
     sources=(CLOPPER,),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: len(asked.factors) * asked.runs,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.runs * len(asked.factors),
     measured=_measured,
     items=_items,
 )

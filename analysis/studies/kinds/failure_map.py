@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,21 +13,16 @@ from pydantic import Field
 from nlctl.wording import counted, some_of
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph
+from ...report.document import Item, Paragraph, captioned
 from ...robustness import Space
 from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
 from ..file.asked import Asked
 from ..file.field_types import Pair, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, finding_of
 from ..page.tables import known
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["FAILURE_MAP"]
+from ..result import Result
 
 _CAPTION = (
     "Margin over the plane, the other quantities nominal; between the points that were run, the "
@@ -80,7 +75,7 @@ def _run(asked: Map, ground: Ground) -> Finding:
             f"cells at the boundary have sides {sides}{fine}. Points were chosen near the "
             "boundary, so their share is not a probability."
         )
-    return made(
+    return finding_of(
         asked,
         f"In the plane of {margin_map.x} and {margin_map.y}, the others nominal, {outcome}",
         runs=len(margin_map.table),
@@ -91,14 +86,6 @@ def _run(asked: Map, ground: Ground) -> Finding:
             "boundary": edge,
         },
     )
-
-
-def _runs(asked: Map, setup: Setup) -> int:
-    return asked.runs
-
-
-def _largest(asked: Map, quantities: int) -> int:
-    return max(asked.runs, (asked.cells + 1) ** 2)
 
 
 def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
@@ -112,11 +99,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     caption = _CAPTION + _VIOLATED * bool(np.any(violates(points["spec"])))
     caption += BOUNDARY * bool(len(edge)) + STAR * is_nominal + BOX
     box = tuple((float(row["low"]), float(row["high"])) for _, row in about.iterrows())
-    yield Figure(
-        key=f"{key}-map",
-        caption=caption,
-        description=f"{caption} {finding.sentence}",
-        figure=figures.failure_map_figure(
+    yield captioned(
+        f"{key}-map",
+        caption,
+        finding.sentence,
+        figures.failure_map_figure(
             points,
             finding.tables["triangles"].to_numpy(),
             names,
@@ -146,10 +133,10 @@ FAILURE_MAP = Kind(
         "or may do so between the corners."
     ),
     quantities=("x", "y"),
-    runs=_runs,
+    runs=lambda asked, setup: asked.runs,
     ends_early=True,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.runs, (asked.cells + 1) ** 2),
     items=_items,
     in_brief=True,
 )

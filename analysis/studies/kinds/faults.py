@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -21,7 +21,7 @@ from nlctl.native import Status
 from nlctl.wording import some_of
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph, Table
+from ...report.document import Figure, Item, Paragraph, Table, captioned
 from ...robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
 from ...robustness.runs.experiment import by_diagram, simulate_rows
 from ...robustness.stl.spec import Requirement, violates
@@ -31,15 +31,10 @@ from ..build import faults_of
 from ..file.asked import Asked
 from ..file.field_types import Flag, Names, Size
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.text import DID_NOT_END, margin_text
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["FAULTS"]
+from ..result import Result
 
 TOGETHER = 256  # unfinished runs that are simulated again in batches
 _MOST = 40  # rows of the table of pairs
@@ -90,7 +85,7 @@ def _faults(setup: Setup) -> dict[str, Fault]:
 def _faulty(
     build: Any, options: Mapping[str, Any], faults: Sequence[Fault]
 ) -> ct.InterconnectedSystem:
-    """Return the loop with all faults in it; which of them begin is said by parameters."""
+    """Return the loop with all faults in it; parameters say which of them begin."""
     return with_faults(build(**options), *faults)
 
 
@@ -157,10 +152,6 @@ def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
     single = [(name,) for name in names]
     chosen = [*single, *(combinations(names, 2) if asked.pairs else ())]
     return [((), NEVER), *((which, onset) for onset in asked.onsets for which in chosen)]
-
-
-def _runs(asked: Faults, setup: Setup) -> int:
-    return len(_cases(asked, setup))
 
 
 def _run(asked: Faults, ground: Ground) -> Finding | None:
@@ -261,9 +252,9 @@ def _finding(asked: Faults, effects: pd.DataFrame) -> Finding:
         "pairs_violating": len(bad_pairs),
         "only_together": only,
     }
-    return made(
+    return finding_of(
         asked,
-        f"{words} Nominal values, one run each: nothing is said of other onsets or magnitudes.",
+        f"{words} Nominal values, one run each; other onsets and magnitudes were not examined.",
         **_answer(asked, bad),
         runs=len(effects),
         numbers=numbers,
@@ -300,10 +291,6 @@ def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:
     return {"answer": "refuted" if set(asked.tolerates) & set(violating["first"]) else "shown"}
 
 
-def _largest(asked: Faults, quantities: int) -> int:
-    return len(asked.onsets)
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     """Return the least margin under the faults that are claimed to be tolerated."""
     effects = finding.tables["effects"]
@@ -321,12 +308,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     single = _single(effects)
     names = [_label(row, several) for row in single.to_dict("records")]
     margin = pd.Series(single["margin"].to_numpy(), index=names)
-    yield Figure(
-        key=f"{key}-margins",
-        caption=_MARGINS,
-        description=f"{_MARGINS} "
-        + "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
-        figure=figures.fault_margins(margin),
+    yield captioned(
+        f"{key}-margins",
+        _MARGINS,
+        "; ".join(f"{n}: {margin_text(m)}" for n, m in zip(names, margin, strict=True)),
+        figures.fault_margins(margin),
     )
     watched = _columns(asked, result)
     yield _effects(single, EFFECTS, result, finding.key, watched)
@@ -426,8 +412,8 @@ FAULTS = Kind(
         "begin, and when, are parameters. Rows are nominal but for these."
     ),
     check=_check,
-    runs=_runs,
-    largest=_largest,
+    runs=lambda asked, setup: len(_cases(asked, setup)),
+    largest=lambda asked, quantities: len(asked.onsets),
     experiment=_experiment,
     measured=_measured,
     items=_items,

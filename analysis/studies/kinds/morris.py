@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
 from ..file.asked import Asked
 from ..file.field_types import Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import response
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["MORRIS"]
 
 MORRIS_CAPTION = (
     "Elementary effects on '{of}': μ* is the mean magnitude, with its bootstrap interval; a σ far "
@@ -48,10 +43,6 @@ def _design(asked: Morris, space: Space, seed: int) -> Design:
     return morris(space, asked.trajectories, asked.levels, seed)
 
 
-def _largest(asked: Morris, quantities: int) -> int:
-    return max(asked.levels, asked.trajectories * (quantities + 2))
-
-
 def _run(asked: Morris, ground: Ground) -> Finding | None:
     design = _design(asked, ground.prepared.experiment.space, ground.seed)
     done = ground.run_design(design)
@@ -60,7 +51,7 @@ def _run(asked: Morris, ground: Ground) -> Finding | None:
     values, failed, numbers = response(asked.of, ground, done)
     table = elementary_effects(design, values)
     order = ", ".join(table.nlargest(3, "mu_star").index)
-    return made(
+    return finding_of(
         asked,
         f"Largest mean effects on '{asked.of}': {order} ({counted(done.done, 'run')} of a Morris "
         f"design, which screens and proves nothing).{failed}",
@@ -74,11 +65,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     """Yield the elementary effects."""
     table = finding.tables["effects"]
     caption = MORRIS_CAPTION.format(of=finding.numbers["of"])
-    yield Figure(
-        key=f"{key}-effects",
-        caption=caption,
-        description=f"{caption} μ*: {column_in_words(table['mu_star'])}.",
-        figure=figures.screening(table),
+    yield captioned(
+        f"{key}-effects",
+        caption,
+        f"μ*: {column_in_words(table['mu_star'])}.",
+        figures.screening(table),
     )
     yield result_table(
         table.sort_values("mu_star", ascending=False, kind="stable"),
@@ -97,6 +88,6 @@ MORRIS = Kind(
     sources=(MORRIS_1991,),
     columns=("of",),
     design=_design,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.levels, asked.trajectories * (quantities + 2)),
     items=_items,
 )

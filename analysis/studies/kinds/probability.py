@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from nlctl.wording import counted
 
+from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
+from ..result import Result
 from .context import CLOPPER, HOWARD, ROBBINS, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["PROBABILITY"]
 
 DECIDES_FIXED = (
     " The verdict rests on the exact bounds at the end alone, drawn as a bar: their number of runs "
@@ -54,12 +50,8 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     design, margins = ground.main
     violation = violation_probability(design, margins, asked.confidence, asked.side)
     verdict = {} if asked.limit is None else vars(bound_verdict(violation, asked.limit))
-    return made(
-        asked,
-        str(violation),
-        **verdict,
-        runs=violation.runs,
-        numbers=statement_numbers(violation),
+    return finding_of(
+        asked, str(violation), **verdict, runs=violation.runs, numbers=statement_numbers(violation)
     )
 
 
@@ -97,11 +89,7 @@ PROBABILITY = Kind(
         "Pearson 1934). The running estimate is drawn with a confidence sequence, valid at every "
         "number of runs (Robbins 1970; Howard et al. 2021)."
     ),
-    sources=(
-        CLOPPER,
-        ROBBINS,
-        HOWARD,
-    ),
+    sources=(CLOPPER, ROBBINS, HOWARD),
     needs_rows=True,
     is_statement=True,
     measured=_measured,

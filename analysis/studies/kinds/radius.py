@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness.search.largest_scale import largest_scale
 from ...robustness.search.radius import robustness_radius
 from ..file.asked import Varied
 from ..file.field_types import Confidence, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import margin_text
+from ..result import Result
 from .context import AUGER, CLOPPER, HANSEN, SEARCHED, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["RADIUS"]
 
 SIZES = 12  # that the search tries, roughly
 _CAPTION = "Sizes that were tried, as factors of the box, with the lowest margin found there."
@@ -66,7 +61,7 @@ def _run(asked: AskedRadius, ground: Ground) -> Finding:
     numbers |= {"largest": radius.largest, "margin": radius.margin, "witness": radius.witness}
     if radius.statement is not None:
         numbers["statement"] = statement_numbers(radius.statement)
-    return made(
+    return finding_of(
         asked,
         str(radius),
         **_no_small_violation(asked.limit, radius.upper, radius.largest),
@@ -86,14 +81,6 @@ def _no_small_violation(limit: float | None, upper: float, largest: float) -> di
         return {"answer": "shown"}
     needs = f"a search up to that size: this one ended at {largest:.4g}"
     return {"answer": "not shown yet", "needs": needs}
-
-
-def _runs(asked: AskedRadius, setup: Setup) -> int:
-    return SIZES * asked.runs + asked.draws
-
-
-def _largest(asked: AskedRadius, quantities: int) -> int:
-    return max(asked.runs, asked.draws)
 
 
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
@@ -121,11 +108,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
         for step in steps.to_dict("records")
     )
     caption = _CAPTION + _SMALLEST * bool(np.isfinite(n["upper"])) + text.clipped(steps["margin"])
-    yield Figure(
-        key=f"{key}-sizes",
-        caption=caption,
-        description=f"{caption} Lowest margin by size: {listed}.",
-        figure=figures.radius_steps(steps, float(n["upper"])),
+    yield captioned(
+        f"{key}-sizes",
+        caption,
+        f"Lowest margin by size: {listed}.",
+        figures.radius_steps(steps, float(n["upper"])),
     )
     if n["witness"] is not None:
         yield from found_rows({"violating row": n["witness"]}, result.quantities, key)
@@ -142,16 +129,12 @@ RADIUS = Kind(
         f"At each size of the radius the box was searched by {SEARCHED}, with the same random "
         "numbers; each violation is moved towards nominal along its ray."
     ),
-    sources=(
-        HANSEN,
-        AUGER,
-        CLOPPER,
-    ),
+    sources=(HANSEN, AUGER, CLOPPER),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: SIZES * asked.runs + asked.draws,
     ends_early=True,
     keeps_rows=False,
-    largest=_largest,
+    largest=lambda asked, quantities: max(asked.runs, asked.draws),
     measured=_measured,
     items=_items,
 )

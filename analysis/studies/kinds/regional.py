@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import regional
 from ..file.asked import Asked
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import HOLM
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["REGIONAL"]
 
 _CAPTION = (
     "Distance between the distributions in failing and in passing runs; for choices Cramér's V. 0: "
@@ -54,11 +49,11 @@ def _run(asked: Regional, ground: Ground) -> Finding:
         sentence = (
             f"Every one of {counted(margins.size, 'row')} {which}: nothing sets failures apart."
         )
-        return made(asked, sentence, runs=margins.size)
+        return finding_of(asked, sentence, runs=margins.size)
     table = regional(design, margins)
     largest = table.nlargest(3, "statistic")["statistic"].to_dict()
     largest_first = ", ".join(f"{name} ({value:.2g})" for name, value in largest.items())
-    return made(
+    return finding_of(
         asked,
         f"What sets {counted(margins.size - passed, 'failing row')} most apart from "
         f"{counted(passed, 'passing one')} (distance of the two distributions, 0 to 1): "
@@ -73,11 +68,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     if "differences" not in finding.tables:
         return
     table = finding.tables["differences"]
-    yield Figure(
-        key=f"{key}-distances",
-        caption=_CAPTION,
-        description=f"{_CAPTION} {column_in_words(table['statistic'])}.",
-        figure=figures.set_apart(table),
+    yield captioned(
+        f"{key}-distances",
+        _CAPTION,
+        f"{column_in_words(table['statistic'])}.",
+        figures.set_apart(table),
     )
     columns = {"statistic": "distance"}
     if np.isfinite(table["p"].to_numpy()).any():  # rows are independent draws
@@ -98,11 +93,7 @@ REGIONAL = Kind(
         "all tables with the same sums (Freeman and Halton 1951) or over draws of them where "
         "counts are small; p-values are adjusted for their number (Holm 1979)."
     ),
-    sources=(
-        SPEAR,
-        FREEMAN,
-        HOLM,
-    ),
+    sources=(SPEAR, FREEMAN, HOLM),
     needs_rows=True,
     items=_items,
 )

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
+from ...report.document import Item
 from ...robustness import Design, decide, test_verdict
 from ...robustness.runs.progress import Progress, until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
+from ..result import Result
 from .context import HOWARD, ROBBINS, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["SEQUENTIAL"]
 
 DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
 
@@ -42,7 +38,7 @@ class Sequential(Asked):
 def _run(asked: Sequential, ground: Ground) -> Finding:
     design, margins = ground.main
     test = decide(design, margins, asked.limit, asked.confidence)
-    return made(
+    return finding_of(
         asked,
         str(test),
         **vars(test_verdict(test)),
@@ -83,10 +79,7 @@ SEQUENTIAL = Kind(
         "The sequential test uses a confidence sequence, valid at every number of runs (Robbins "
         "1970; Howard et al. 2021)."
     ),
-    sources=(
-        ROBBINS,
-        HOWARD,
-    ),
+    sources=(ROBBINS, HOWARD),
     needs_rows=True,
     is_statement=True,
     stop=_stop,

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import Design, Space, saltelli, sobol_indices
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
+from ..result import Result
 from .context import response
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["SOBOL"]
 
 SOBOL_CAPTION = (
     "Shares of the variance of '{of}' with bootstrap intervals, confidence {confidence:g} % each. "
@@ -53,10 +48,6 @@ def _design(asked: Sobol, space: Space, seed: int) -> Design:
     return saltelli(space, asked.size, seed)
 
 
-def _largest(asked: Sobol, quantities: int) -> int:
-    return asked.size * (quantities + 2)
-
-
 def _run(asked: Sobol, ground: Ground) -> Finding | None:
     design = _design(asked, ground.prepared.experiment.space, ground.seed)
     done = ground.run_design(design)
@@ -66,7 +57,7 @@ def _run(asked: Sobol, ground: Ground) -> Finding | None:
     table = sobol_indices(design, values, asked.confidence)
     largest = table.nlargest(3, "ST")["ST"].to_dict()
     shares = ", ".join(f"{name} ({share:.0%})" for name, share in largest.items())
-    return made(
+    return finding_of(
         asked,
         f"Largest shares of the variance of '{asked.of}', interactions included: {shares} "
         f"({counted(done.done, 'run')}; intervals by bootstrap with confidence "
@@ -83,11 +74,8 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     caption = SOBOL_CAPTION.format(
         of=finding.numbers["of"], confidence=100 * finding.numbers["confidence"]
     )
-    yield Figure(
-        key=f"{key}-shares",
-        caption=caption,
-        description=f"{caption} S_T: {column_in_words(table['ST'])}.",
-        figure=figures.shares(table),
+    yield captioned(
+        f"{key}-shares", caption, f"S_T: {column_in_words(table['ST'])}.", figures.shares(table)
     )
     columns = {"S1": "S₁", "S1_low": "from", "S1_high": "to"}
     columns |= {"ST": "S_T", "ST_low": "from", "ST_high": "to"}
@@ -105,12 +93,9 @@ SOBOL = Kind(
         "Shares of the variance are estimated from two Sobol' samples and their mixtures (Sobol' "
         "2001; Saltelli et al. 2010)."
     ),
-    sources=(
-        SOBOL_2001,
-        SALTELLI,
-    ),
+    sources=(SOBOL_2001, SALTELLI),
     columns=("of",),
     design=_design,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.size * (quantities + 2),
     items=_items,
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,19 +16,14 @@ from nlctl.sensitivities import MetricGradient, metric_gradient, sensitivity_res
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure
+from ...report.document import Item, captioned
 from ...robustness import Experiment, Space, Uncertain, arguments, from_table, nominal
 from ..file.asked import Asked
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, column, made
+from ..kind import Ground, Kind, Setup, column, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["TORNADO"]
+from ..result import Result
 
 _CAPTION = (
     "'{of}' is {value:.4g} at the nominal values. Bars: its derivative by each quantity times the "
@@ -58,10 +53,6 @@ def _check(asked: Tornado, setup: Setup) -> None:
         raise ParameterError("'tornado' needs quantities that are no integers, got none")
 
 
-def _runs(asked: Tornado, setup: Setup) -> int:
-    return 1 + 2 * len(_numbers(setup.experiment.space))
-
-
 def _run(asked: Tornado, ground: Ground) -> Finding | None:
     """Differentiate the nominal run, then run every quantity at either end of its box."""
     prepared = ground.prepared
@@ -86,7 +77,7 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
         + f"; what changes it most within its box, by its derivative: {largest} (one run with "
         f"{counted(len(varied), 'derivative')}, {counted(len(rows), 'run')} without).{without}"
     )
-    return made(
+    return finding_of(
         asked,
         sentence,
         runs=1 + len(rows),
@@ -169,11 +160,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     """Yield the tornado."""
     n, table = finding.numbers, finding.tables["effects"]
     caption = _CAPTION.format(of=n["of"], value=n["value"])
-    yield Figure(
-        key=f"{key}-tornado",
-        caption=caption,
-        description=f"{caption} Towards the upper end: {column_in_words(table['high'])}.",
-        figure=figures.tornado(table, n["value"]),
+    yield captioned(
+        f"{key}-tornado",
+        caption,
+        f"Towards the upper end: {column_in_words(table['high'])}.",
+        figures.tornado(table, n["value"]),
     )
     columns = {"derivative": "derivative", "low": "towards the lower end", "high": "upper end"}
     columns |= {"run_low": "run at the lower end", "run_high": "upper end "}
@@ -194,6 +185,6 @@ TORNADO = Kind(
     sources=(GRIEWANK,),
     columns=("of",),
     check=_check,
-    runs=_runs,
+    runs=lambda asked, setup: 1 + 2 * len(_numbers(setup.experiment.space)),
     items=_items,
 )

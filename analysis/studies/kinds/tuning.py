@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from nlctl.sensitivities import Tuned, tune
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph, Table
+from ...report.document import Item, Paragraph, Table, captioned
 from ...robustness import (
     Experiment,
     Prepared,
@@ -37,17 +37,12 @@ from ...robustness.statistics.guarantee import rounded_up
 from ..file.asked import Asked
 from ..file.field_types import Confidence, Pair, Size, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
 from ..page.tables import column_in_words, result_table
 from ..page.text import margin_text
+from ..result import Result
 from .context import CLOPPER, statement_numbers
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["GAIN_TUNING"]
 
 _BOTH = "Signals with the gains of the start and with those that were found, at nominal values."
 _TRIED = "What every choice of gains was worth on the samples that gains were found on."
@@ -126,10 +121,6 @@ def _runs(asked: Tuning, setup: Setup) -> int:
     return int(search) + 2 * asked.runs
 
 
-def _largest(asked: Tuning, quantities: int) -> int:
-    return max(2 * asked.runs, int(asked.budget), asked.samples)
-
-
 def _run(asked: Tuning, ground: Ground) -> Finding | None:
     """Find gains, then run fresh rows with those of before and after."""
     prepared = prepare(_experiment(asked, ground.setup))
@@ -150,7 +141,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
         violation_probability(design, part, asked.confidence) for part in np.split(margins, 2)
     )
     verdict = {} if asked.limit is None else vars(bound_verdict(after, asked.limit))
-    return made(
+    return finding_of(
         asked,
         _sentence(asked, tuned, before, after),
         **verdict,
@@ -293,35 +284,38 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     yield Paragraph(text="The gains that were found:", code=lines)
     signals = tables["signals"]
     names = list(dict.fromkeys(c.rpartition(", ")[0] for c in signals.columns if c != "time"))
-    before, after = ({s: signals[f"{s}, {w}"].to_numpy() for s in names}
-                     for w in ("before", "after"))  # fmt: skip
-    yield Figure(
-        key=f"{key}-signals", caption=_BOTH, description=f"{_BOTH} {_largest_of(before, after)}",
-        figure=figures.before_and_after(signals["time"].to_numpy(), before, after),
-    )  # fmt: skip
-    yield Figure(
-        key=f"{key}-bought", caption=_BOUGHT,
-        description=f"{_BOUGHT} With it alone: {column_in_words(gains['alone'])}.",
-        figure=figures.bought(gains, n["before"], n["after"], what),
-    )  # fmt: skip
+    before, after = (
+        {s: signals[f"{s}, {w}"].to_numpy() for s in names} for w in ("before", "after")
+    )
+    time = signals["time"].to_numpy()
+    drawn = figures.overlaid((time, before), (time, after))
+    yield captioned(f"{key}-signals", _BOTH, _largest_of(before, after), drawn)
+    yield captioned(
+        f"{key}-bought",
+        _BOUGHT,
+        f"With it alone: {column_in_words(gains['alone'])}.",
+        figures.bought(gains, n["before"], n["after"], what),
+    )
     fresh = tables["fresh"]
     margins = fresh["before"].to_numpy(), fresh["after"].to_numpy()
-    yield Figure(
-        key=f"{key}-fresh", caption=_FRESH + text.clipped(np.concatenate(margins)),
-        description=f"{_FRESH} Median before {np.median(margins[0]):.4g}, after "
-        f"{np.median(margins[1]):.4g}.", figure=figures.margins_of_both(*margins),
-    )  # fmt: skip
+    yield captioned(
+        f"{key}-fresh",
+        _FRESH + text.clipped(np.concatenate(margins)),
+        f"Median before {np.median(margins[0]):.4g}, after {np.median(margins[1]):.4g}.",
+        figures.margins_of_both(*margins),
+    )
     yield _requirements_table(tables["requirements"])
-    yield Figure(
-        key=f"{key}-tried", caption=_TRIED + text.clipped(tables["tried"]["margin"]),
-        description=f"{_TRIED} Runs as counted: {n['counted_runs']:.0f}.",
-        figure=figures.tried(tables["tried"], is_cost),
-    )  # fmt: skip
+    yield captioned(
+        f"{key}-tried",
+        _TRIED + text.clipped(tables["tried"]["margin"]),
+        f"Runs as counted: {n['counted_runs']:.0f}.",
+        figures.tried(tables["tried"], is_cost),
+    )
 
 
 def _requirements_table(requirements: pd.DataFrame) -> Table:
     return Table(
-        caption="What was asked, on the samples that gains were found on: least margins, and the "
+        caption="Margins and cost on the samples that gains were found on: least margins, and the "
         "mean of a metric.",
         columns=("number", "before", "after"),
         rows=[(name, margin_text(row["before"]), margin_text(row["after"]))
@@ -356,7 +350,7 @@ GAIN_TUNING = Kind(
     check=_check,
     runs=_runs,
     ends_early=True,
-    largest=_largest,
+    largest=lambda asked, quantities: max(2 * asked.runs, int(asked.budget), asked.samples),
     experiment=_experiment,
     measured=_measured,
     items=_items,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +13,7 @@ from pydantic import Field
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Paragraph, Table
+from ...report.document import Item, Paragraph, Table, captioned
 from ...robustness import nominal
 from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
@@ -22,17 +22,12 @@ from ...robustness.search.worst_case import worst_case
 from ..file.asked import Varied
 from ..file.field_types import Flag, Number, Whole
 from ..finding import Finding
-from ..kind import Ground, Kind, Setup, made
+from ..kind import Ground, Kind, finding_of
 from ..page import text as text
 from ..page.deviations import found_rows
 from ..page.text import DID_NOT_END, margin_text, status_text
+from ..result import Result
 from .context import AUGER, HANSEN, SEARCHED
-
-if TYPE_CHECKING:
-    from ...report.document import Item
-    from ..result import Result
-
-__all__ = ["WORST_CASE"]
 
 SEARCH = "Lowest margin after each run of the search; the background shows what chose the run."
 ZELLER = (
@@ -77,7 +72,7 @@ def _run(asked: AskedWorstCase, ground: Ground) -> Finding:
             sentences.append(str(small))
             numbers["shrunk"] = vars(small)
             count += small.runs
-    return made(
+    return finding_of(
         asked,
         " ".join(sentences),
         **_no_low_margin(asked.limit, worst.margin, bool(numbers.get("is_confirmed", True))),
@@ -99,18 +94,6 @@ def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> di
     return {"answer": "not shown yet", "needs": needs}
 
 
-def _runs(asked: AskedWorstCase, setup: Setup) -> int:
-    return asked.runs
-
-
-def _largest(asked: AskedWorstCase, quantities: int) -> int:
-    return asked.runs
-
-
-def _witness(finding: Finding) -> tuple[Mapping[str, Any], float]:
-    return finding.numbers["witness"], finding.numbers["margin"]
-
-
 def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     n = finding.numbers
     ended = margin_text(n["margin"]) == DID_NOT_END
@@ -130,12 +113,11 @@ def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[I
     n = finding.numbers
     lowest = finding.tables["best"]["margin"].to_numpy(dtype=float)
     caption = SEARCH + text.clipped(lowest)
-    yield Figure(
-        key=f"{key}-search",
-        caption=caption,
-        description=f"{caption} After {counted(lowest.size, 'run')} it is "
-        f"{margin_text(lowest[-1])}.",
-        figure=figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
+    yield captioned(
+        f"{key}-search",
+        caption,
+        f"After {counted(lowest.size, 'run')} it is {margin_text(lowest[-1])}.",
+        figures.search(lowest, list(finding.tables["rows"]["searcher"].astype(str))),
     )
     if "replays" in finding.tables:
         yield _replays(finding.tables["replays"], bool(n["is_confirmed"]))
@@ -182,16 +164,12 @@ WORST_CASE = Kind(
         "of the tolerances with an explicit and a stiff integrator before it is called confirmed, "
         "and shrunk to few deviations (Zeller and Hildebrandt 2002)."
     ),
-    sources=(
-        HANSEN,
-        AUGER,
-        ZELLER,
-    ),
+    sources=(HANSEN, AUGER, ZELLER),
     quantities=("quantities",),
-    runs=_runs,
+    runs=lambda asked, setup: asked.runs,
     ends_early=True,
-    largest=_largest,
+    largest=lambda asked, quantities: asked.runs,
     measured=_measured,
     items=_items,
-    witness=_witness,
+    witness=lambda finding: (finding.numbers["witness"], finding.numbers["margin"]),
 )

@@ -1,4 +1,4 @@
-"""Rows that a search found, beside the nominal one."""
+"""Rows that a search found, next to the nominal one."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ import numpy as np
 import pandas as pd
 
 from ... import figures as figures
-from ...report.document import Figure, Item, Table
+from ...report.document import Item, Table, captioned
 from .tables import known
-
-__all__ = ["deviations_table", "found_rows"]
 
 DEVIATIONS = "How far each quantity lies from nominal: ±1 is the end of its box on that side."
 _Row = Mapping[str, Any]
 
 
 def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> Iterator[Item]:
-    """Yield some rows beside the nominal one, and how far their numbers deviate.
+    """Yield some rows next to the nominal one, and how far their numbers deviate.
 
     What a row leaves out is nominal.
     """
@@ -27,7 +25,7 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
     rows = {label: middle | dict(row) for label, row in rows.items()}
     table = deviations_table(rows, quantities)
     yield Table(
-        caption="Its values beside the nominal ones; * deviates from nominal.",
+        caption="Its values next to the nominal ones; * deviates from nominal.",
         columns=("quantity", "unit", "nominal", *rows),
         rows=[
             (name, unit, middle, *(_marked(row[name], middle) for row in rows.values()))
@@ -35,16 +33,11 @@ def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> 
         ],
     )
     if np.any(table.to_numpy() != 0):
-        told = "; ".join(
+        values = "; ".join(
             f"{name}: " + ", ".join(f"{row} {value:.3g}" for row, value in line.items())
             for name, line in table.iterrows()
         )
-        yield Figure(
-            key=f"{key}-deviations",
-            caption=DEVIATIONS,
-            description=f"{DEVIATIONS} {told}.",
-            figure=figures.deviations(table),
-        )
+        yield captioned(f"{key}-deviations", DEVIATIONS, f"{values}.", figures.deviations(table))
 
 
 def _marked(value: object, middle: Any) -> str:

@@ -11,14 +11,12 @@ import pandas as pd
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Figure, Item
+from ...report.document import Item, captioned
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ...robustness.statistics.sequential import sequence_bounds
 from ...robustness.stl.spec import violates
 from ..finding import Finding
 from ..result import Result
-
-__all__ = ["running", "running_items"]
 
 _POINTS = 150  # of the estimate
 _RUNNING = (
@@ -44,12 +42,12 @@ def running_items(
     last = curve.iloc[-1]
     caption = _RUNNING.format(confidence=100 * confidence) + decides
     ends = f", exact bounds {rounded_down(fixed[0])} and {rounded_up(fixed[1])}" if fixed else ""
-    yield Figure(
-        key=f"{key}-running",
-        caption=caption,
-        description=f"{caption} After {counted(curve.index[-1], 'run')}: {last['rate']:.4g}, band "
+    yield captioned(
+        f"{key}-running",
+        caption,
+        f"After {counted(curve.index[-1], 'run')}: {last['rate']:.4g}, band "
         f"from {last['low']:.4g} to {last['high']:.4g}{ends}.",
-        figure=figures.running_estimate(curve, asked.limit, fixed),
+        figures.running_estimate(curve, asked.limit, fixed),
     )
 
 

@@ -1,4 +1,4 @@
-"""Tables of results and quantities on a page, and what a figure says of a column."""
+"""Tables of results and quantities on a page, and columns in words."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import pandas as pd
 
 from ...report.document import Table
 from . import text as text
-
-__all__ = ["column_in_words", "known", "result_table"]
 
 
 def column_in_words(column: Any) -> str:

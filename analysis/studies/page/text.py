@@ -1,4 +1,4 @@
-"""What the report of a study says of its results: captions, headings, words for numbers."""
+"""Words of the report of a study: captions, headings, numbers in words."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def without_assumptions(sentence: str) -> str:
 def assumptions_in(sentences: Iterable[str]) -> list[str]:
     """Return what statements assume, each assumption once."""
     clauses = (clause for words in sentences for clause in _ASSUMED.findall(words))
-    return list(dict.fromkeys(part for told in clauses for part in told.split("; ")))
+    return list(dict.fromkeys(part for assumption in clauses for part in assumption.split("; ")))
 
 
 def violate(count: int, total: int) -> str:
@@ -46,7 +46,7 @@ def violate(count: int, total: int) -> str:
 
 
 def clipped(margins: Iterable[float]) -> str:
-    """Return what a caption says of margins beyond the picture; nothing where there are none."""
+    """Return the note of a caption on margins beyond the picture; nothing where there are none."""
     return CLIPPED if np.any(~(np.asarray(list(margins), dtype=float) >= -CLIP)) else ""
 
 

@@ -9,8 +9,6 @@ from nlctl.names import unknown
 from ..file.errors import Problem
 from ..file.schema import Study
 
-__all__ = ["id_problems"]
-
 
 def id_problems(study: Study, *, whole: bool) -> Iterator[Problem]:
     """Yield what is wrong with ids; `whole` says that no requirement of the file is missing."""

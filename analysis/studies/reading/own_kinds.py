@@ -20,8 +20,6 @@ from ..kind import Ground, Kind, tagged
 from ..kinds import KINDS
 from ..resolve import named_kind
 
-__all__ = ["STAND_IN", "model_of", "own_kinds", "stand_ins"]
-
 STAND_IN = "gone"
 """Name of the kinds that stand in for those that are not known."""
 

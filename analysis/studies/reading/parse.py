@@ -33,8 +33,6 @@ from ..resolve import checked_definition
 from .own_kinds import model_of, own_kinds
 from .validate import checked_experiment
 
-__all__ = ["StudyFile", "read_study"]
-
 _ROUNDS = 5  # mistakes may stand behind mistakes
 STAND_INS = {  # while the rest of a mistaken file is validated
     "study": {"title": "a study", "seed": 0},

@@ -42,8 +42,6 @@ from ..kind import Setup
 from ..resolve import check_complete, loop_function, option, uncertain
 from .ids import id_problems
 
-__all__ = ["checked_experiment"]
-
 _T = TypeVar("_T")
 _MOST_ROWS = 10_000_000  # of a design or a search
 MOST_DIAGRAMS = 1000

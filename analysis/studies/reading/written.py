@@ -17,8 +17,6 @@ from ..file.toml import read_toml
 from ..kind import Kind
 from .own_kinds import model_of
 
-__all__ = ["from_toml", "remember_run", "to_toml"]
-
 
 @as_annotated
 def to_toml(study: Study) -> str:
@@ -55,14 +53,14 @@ def _data(study: Study) -> dict[str, Any]:
 
 
 @as_annotated
-def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
+def from_toml(text: str, kinds: Mapping[str, Kind] | None = None) -> Study:
     """Return the study in a text that `to_toml` has written.
 
     Parameters
     ----------
     text : str
         In TOML.
-    own : mapping of str to Kind, optional
+    kinds : mapping of str to Kind, optional
         Kinds of analysis of one's own, as the text calls them.
 
     Returns
@@ -90,7 +88,7 @@ def from_toml(text: str, own: Mapping[str, Kind] | None = None) -> Study:
     >>> study.solver.rtol  # the default
     1e-08
     """
-    return model_of(own or {}).model_validate(read_toml(text))
+    return model_of(kinds or {}).model_validate(read_toml(text))
 
 
 def remember_run(study: Study, folder: Path) -> None:

@@ -2,9 +2,9 @@ r"""
 A derivative through backlash
 =============================
 
-What becomes of a signal when a parameter is changed a little is the derivative of a run. Through a play it is one of
+How a signal changes when a parameter is changed a little is the derivative of a run. Through a play it is one of
 three: on its sides :math:`v = A \sin t \mp c`, with :math:`\partial v / \partial A = \sin t` and :math:`\partial v /
-\partial c = \mp 1`; in the gap :math:`v` stands where it has turned, :math:`A - c`, and so do its derivatives, 1 and -1.
+\partial c = \mp 1`; in the gap :math:`v` stands where it has reversed, :math:`A - c`, and so do its derivatives, 1 and -1.
 Nothing is switched by hand: ``nlctl.sensitivity_response`` integrates the derivative of the diagram with the diagram, and
 its memory keeps the derivative of what it keeps.
 """

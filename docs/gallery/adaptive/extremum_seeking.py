@@ -2,7 +2,7 @@ r"""
 Extremum seeking
 ================
 
-A lag whose performance :math:`y = 5 - (\theta - 2)^{2}` nobody has told the controller: it moves :math:`\theta` by
+A lag whose performance :math:`y = 5 - (\theta - 2)^{2}` the controller does not know: it moves :math:`\theta` by
 :math:`a \sin \omega t` and climbs along what comes back (Krstić and Wang, *Automatica* 36(4), 2000). With a fast
 perturbation the average of its estimate is a second-order system in closed form:
 :math:`s^{2} + \omega_{l} s - k \omega_{l} a^{2} h / 2 = 0`, :math:`h = y'' = -2`.

@@ -5,7 +5,7 @@ Stick-slip and break-away of the LuGre model
 A mass that a spring pulls sticks and slips, and it breaks away at a smaller force where the force rises faster: two
 figures of Canudas de Wit, Olsson, Astrom and Lischinsky (IEEE Trans. Automatic Control 40, 1995, not read; its parameters
 are the defaults of ``nlctl.actuators.LuGre``). The period is near that with Coulomb's law, for the Stribeck velocity is
-small next to the slips; pushed slowly, the mass breaks away at the static friction :math:`F_s = 1.5` N.
+small compared with the slips; pushed slowly, the mass breaks away at the static friction :math:`F_s = 1.5` N.
 """
 
 import control as ct

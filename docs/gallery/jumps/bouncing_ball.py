@@ -3,7 +3,7 @@ A ball that bounces
 ===================
 
 A state that jumps where a condition is met: :math:`\dot h = v`, :math:`\dot v = -g`, and where the height falls through 0
-the ball goes on with :math:`v^+ = -e v`. The block says where (``guard``) and what its states are behind the jump
+the ball continues with :math:`v^+ = -e v`. The block says where (``guard``) and what its states are behind the jump
 (``reset``). The bounces are at :math:`t_0 + 2 t_0 (e + e^2 + \dots)` with :math:`t_0 = \sqrt{2 h_0 / g}`; they accumulate
 at :math:`t_0 (1 + e) / (1 - e)`, where a run ends with an error that says so (Zeno).
 """

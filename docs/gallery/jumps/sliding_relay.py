@@ -43,7 +43,7 @@ output.plot(t, np.where(late & (mode == 0), v, np.nan), lw=2, color="C3")
 output.set_xlabel("t (s)")
 output.set_ylabel("v")
 
-# from sample to sample by matrix exponentials: of A beside the surface, on it of the projected A
+# from sample to sample by matrix exponentials: of A next to the surface, on it of the projected A
 h, rest = t[1], np.linalg.solve(A, b)
 for side in (-1, 0, 1):
     k = np.flatnonzero((mode[:-1] == side) & (mode[1:] == side))

@@ -2,7 +2,7 @@ r"""
 The same controller, another actuator
 =====================================
 
-Example 1 with the backlash of Example 2 in the place of its dead zone: nothing else changes. The expected
+Example 1 with the backlash of Example 2 instead of its dead zone: nothing else changes. The expected
 number comes from an independent computation.
 """
 

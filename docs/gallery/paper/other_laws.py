@@ -2,7 +2,7 @@ r"""
 Other laws in the same loop
 ===========================
 
-Example 1 with each law of the catalogue in the place of the paper's, and with a sliding mode. Within the boundary
+Example 1 with each law of the catalogue instead of the paper's, and with a sliding mode. Within the boundary
 layer the sliding mode keeps :math:`|r| \leq \phi`, here 0.1 and unit gain 12, and the tracking error then stays below
 :math:`\phi/\lambda_{1}` (Slotine and Li 1991, section 7.2).
 """

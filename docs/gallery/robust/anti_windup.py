@@ -2,7 +2,7 @@ r"""
 Windup of a PID controller
 ==========================
 
-A saturated integrator goes on integrating. ``PID`` tracks its own limit with the time :math:`T_{t}`; with a very long
+A saturated integrator continues to integrate. ``PID`` tracks its own limit with the time :math:`T_{t}`; with a very long
 one it winds up and overshoots. While saturated at :math:`u_{max}`, a double integrator moves by
 :math:`u_{max} t^{2} / 2`.
 """

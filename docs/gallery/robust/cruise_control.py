@@ -3,7 +3,7 @@ Cruise control
 ==============
 
 The car of Astrom and Murray (*Feedback Systems*, section 4.1; python-control's ``cruise-control.py``): in the fourth
-gear it keeps 20 m/s with the throttle at 0.1687. python-control's own model runs in machine code as it stands.
+gear it keeps 20 m/s with the throttle at 0.1687. python-control's own model runs in machine code unchanged.
 """
 
 import control as ct

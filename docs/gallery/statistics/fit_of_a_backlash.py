@@ -5,7 +5,7 @@ A backlash from data
 Both ends of a gap, a slope and a time constant are found from a noisy output. With the gap in between, the output has
 kinks that move with the parameters; its derivatives are those of the run (``nlctl.sensitivity_response``), so that
 SciPy's ``least_squares`` takes a few runs. The Fisher matrix says how sure the values are, and which parameters data do
-not tell: behind a slope :math:`m` and a gain :math:`k` only :math:`m k` is seen.
+not identify: behind a slope :math:`m` and a gain :math:`k` only :math:`m k` is seen.
 """
 
 import control as ct

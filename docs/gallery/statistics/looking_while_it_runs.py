@@ -1,10 +1,10 @@
 r"""
-Bounds that may be looked at all the time
-=========================================
+Bounds that may be read at any time
+===================================
 
-Whoever looks after every run and stops when the bound looks good is wrong more often than the confidence says. A
-confidence sequence is not: over 300 studies of 200 runs it misses the true probability, at any time, in less than
-10 %, and the exact bound for a fixed number of runs misses it far more often.
+A study that is checked after every run and stopped when the bound looks good is wrong more often than the confidence
+says. A confidence sequence is not: over 300 studies of 200 runs it misses the true probability, at any time, in less
+than 10 %, and the exact bound for a fixed number of runs misses it far more often.
 """
 
 import matplotlib.pyplot as plt
@@ -27,7 +27,7 @@ figure, axes = plt.subplots(figsize=(6, 3))
 for name, share in missed.items():
     axes.plot(looks, share, label=name)
 axes.axhline(1 - confidence, color="black", linewidth=0.8)
-axes.set(xlabel="runs looked at", ylabel="studies that were wrong so far")
+axes.set(xlabel="runs seen", ylabel="studies that were wrong so far")
 axes.legend()
 print({name: float(share[-1]) for name, share in missed.items()})
 assert missed["at any time"][-1] <= 1 - confidence

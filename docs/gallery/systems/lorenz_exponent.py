@@ -3,7 +3,7 @@ The Lyapunov exponent of Lorenz's system
 ========================================
 
 The largest exponent is 0.9056 (Sprott, *Chaos and Time-Series Analysis*, 2003). Here the variational equation runs
-beside the system, in machine code; its logarithm is rescaled by a state of its own.
+next to the system, in machine code; its logarithm is rescaled by a state of its own.
 """
 
 import control as ct

@@ -2,7 +2,7 @@ r"""
 ``ct.ss`` and ``ct.nlsys`` in machine code
 ==========================================
 
-A loop of python-control's own systems is compiled as it stands. Both engines agree with the closed form of
+A loop of python-control's own systems is compiled unchanged. Both engines agree with the closed form of
 the linear loop's step response.
 """
 

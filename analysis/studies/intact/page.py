@@ -10,9 +10,7 @@ from typing import Any
 
 from ...robustness.runs.store import locked
 from ..sealed import RunFolderError, file_digest, write_json
-from .contents import CONTENTS, check_whole, sealed_record
-
-__all__ = ["PAGE_FILES", "check_page", "is_run", "page_problems", "recorded_page", "recorded_print"]
+from .contents import CONTENTS, check_intact, sealed_record
 
 _PAGE, _SIGNALS, _PRINT = ("index.html", "report.json"), "signals.json", "report.pdf"
 PAGE_FILES = (*_PAGE, _SIGNALS, _PRINT)
@@ -28,7 +26,7 @@ def is_run(folder: Path) -> bool:
 def recorded_page(folder: Path) -> Iterator[None]:
     """Hold a run's folder while its page is written, and put that page into its record."""
     with locked(folder, RunFolderError):
-        content = check_whole(folder)
+        content = check_intact(folder)
         yield
         files = (*_PAGE, *(name for name in (_SIGNALS,) if (folder / name).exists()))
         digests = {name: file_digest(folder / name) for name in files}

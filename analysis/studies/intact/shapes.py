@@ -1,6 +1,6 @@
 """The shapes that the JSON files of a run folder are validated against.
 
-A file may be whole and carry the right key, and yet be of another version or made by hand.
+A file may be intact and carry the right key, and yet be of another version or made by hand.
 """
 
 from __future__ import annotations
@@ -8,18 +8,9 @@ from __future__ import annotations
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-)
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from ..sealed import ANEW, RunFolderError, read_json
-
-__all__ = ["ContentsFile", "FindingFile", "ResultsFile", "RunFile", "shaped"]
 
 _Shape = TypeVar("_Shape", bound=BaseModel)
 
@@ -156,7 +147,7 @@ class _Table(_File):
 
 
 class ContentsFile(_File):
-    """``contents.json``: the record that proves that a folder is whole."""
+    """``contents.json``: the record that proves that a folder is intact."""
 
     files: dict[_Place, _Digest]
     rows: dict[_Key, _Count]

@@ -1,4 +1,4 @@
-"""A run folder proves that it is whole: what is lost, added or exchanged, no reader believes."""
+"""A run folder proves that it is intact: what is lost, added or exchanged, no reader believes."""
 
 import hashlib
 import json
@@ -95,17 +95,17 @@ def is_refused_everywhere(folder):
             assert len(told.stderr.strip().splitlines()) == 1
 
 
-def test_a_whole_folder_says_so(done):
+def test_an_intact_folder_says_so(done):
     """Files, rows and analyses are counted; its page is no part of it."""
     found = verify(done)
-    assert (found.is_whole, found.others, found.problems) == (True, (), ())
+    assert (found.is_intact, found.others, found.problems) == (True, (), ())
     assert found.rows == {"rows": 300, "compare": 60}
     assert found.done == found.analyses == ("probability", "worst-case", "compare")
     told = nlctl_here("verify", done)
     assert told.returncode == 0
     assert told.stdout == f"{found}\n"
     assert f"{found.files} files, 360 rows, 3 of 3 analyses" in told.stdout
-    assert json.loads(nlctl_here("verify", done, "--json").stdout)["is_whole"] is True
+    assert json.loads(nlctl_here("verify", done, "--json").stdout)["is_intact"] is True
 
 
 def test_every_part_that_is_lost_is_noticed_by_every_reader(done, tmp_path):
@@ -356,7 +356,7 @@ def test_other_formats_are_refused_by_name(copied, name, version):
         load_result(copied)
 
 
-def test_a_run_that_goes_on_is_not_taken_for_whole(copied, done):
+def test_a_run_that_continues_is_not_taken_for_intact(copied, done):
     """While it runs, or after a kill, the record is gone; --resume ends with the same one.
 
     Nothing then says that the page is of these results: it is made again.
@@ -373,7 +373,7 @@ def test_a_run_that_goes_on_is_not_taken_for_whole(copied, done):
     ] * 3  # index.html, report.json, signals.json
     assert nlctl_here("report", copied).returncode == 1
     assert verify(copied).has_page
-    assert verify(copied).is_whole
+    assert verify(copied).is_intact
 
 
 def test_runs_are_compared_table_by_table(copied, done, tmp_path):

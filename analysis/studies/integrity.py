@@ -11,14 +11,12 @@ from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from .folder import read_through
-from .whole.contents import CONTENTS, is_part, problems_in, sealed_record
-from .whole.page import PAGE_FILES, page_problems
-
-__all__ = ["Wholeness", "verify"]
+from .intact.contents import CONTENTS, is_part, problems_in, sealed_record
+from .intact.page import PAGE_FILES, page_problems
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wholeness:
+class Integrity:
     """What `verify` found of a run folder.
 
     Attributes
@@ -33,7 +31,7 @@ class Wholeness:
     done : tuple of str
         Those that are done.
     problems : tuple of str
-        What is missing, edited or too much, one sentence each; empty if the folder is whole.
+        What is missing, edited or too much, one sentence each; empty if the folder is intact.
     others : tuple of str
         Files that the run has not written, its page aside.
     has_page : bool
@@ -54,23 +52,23 @@ class Wholeness:
     has_page: bool = False
 
     @property
-    def is_whole(self) -> bool:
+    def is_intact(self) -> bool:
         """Whether nothing is missing, edited or too much."""
         return not self.problems
 
     def __str__(self) -> str:
         if self.problems:
             count = counted(len(self.problems), "difference")
-            return "\n  ".join([f"'{self.folder}' is not whole, {count}:", *self.problems])
+            return "\n  ".join([f"'{self.folder}' is not intact, {count}:", *self.problems])
         rows, page = sum(self.rows.values()), ", and its page" if self.has_page else ""
         return (
-            f"'{self.folder}' is whole: {counted(self.files, 'file')}, {counted(rows, 'row')}, "
+            f"'{self.folder}' is intact: {counted(self.files, 'file')}, {counted(rows, 'row')}, "
             f"{len(self.done)} of {counted(len(self.analyses), 'analysis', 'analyses')}{page}."
         )
 
 
 @as_annotated
-def verify(folder: str | Path) -> Wholeness:
+def verify(folder: str | Path) -> Integrity:
     """Hold every file of a run folder against the record that its run has sealed.
 
     Nothing is imported, run or drawn.
@@ -82,7 +80,7 @@ def verify(folder: str | Path) -> Wholeness:
 
     Returns
     -------
-    Wholeness
+    Integrity
         With every difference, in words.
 
     Raises
@@ -115,9 +113,9 @@ def verify(folder: str | Path) -> Wholeness:
     ...     before = verify(Path(folder, "run"))
     ...     shutil.rmtree(Path(folder, "run", "probability"))
     ...     after = verify(Path(folder, "run"))
-    >>> before.is_whole, before.rows, before.done
+    >>> before.is_intact, before.rows, before.done
     (True, {'rows': 20}, ('probability',))
-    >>> after.is_whole, [text[-36:] for text in after.problems]
+    >>> after.is_intact, [text[-36:] for text in after.problems]
     (False, ["probability/finding.json' is missing"])
     """
     folder = Path(folder)
@@ -128,7 +126,7 @@ def verify(folder: str | Path) -> Wholeness:
     in_files = [*problems_in(folder, content)] or [*_contradictions(folder)]
     problems = tuple(dict.fromkeys([*in_files, *page_problems(folder, content)]))
     listed = " ".join(problems)
-    return Wholeness(
+    return Integrity(
         folder=folder,
         files=len(content["files"]),
         rows=content["rows"],

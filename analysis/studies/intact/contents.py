@@ -1,4 +1,4 @@
-"""Whether a run folder is whole: one sealed record of every file, which every reader checks first.
+"""Whether a run folder is intact: one sealed record of every file, which every reader checks first.
 
 ``contents.json`` is written last, when a run ends, and removed when it continues.  It says which
 files there are, with a key of each, how many rows and which columns each table has, which analyses
@@ -19,8 +19,6 @@ from ..file.schema import keyed
 from ..result import Result
 from ..sealed import RunFolderError, file_digest, write_json
 from .shapes import ContentsFile, shaped
-
-__all__ = ["CONTENTS", "check_whole", "is_part", "problems_in", "seal", "sealed_record", "unseal"]
 
 CONTENTS = "contents.json"
 _LONGEST = 200  # characters of names in a message
@@ -48,7 +46,7 @@ def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> N
 
 
 def unseal(folder: Path) -> dict[str, Any] | None:
-    """Take the record away, before anything in the folder changes; return it if it was whole."""
+    """Take the record away, before anything in the folder changes; return it if it was intact."""
     try:
         before = sealed_record(folder)
     except RunFolderError:
@@ -94,7 +92,7 @@ def _tables(folder: Path, files: Iterable[Path]) -> dict[str, Any]:
     return tables
 
 
-def check_whole(folder: Path) -> dict[str, Any]:
+def check_intact(folder: Path) -> dict[str, Any]:
     """Refuse a folder that is not what its run has written; return its record."""
     content = sealed_record(folder)
     for problem in problems_in(folder, content):

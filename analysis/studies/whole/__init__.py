@@ -1,1 +1,0 @@
-"""Whether a run folder is whole: its sealed record, and the shapes of its files."""
