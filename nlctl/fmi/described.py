@@ -154,6 +154,6 @@ def _check_events(made: Described, root: Any) -> None:
         "completedIntegratorStepNotNeeded"
     ) in ("false", "0"):
         raise UsageError(
-            f"'{made.path.name}' cannot be a block in Model Exchange: it needs to be told of "
+            f"'{made.path.name}' cannot be a block in Model Exchange: it needs a report of "
             "accepted steps (completedIntegratorStep); take kind='CoSimulation'"
         )

@@ -62,7 +62,7 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
         If the kind is neither.
     UsageError
         If it is not supported: FMI 1.0, no library for this platform, inputs other than real
-        numbers, arrays, states that cannot be kept, accepted steps that it needs to be told of; or
+        numbers, arrays, states that cannot be kept, reports of accepted steps that it needs; or
         FMPy is not installed.
 
     Notes
