@@ -43,6 +43,7 @@ from .diagrams import initial_state, interconnect, parameters, state_names
 from .drawing.picture import draw
 from .equations import equation
 from .faults import Fault, with_faults
+from .fmi import FMU
 from .native import (
     compile,  # noqa: A004
     ensemble_response,
@@ -63,6 +64,7 @@ from .sliding import IdealRelay
 from .sources import Sine, Step
 
 __all__ = [
+    "FMU",
     "PID",
     "PID2",
     "Backlash",

@@ -1,16 +1,16 @@
-"""``nlctl export``: a controller, or all equations of a loop, as code for other machines."""
+"""``nlctl export``: a controller, all equations of a loop, or an FMU, for other machines."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from nlctl.errors import ParameterError
-from nlctl.export import TARGETS, c_files, export_controller, export_equations, object_code
+from nlctl.export import TARGETS, c_files, export_controller, export_equations, fmu, object_code
 from nlctl.host.files import replace_file
 from nlctl.names import unknown
 
-__all__ = ["write_export"]
+__all__ = ["write_export", "write_fmu"]
 
 
 def write_export(
@@ -53,6 +53,39 @@ def write_export(
             content[f"{controller.name}.o"] = object_code(controller, target)
     out.mkdir(parents=True, exist_ok=True)
     return [_written(out / file, text) for file, text in content.items()]
+
+
+def write_fmu(
+    loop: str,
+    others: Mapping[str, object],
+    target: str,
+    *,
+    settings: Sequence[str],
+    name: str | None,
+    version: int,
+    stop_time: float,
+    out: Path,
+) -> Path:
+    """Write what a loop's name stands for as an FMU; return the file.
+
+    `others` are options that are of controllers alone.
+    """
+    from .loops import assignments, named_loop
+
+    given = [option for option, value in others.items() if value is not None]
+    if given or target != "c":
+        raise ParameterError(
+            f"--fmu is of a whole loop: leave out {' and '.join(given or ['--target'])}"
+        )
+    diagram = named_loop(loop)
+    params, start = assignments(diagram, settings)
+    if out.suffix != ".fmu":
+        out = out / f"{name or diagram.name}.fmu"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    return fmu(
+        diagram, out, version=version, params=params, initial_state=start, name=name,
+        stop_time=stop_time,
+    )  # fmt: skip
 
 
 def _written(path: Path, content: str | bytes) -> Path:

@@ -227,14 +227,33 @@ def export(
     name: Annotated[
         str | None, typer.Option(help="In front of all names in C; by default the block's.")
     ] = None,
-    out: Annotated[Path, typer.Option("-o", "--out", help="Folder of the files.")] = Path("."),
+    as_fmu: Annotated[
+        bool, typer.Option("--fmu", help="The whole loop as an FMU, which other simulators run.")
+    ] = False,
+    version: Annotated[int, typer.Option(help="Of FMI: 2 or 3.")] = 3,
+    stop_time: Annotated[
+        float, typer.Option(help="End of the FMU's default experiment in s.")
+    ] = 10.0,
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder of the files; of --fmu the file itself.")
+    ] = Path("."),
 ) -> None:
     """Write a controller as C99 or object code: the program that the simulation runs.
 
-    Without --block all equations of the loop are written, for an integrator of your own.
+    Without --block all equations of the loop are written, for an integrator of your own; with
+    --fmu the loop, with its events, as a model for other simulators.
     """
-    from .exporting import write_export
+    from .exporting import write_export, write_fmu
 
+    if as_fmu:
+        chosen = {"--block": block, "--dt": dt, "--method": method}
+        say(
+            write_fmu(
+                loop, chosen, target, settings=set_ or [], name=name, version=version,
+                stop_time=stop_time, out=out,
+            )
+        )  # fmt: skip
+        return
     files = write_export(
         loop, block, target, dt=dt, method=method, settings=set_ or [], name=name, out=out
     )

@@ -1,7 +1,8 @@
-"""Controllers and equations as code for other machines: C99 that is read, object code to link."""
+"""Controllers and equations as code for other machines: C99, object code, FMUs."""
 
 from .controller import export_controller
 from .equations import export_equations
+from .fmi.archive import fmu
 from .objects import TARGETS, Target, object_code
 from .records import ExportedController, ExportedEquations
 from .source import c_files
@@ -14,5 +15,6 @@ __all__ = [
     "c_files",
     "export_controller",
     "export_equations",
+    "fmu",
     "object_code",
 ]

@@ -13,7 +13,7 @@ from .counted import counted_operations, in_words
 from .records import ExportedController, ExportedEquations
 from .words import comment, enumeration
 
-_INCLUDED = """\
+INCLUDED = """\
 #include <float.h>
 #include <math.h>
 #include <stdint.h>
@@ -229,7 +229,7 @@ def _source(
    {in_words(counts)}. */
 #include "{name}.h"
 
-{_INCLUDED}
+{INCLUDED}
 const double {name}_parameters[{max(len(exported.parameters), 1)}] = {{
 {values or "  0.0"}
 }};

@@ -166,6 +166,18 @@ def instants(
     return Instants(np.array(times, float), np.array(which, np.int64), tuple(patterns))
 
 
+def schedules(clocks: Clocks) -> list[tuple[tuple[int, int, int], frozenset[Moment]]]:
+    """Return begin, step and scale of each series of instants (begin + k step) / scale, and what.
+
+    Clocks with a jitter have none.
+    """
+    alike: dict[_Series, frozenset[Moment]] = {}
+    for moment in moments(clocks):
+        series = _series(moment, clocks)
+        alike[series] = alike.get(series, frozenset()) | {moment}
+    return [(_integers(series), together) for series, together in alike.items()]
+
+
 def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
     """Return the beginning and end of a period that repeats, and its length (s)."""
     for clock in clocks:
@@ -212,8 +224,7 @@ def _times(series: _Series, begin: float, end: float) -> np.ndarray:
             f"a sampling time of {float(dt):g} s has more than {_MOST:,} samples from {begin:g} to "
             f"{end:g} s: simulate a shorter time"
         )
-    scale = lcm(start.denominator, dt.denominator)
-    begins, step = int(start * scale), int(dt * scale)
+    begins, step, scale = _integers(series)
     if begins + last * step < 2**53 and scale < 2**53:
         times = (begins + np.arange(first, last + 1) * step) / scale
     else:
@@ -223,6 +234,12 @@ def _times(series: _Series, begin: float, end: float) -> np.ndarray:
         random = np.random.Generator(np.random.Philox(series.seed)).random(last + 1)
         times = times + series.jitter * random[first:]
     return times[(times >= begin) & (times < end)]
+
+
+def _integers(series: _Series) -> tuple[int, int, int]:
+    """Return begin, step and scale of (begin + k step) / scale."""
+    scale = lcm(series.start.denominator, series.dt.denominator)
+    return int(series.start * scale), int(series.dt * scale), scale
 
 
 def _exact(value: float) -> Fraction:

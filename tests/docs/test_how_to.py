@@ -37,6 +37,24 @@ def test_code_that_exports_runs():
     exec(compile(code, "export.md", "exec"), {})
 
 
+@pytest.mark.ci
+def test_the_page_on_fmus_says_what_is_so(tmp_path, monkeypatch):
+    """Its command writes the file that it says, for all platforms, and its code runs."""
+    needed("fmpy", "export")
+    needed("ziglang", "export")
+    ((command, printed),) = [
+        pair for block in blocks("fmi.md", "console") for pair in COMMANDS.findall(block)
+    ]
+    (tmp_path / "build").mkdir()
+    told = nlctl_here(*shlex.split(command), cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (0, printed), told.stderr
+    assert 100_000 < (tmp_path / printed.strip()).stat().st_size < 300_000
+    monkeypatch.chdir(tmp_path)
+    namespace = {}
+    for code in blocks("fmi.md", "python"):
+        exec(compile(code, "fmi.md", "exec"), namespace)
+
+
 def test_signatures_on_the_page_are_those_of_the_header():
     from nlctl import paper
     from nlctl.export import c_files, export_controller

@@ -29,7 +29,8 @@ LAYERS = [  # from the bottom; a module belongs to the longest name that it begi
     ["nlctl.expressions"],
     ["nlctl.observers"],
     ["nlctl.native"],
-    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing", "nlctl.export", "nlctl.__main__"],
+    ["nlctl.response", "nlctl.sensitivities", "nlctl.describing"]
+    + ["nlctl.export", "nlctl.fmi", "nlctl.__main__"],
     [
         "nlctl.analysis.json_values",
         "nlctl.analysis.catalogue",

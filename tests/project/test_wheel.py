@@ -44,6 +44,7 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     for name in (
         *("nlctl/__init__.py", "nlctl/__init__.pyi", "nlctl/py.typed", "nlctl/controllers/rbf.py"),
+        *("nlctl/export/fmi/c/machine.c", "nlctl/export/fmi/templates/modelDescription3.xml.j2"),
         *("nlctl/analysis/py.typed", "nlctl/analysis/paper/expected.csv"),
         *(
             "nlctl/analysis/report/templates/report.html",

@@ -98,17 +98,22 @@ def instants_of(
 ) -> list[Instants]:
     """Return what is due to sampled blocks, for each column of `p`; at the last time, too."""
     begin, behind_end = float(times[0]), float(np.nextafter(times[-1], np.inf))
-    first = len(schedule.nodes)
-    places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
     known: dict[tuple[Clock, ...], Instants] = {}
     every = []
     for column in p.T:
-        clocks = {owner: _clock(slots, column) for owner, slots in places}
+        clocks = clocks_at(schedule, program, column)
         key = tuple(clocks.values())
         if key not in known:
             known[key] = instants(clocks, begin, behind_end, program.meetings)
         every.append(known[key])
     return every
+
+
+def clocks_at(schedule: Schedule, program: Program, p: np.ndarray) -> dict[Any, Clock]:
+    """Return the clocks of sampled blocks that a parameter vector says, by their owners."""
+    first = len(schedule.nodes)
+    places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
+    return {owner: _clock(slots, p) for owner, slots in places}
 
 
 def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, cast
 
@@ -28,7 +29,7 @@ def function_text(module: CModule, name: str, function: Function, labels: Mappin
             _loop(writer, b, loop)
     inside = b.text()
     written = {store.array for store in function.plan.stores}
-    used = {name for name in function.arguments if f"{name}[" in inside}
+    used = {name for name in function.arguments if re.search(rf"\b{name}\[", inside)}
     if function.copied:
         used.update(function.arguments[:2])
         written.add(function.arguments[1])

@@ -1,0 +1,1 @@
+"""Diagrams as FMUs: models of the Functional Mock-up Interface that other simulators run."""

@@ -1,0 +1,139 @@
+"""A diagram read as a model of FMI; what such a model cannot be is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import control as ct
+import numpy as np
+
+from ... import native
+from ...diagrams import initial_state as state_of
+from ...diagrams import supplied_blocks
+from ...errors import CompileError
+from ...native import Compiled
+from ...native.diagram.program import clocks_at
+from ...native.timed.ahead import ahead
+from ...sampling.clock import Clock, schedules
+from ...sliding.relay import SLIDING
+from ...wording import counted
+from ..words import c_name, check_written_out
+from .records import Happenings, Model
+from .variables import all_variables, value_references
+
+_MOST_SERIES = 31  # of instants of samples: bits of a number
+
+
+def read_model(
+    diagram: Any,
+    params: Mapping[str, Any] | None,
+    initial_state: Mapping[str, float] | None,
+    name: str | None,
+    stop_time: float,
+    tolerance: float,
+) -> Model:
+    """Return what an FMU of a diagram is made of."""
+    compiled = native.compile(diagram)
+    system, what, program = compiled.system, str(compiled.system.name), compiled.program
+    _check(compiled, what)
+    p = compiled.parameter_vector(params)
+    start, lowered = state_of(system, initial_state), compiled.lowered
+    if not lowered.holds_for(p[:, None]):
+        raise CompileError(
+            f"'{what}' cannot be exported: integers among the parameters steer its equations: set "
+            "them in the diagram"
+        )
+    happenings = _happenings(compiled, p, stop_time, what)
+    rows = lowered.rows
+    at = value_references(rows["x"], rows["u"], rows["y"], rows["g"] + len(program.memory), p.size)
+    fixed = _fixed(compiled)
+    still = {*program.memory, *program.sampled}
+    return Model(
+        name=c_name(what if name is None else name), meaning=what,
+        variables=tuple(all_variables(compiled, system, at, p, start, fixed)), places=at,
+        continuous=tuple(i for i in range(rows["x"]) if i not in still), memory=program.memory,
+        sampled=program.sampled, declared=program.switching, guards=program.guards,
+        jumping=program.jumping, parameters=p, start=start, happenings=happenings,
+        lowered=lowered, tolerance=tolerance, stop_time=stop_time,
+    )  # fmt: skip
+
+
+def _check(compiled: Compiled, what: str) -> None:
+    """Refuse what the C of an FMU cannot say."""
+    check_written_out(compiled, what)
+    if not ct.isctime(compiled.system):
+        raise CompileError(
+            f"'{what}' cannot be exported: it is in discrete time; put it into a diagram by "
+            "nlctl.sampled"
+        )
+    if compiled.schedule.lines:
+        raise CompileError(f"'{what}' cannot be exported: it has transport delays")
+    for made in supplied_blocks(compiled.system, SLIDING):
+        raise CompileError(
+            f"'{what}' cannot be exported: block '{made.name}' is an ideal relay, whose sliding "
+            "an importer does not know; nlctl.Relay has a hysteresis"
+        )
+    beyond = compiled.lowered.conditions.beyond
+    if beyond:
+        raise CompileError(
+            f"'{what}' cannot be exported: it has {counted(beyond, 'condition')} more than are "
+            "located"
+        )
+
+
+def _fixed(compiled: Compiled) -> set[int]:
+    """Return the places of parameters that hold at export alone: of clocks, of instants, of loops.
+
+    And those that steer which equations there are.
+    """
+    fixed = {*compiled.lowered.assumed, *compiled.lowered.timed.parameters.tolist()}
+    first = len(compiled.schedule.nodes)
+    for k in range(len(compiled.schedule.samplings)):
+        slots = compiled.program.layout[first + k]
+        fixed |= {
+            slots[n].offset for n in ("dt", "offset", "delay", "jitter", "seed") if n in slots
+        }
+    return fixed
+
+
+def _happenings(compiled: Compiled, p: np.ndarray, stop_time: float, what: str) -> Happenings:
+    """Return when something happens in it."""
+    clocks = clocks_at(compiled.schedule, compiled.program, p)
+    series, meetings = _series(clocks, compiled, what)
+    timed = compiled.lowered.timed
+    known = ahead(timed, p[:, None], np.array([0.0, stop_time]), np.inf)
+    breaks = known["jumps"][0]
+    longest = float(known["longest"][0])
+    reach = known["reach"][0]
+    if reach.size:  # no step may pass over half of a pulse, wherever it begins
+        begins = np.linspace(0.0, stop_time, reach.size + 1)[:-1]
+        longest = min(longest, float(np.min(reach - begins)))
+    return Happenings(
+        series=series, meetings=meetings, breaks=tuple(breaks[np.isfinite(breaks)].tolist()),
+        known_until=stop_time if timed.conditions.of_time else np.inf, longest=longest,
+    )  # fmt: skip
+
+
+def _series(
+    clocks: Mapping[Any, Clock], compiled: Compiled, what: str
+) -> tuple[tuple[tuple[int, int, int], ...], tuple[int, ...]]:
+    """Return the instants of clocks, and of each meeting which of these meet."""
+    for clock in clocks.values():
+        if clock.jitter:
+            raise CompileError(
+                f"'{what}' cannot be exported: a clock has a jitter of {clock.jitter:g} s, random "
+                "times that are the computer's; set it to 0"
+            )
+    found = schedules(clocks)
+    largest = max((max(numbers) for numbers, _ in found), default=0)
+    if len(found) > _MOST_SERIES or largest >= 2**40:
+        raise CompileError(
+            f"'{what}' cannot be exported: its clocks have instants in parts of 1/{largest} s, or "
+            f"{len(found)} different ones, more than its C counts; round their times"
+        )
+    meetings = tuple(
+        sum(1 << k for k, (_, together) in enumerate(found) if together <= meeting)
+        for meeting in compiled.program.meetings
+    )
+    return tuple(numbers for numbers, _ in found), meetings

@@ -1,0 +1,168 @@
+"""The variables of a model: names, units, meanings, bounds, and their value references."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from ...blocks import Block, within
+from ...diagrams import leaves, samplings, state_names
+from ...native import Compiled
+from ...params import Param, declared_params
+from .records import Bounds, Variable
+
+_KINDS = ("states", "rates", "inputs", "outputs", "indicators", "parameters", "nothing")
+STRUCTURED = re.compile(
+    r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII
+)
+
+
+def value_references(
+    states: int, inputs: int, outputs: int, indicators: int, count: int
+) -> dict[str, int]:
+    """Return the first value reference of each kind; 0 is the time."""
+    sizes = (states, states, inputs, outputs, indicators, count)
+    return dict(zip(_KINDS, accumulate(sizes, initial=1), strict=True))
+
+
+def is_structured(variables: Collection[Variable]) -> bool:
+    """Whether names follow FMI's structured convention."""
+    return all(
+        STRUCTURED.fullmatch(v.name.removeprefix("der(").removesuffix(")")) for v in variables
+    )
+
+
+def all_variables(
+    compiled: Compiled,
+    diagram: Any,
+    at: dict[str, int],
+    p: np.ndarray,
+    start: np.ndarray,
+    fixed: Collection[int],
+) -> list[Variable]:
+    """Return all variables; parameters at the places `fixed` are constants."""
+    program = compiled.program
+    still = {*program.memory, *program.sampled}
+    states = _states(state_names(diagram), at["states"], start, still, program.jumping)
+    rates = [
+        Variable(
+            name=f"der({v.name})", reference=v.reference - at["states"] + at["rates"],
+            causality="local", variability="continuous", initial="calculated",
+            meaning=f"rate of {v.name}", derivative_of=v.reference,
+        )
+        for i, v in enumerate(states) if i not in still
+    ]  # fmt: skip
+    before = [
+        Variable(name="time", reference=0, causality="independent", variability="continuous",
+                 unit="s", meaning="time"),
+        *states, *rates,
+    ]  # fmt: skip
+    parameters = _parameters(compiled, diagram, at["parameters"], p, fixed)
+    indicators = [
+        Variable(
+            name=f"event_indicator_{i}", reference=at["indicators"] + i, causality="local",
+            variability="continuous", initial="calculated", meaning="changes its sign at an event",
+        )
+        for i in range(at["parameters"] - at["indicators"])
+    ]  # fmt: skip
+    known = {v.name for v in [*before, *parameters, *indicators]}
+    signals = _signals(diagram, at, known)
+    return [*before, *signals, *indicators, *parameters]
+
+
+def _states(
+    names: list[str],
+    first: int,
+    start: np.ndarray,
+    still: Collection[int],
+    jumping: Collection[tuple[int, int, int]],
+) -> list[Variable]:
+    jump = {i for _, begin, end in jumping for i in range(begin, end)}
+    return [
+        Variable(
+            name=name, reference=first + i, causality="local", initial="exact",
+            variability="discrete" if i in still else "continuous", start=float(start[i]),
+            meaning="state of a computer or memory" if i in still else "state",
+            reinit=i in jump and i not in still,
+        )
+        for i, name in enumerate(names)
+    ]  # fmt: skip
+
+
+def _signals(diagram: Any, at: dict[str, int], known: set[str]) -> list[Variable]:
+    """Return inputs and outputs; one whose name is taken gets a path in front of it."""
+    found = []
+    for kind in ("inputs", "outputs"):
+        for i, label in enumerate(getattr(diagram, f"{kind[:-1]}_labels") or ()):
+            name = label if label not in known else f"{kind}.{label}"
+            known.add(name)
+            is_input = kind == "inputs"
+            found.append(
+                Variable(
+                    name=name, reference=at[kind] + i, causality=kind[:-1],
+                    variability="continuous", meaning=f"{kind[:-1]} of the diagram",
+                    initial="" if is_input else "calculated", start=0.0 if is_input else None,
+                )
+            )  # fmt: skip
+    return found
+
+
+def _parameters(
+    compiled: Compiled, diagram: Any, first: int, p: np.ndarray, fixed: Collection[int]
+) -> list[Variable]:
+    """Return every number of the parameter vector, with what its record says of it."""
+    declared = _declared(diagram)
+    made = []
+    for slots in compiled.program.layout.values():
+        for slot in slots.values():
+            rule = declared.get(slot.name)
+            for k, index in enumerate(np.ndindex(slot.shape)):
+                place = slot.offset + k
+                made.append(_parameter(
+                    slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
+                    first + place, float(p[place]), rule, place not in fixed,
+                ))  # fmt: skip
+    return made
+
+
+def _parameter(
+    name: str, reference: int, value: float, rule: Param | None, may_change: bool
+) -> Variable:
+    return Variable(
+        name=name, reference=reference, initial="exact", start=value,
+        causality="parameter" if may_change else "local",
+        variability="tunable" if may_change else "constant",
+        unit="" if rule is None else rule.unit, meaning="" if rule is None else rule.meaning,
+        bounds=_bounds(rule, may_change),
+    )  # fmt: skip
+
+
+def _bounds(rule: Param | None, may_change: bool) -> Bounds:
+    if rule is None:
+        return Bounds(may_change=may_change)
+    low, high = (
+        (strict, True) if strict is not None else (limit, False)
+        for strict, limit in ((rule.above, rule.at_least), (rule.below, rule.at_most))
+    )  # fmt: skip
+    return Bounds(
+        low=-np.inf if low[0] is None else float(low[0]), open_below=low[1],
+        high=np.inf if high[0] is None else float(high[0]), open_above=high[1],
+        may_change=may_change,
+    )  # fmt: skip
+
+
+def _declared(diagram: Any) -> dict[str, Param]:
+    """Return what records declare, by qualified names."""
+    found: dict[str, Param] = {}
+    for leaf in leaves(diagram):
+        block = within(leaf.system)
+        if isinstance(block, Block):
+            for name, rule in declared_params(block.spec).items():
+                found[f"{leaf.parameter_path}.{name}"] = rule
+    for path, owner in samplings(diagram):
+        found |= {f"{path}.{k}": rule for k, rule in declared_params(owner.spec).items()}
+    return found

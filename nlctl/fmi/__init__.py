@@ -1,0 +1,5 @@
+"""FMUs of others as blocks: Model Exchange with its events, Co-Simulation as a sampled block."""
+
+from .imported import FMU
+
+__all__ = ["FMU"]

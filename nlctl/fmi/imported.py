@@ -1,0 +1,98 @@
+"""An FMU as a block of a diagram."""
+
+from __future__ import annotations
+
+import os
+
+import control as ct
+
+from ..annotations import as_annotated
+from ..arguments import number
+from ..blocks import block
+from ..errors import ParameterError, UsageError
+from ..sampling.system import sampled
+from .described import read_description
+from .kinds import in_co_simulation, in_model_exchange
+from .running import Running
+
+
+@as_annotated
+def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
+    path: str | os.PathLike[str],
+    name: str | None = None,
+    *,
+    kind: str | None = None,
+    dt: float | None = None,
+    start: float = 0.0,
+) -> ct.InputOutputSystem:
+    """Make a block of an FMU, FMI 2.0 or 3.0, that FMPy runs.
+
+    Opening one runs its library: do it with FMUs that you would run as a program.  A study file
+    cannot name this function unless its user has trusted it.
+
+    In Model Exchange its continuous states are the block's, its event indicators and event times
+    are guards, and what it does at an event is the block's reset.  In Co-Simulation it is a sampled
+    block: at each sample it makes a step with the inputs of then, and its outputs are those that
+    the last step has led to.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file.
+    name : str, optional
+        Of the block; by default the model identifier.
+    kind : {"ModelExchange", "CoSimulation"}, optional
+        By default Model Exchange if the FMU has that.
+    dt : float, optional
+        Sampling time (s) of Co-Simulation; by default the step of its default experiment.
+    start : float, optional
+        When it begins (s): the first time of the runs.
+
+    Returns
+    -------
+    control.InputOutputSystem
+        To be connected as any block; ``nlctl.input_output_response(..., engine="python-control")``
+        runs it.  Its last state is the number of the inner state that the FMU is in.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file, it is not an FMU, or a number is out of its bounds.
+    UnknownNameError
+        If the kind is neither.
+    UsageError
+        If it is not supported: FMI 1.0, no library for this platform, inputs other than real
+        numbers, arrays, states that cannot be kept, reports of accepted steps that it needs; or
+        FMPy is not installed.
+
+    Notes
+    -----
+    Every inner state that an event or a step leads to is kept as long as the block: a step that is
+    repeated begins where it began.  Machine code refuses the block, and says that python-control
+    takes over.
+
+    Examples
+    --------
+    >>> ball = nlctl.FMU("BouncingBall.fmu")  # doctest: +SKIP
+    >>> run = nlctl.input_output_response(
+    ...     ball, [0, 1], engine="python-control"
+    ... )  # doctest: +SKIP
+    """
+    start = number("FMU", "start", start)
+    of = read_description(path, kind)
+    name = str(name or of.own.modelIdentifier)
+    running = Running(of, start)
+    if of.kind == "ModelExchange":
+        if dt is not None:
+            raise ParameterError("FMU takes dt in Co-Simulation alone: leave it out")
+        return block(in_model_exchange(of, running), name)
+    if not of.keeps_states:
+        raise UsageError(
+            f"'{of.path.name}' cannot be a block: its state cannot be read and written "
+            "(canGetAndSetFMUState)"
+        )
+    if dt is None:
+        dt = getattr(of.whole.defaultExperiment, "stepSize", None)
+        if dt is None:
+            raise ParameterError(f"'{of.path.name}' says nothing of its step: give dt in s")
+    return sampled(in_co_simulation(of, running, name, number("FMU", "dt", float(dt), above=0)))
