@@ -55,7 +55,9 @@ class Described:
         return getattr(self.whole, _KINDS[self.kind])
 
 
-def read_description(path: str | os.PathLike[str], kind: str | None) -> Described:
+def read_description(
+    path: str | os.PathLike[str], kind: str | None, *, ignore_completed_steps: bool = False
+) -> Described:
     """Read the description of an FMU; what cannot be a block is refused."""
     fmpy = _fmpy()
     path = Path(path)
@@ -77,10 +79,17 @@ def read_description(path: str | os.PathLike[str], kind: str | None) -> Describe
             f"'{path.name}' has no library for this platform, {fmpy.platform}: it has those for "
             f"{', '.join(fmpy.supported_platforms(str(path))) or 'none'}"
         )
-    made = _of_description(path, whole, kind)
+    description = _of_description(path, whole, kind)
     if kind == "ModelExchange":
-        _check_events(made, root)
-    return made
+        _check_keeps_states(description)
+        if not ignore_completed_steps and _needs_completed_steps(description, root):
+            raise UsageError(
+                f"'{path.name}' cannot be a block in Model Exchange: by its description it needs a "
+                "report of each accepted step (completedIntegratorStep), which a block does not "
+                "make; take kind='CoSimulation', or give ignore_completed_steps=True if nothing "
+                "happens there"
+            )
+    return description
 
 
 def _root(path: Path) -> Any:
@@ -142,18 +151,18 @@ def _of_description(path: Path, whole: Any, kind: str) -> Described:
     )  # fmt: skip
 
 
-def _check_events(made: Described, root: Any) -> None:
-    """Refuse in Model Exchange what a block cannot do."""
-    if not made.keeps_states:
+def _check_keeps_states(of: Described) -> None:
+    """Refuse in Model Exchange what cannot begin a step again."""
+    if not of.keeps_states:
         raise UsageError(
-            f"'{made.path.name}' cannot be a block in Model Exchange: its state cannot be read and "
+            f"'{of.path.name}' cannot be a block in Model Exchange: its state cannot be read and "
             "written (canGetAndSetFMUState), which a step that is repeated needs"
         )
-    said = dict(getattr(root.find("ModelExchange"), "attrib", {}))
-    if said.get("needsCompletedIntegratorStep") in ("true", "1") or said.get(
-        "completedIntegratorStepNotNeeded"
-    ) in ("false", "0"):
-        raise UsageError(
-            f"'{made.path.name}' cannot be a block in Model Exchange: it needs a report of "
-            "accepted steps (completedIntegratorStep); take kind='CoSimulation'"
-        )
+
+
+def _needs_completed_steps(of: Described, root: Any) -> bool:
+    """Whether `completedIntegratorStep` matters: FMI 2.0 says so of who is silent, FMI 3.0 not."""
+    attributes = dict(getattr(root.find("ModelExchange"), "attrib", {}))
+    if of.version == 2:
+        return attributes.get("completedIntegratorStepNotNeeded", "false") in ("false", "0")
+    return attributes.get("needsCompletedIntegratorStep", "false") in ("true", "1")

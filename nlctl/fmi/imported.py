@@ -24,6 +24,7 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
     kind: str | None = None,
     dt: float | None = None,
     start: float = 0.0,
+    ignore_completed_steps: bool = False,
 ) -> ct.InputOutputSystem:
     """Make a block of an FMU, FMI 2.0 or 3.0, that FMPy runs.
 
@@ -47,6 +48,10 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
         Sampling time (s) of Co-Simulation; by default the step of its default experiment.
     start : float, optional
         When it begins (s): the first time of the runs.
+    ignore_completed_steps : bool, optional
+        In Model Exchange, take an FMU that by its description needs a report of each accepted step
+        (`completedIntegratorStep`), which a block does not make: for those at which nothing
+        happens there.  In FMI 2.0 all that do not mention it need one.
 
     Returns
     -------
@@ -79,7 +84,7 @@ def FMU(  # noqa: N802 (it reads as a block's record, and is called as one)
     ... )  # doctest: +SKIP
     """
     start = number("FMU", "start", start)
-    of = read_description(path, kind)
+    of = read_description(path, kind, ignore_completed_steps=ignore_completed_steps)
     name = str(name or of.own.modelIdentifier)
     running = Running(of, start)
     if of.kind == "ModelExchange":
