@@ -16,6 +16,7 @@ from ..expressions.jacobian_source import jacobian_function
 from ..params import as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
+_SIZES = ("states", "known inputs")
 _MOST = 8  # states
 
 
@@ -103,12 +104,13 @@ class ExtendedKalmanFilter:
         _check_covariance("R", self.R, definite=True)
         _check_covariance("P0", self.P0)
         x = np.array(self.x0, dtype=float)
-        given = {"f": self.f(x, np.zeros(len(self.known))), "h": self.h(x)}
+        values = {"f": _called("f", self.f, x, np.zeros(len(self.known))),
+                  "h": _called("h", self.h, x)}  # fmt: skip
         for name, count in (("f", n), ("h", len(self.R))):
-            if np.size(given[name]) != count:
+            if np.size(values[name]) != count:
                 raise ParameterError(
                     f"{who} needs {name} to return {count} of them, as {'QR'[name == 'h']} has "
-                    f"rows, got {np.size(given[name])}"
+                    f"rows, got {np.size(values[name])}"
                 )
         self.jacobians  # noqa: B018 (it is refused here if there are none)
 
@@ -187,9 +189,23 @@ class ExtendedKalmanFilter:
         return output
 
 
+def _called(name: str, function: Callable, *args: np.ndarray) -> np.ndarray:
+    """Return the values of a function at the initial estimate, with known inputs of 0."""
+    try:
+        return np.asarray(function(*args), dtype=float)
+    except Exception as error:  # whatever a user's function raises
+        sizes = " and ".join(f"{arg.size} {kind}" for arg, kind in zip(args, _SIZES, strict=False))
+        raise ParameterError(
+            f"ExtendedKalmanFilter calls {name} at its initial estimate, with {sizes}, which ends "
+            f"in {type(error).__name__}: {error}"
+        ) from error
+
+
 def _numbers(name: str, given: Any, otherwise: np.ndarray) -> Any:
     """Return finite numbers of a shape as tuples, those of `otherwise` if there are none."""
-    matrix = otherwise if not np.size(given) else as_numbers(given)
+    matrix = as_numbers(given)
+    if matrix is not None and not matrix.size:
+        matrix = otherwise
     if matrix is None or matrix.shape != otherwise.shape or not np.all(np.isfinite(matrix)):
         shape = " x ".join(map(str, otherwise.shape))
         raise ParameterError(

@@ -284,7 +284,7 @@ PAGES = {
     loop_report: lambda: {"loop": lag(), "title": "a", "response": None, "signals": (),
                           "params": None, "sections": (), "claims": (), "question": "",
                           "author": "", "revision": ""},
-    studies.from_toml: lambda: {"text": studies_example.HEAD + studies_example.ROWS, "own": None},
+    studies.from_toml: lambda: {"text": studies_example.HEAD + studies_example.ROWS, "kinds": None},
     studies.load_result: lambda: {"folder": Path("nowhere"), "trust": False},
     studies.origin_differences: lambda: {"first": Path("nowhere"), "second": Path("nowhere")},
     studies.run_differences: lambda: {"first": Path("nowhere"), "second": Path("nowhere")},

@@ -121,7 +121,7 @@ def of_triangle(
 def of_cholesky(
     graph: Graph, c_and_lower: Any, b: Any, overwrite_b: object = False, check_finite: object = True
 ) -> Tracer:
-    """Return the solution of equations from the factor of `cho_factor`."""
+    """Return the solution of equations from the factor of SciPy's `scipy.linalg.cho_factor`."""
     c, lower = c_and_lower
     first = of_triangle(graph, c, b, trans=0 if lower else 1, lower=lower)
     return of_triangle(graph, c, first, trans=1 if lower else 0, lower=lower)
@@ -135,7 +135,7 @@ def of_triangles(
     overwrite_b: object = False,
     check_finite: object = True,
 ) -> Tracer:
-    """Return the solution of equations from the factors of `lu_factor`."""
+    """Return the solution of equations from the factors of SciPy's `scipy.linalg.lu_factor`."""
     lu, pivots = lu_and_piv
     exchanges = pivots if isinstance(pivots, np.ndarray) else constant_value(traced(graph, pivots))
     if trans != 0 or not isinstance(exchanges, np.ndarray):

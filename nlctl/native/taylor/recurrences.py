@@ -96,14 +96,21 @@ class Recurrences:
 
 
 def recurrences(
-    graph: Graph, stores: Mapping[str, Sequence[Store]], sizes: Mapping[str, int], *, packed: bool
+    graph: Graph,
+    stores: Mapping[str, Sequence[Store]],
+    sizes: Mapping[str, int],
+    *,
+    packed: bool,
+    overflows: bool = True,
 ) -> Recurrences:
     """Return how the coefficients of a right-hand side follow.
 
     The first rows of an order are the states, then the switching functions, then the right-hand
     side.
     """
-    return _Reader(graph=graph, n=sizes["x"], g=sizes["g"]).read(stores, packed)
+    return _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows).read(
+        stores, packed
+    )
 
 
 _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coefficients of a node
@@ -128,11 +135,15 @@ class _Reader:
         Which sums there are, by their factors.
     pairs : list
         See `Recurrences.sides`.
+    overflows : bool
+        Whether a function that is flat at an argument that overflows is a constant there; boxes
+        have infinite bounds and no such choice.
     """
 
     graph: Graph
     n: int
     g: int
+    overflows: bool
     terms: dict[Expr, Expr | None] = field(default_factory=dict)
     slopes: dict[Expr, Expr | bool | None] = field(default_factory=dict)
     values: dict[Expr, int] = field(default_factory=dict)
@@ -355,7 +366,7 @@ class _Reader:
     def _unless_flat(self, part: Expr | None, arg: Expr, derivative: Expr) -> Expr | None:
         """Return what follows from an argument, 0 where that is large and nothing follows."""
         graph = self.graph
-        if part is None or not derivative.varies:
+        if part is None or not derivative.varies or not self.overflows:
             return part
         large = graph.op("gt", graph.op("absolute", arg), graph.const(_LARGE))
         tells = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))

@@ -61,7 +61,8 @@ def series_code(rates: Sequence[Expr]) -> SeriesCode:
     every = _with_derivatives(graph, motion)
     stores = [Store(array="dx", row=i, expr=graph.number(e), size=1) for i, e in enumerate(every)]
     try:
-        series = recurrences(graph, {"dx": stores, "g": []}, {"x": 4 * n, "g": 0}, packed=False)
+        lengths = {"x": 4 * n, "g": 0}
+        series = recurrences(graph, {"dx": stores, "g": []}, lengths, packed=False, overflows=False)
     except NoSeriesError as error:
         raise Untraceable(str(error)) from None
     for node in graph.nodes:
