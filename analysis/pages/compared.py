@@ -155,13 +155,24 @@ def _verdict(
 def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
     """Return differences of numbers, those with the largest share first, and the others.
 
-    Those of claims are in their own table.
+    Those of claims are in their own table; a number that a table shows as well is named once, as
+    there.
     """
     numbers, words = [], []
+    cells = [d for d in differences if d.where.startswith("section '")]
+    in_tables = {_pair(cell) for cell in cells if not _LINE.search(cell.where)}
     for one in differences:
-        if not one.where.startswith("claim '"):
-            (numbers if _both_numbers(one) else words).append(one)
+        if one.where.startswith("claim '"):
+            continue
+        if not _both_numbers(one):
+            words.append(one)
+        elif one.where.startswith("section '") or _pair(one) not in in_tables:
+            numbers.append(one)
     return sorted(numbers, key=lambda d: -np.nan_to_num(_share(d), nan=np.inf)), words
+
+
+def _pair(one: Difference) -> tuple[str, str]:
+    return sort_key(one.first), sort_key(one.second)
 
 
 def _both_numbers(one: Difference) -> bool:

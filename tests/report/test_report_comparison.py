@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nlctl.analysis.pages.compared import Compared, comparison_page
-from nlctl.analysis.report import Claim, Figure, History, Report, Section, write_report
+from nlctl.analysis.report import Claim, Figure, History, Report, Section, Table, write_report
 from nlctl.analysis.report.changes import Curves, claim_changes, curves_of
 from nlctl.analysis.report.compare import read_report
 from nlctl.analysis.report.drawings import drawings
@@ -190,3 +190,17 @@ def test_the_page_leaves_output_and_exit_codes_as_they_are(tmp_path):
     assert nlctl("compare", one, two, "--pdf").returncode == 2
     (one / "signals.json").write_text("[", encoding="utf-8")
     assert curves_of(one) == {}
+
+
+def test_a_number_that_a_table_shows_as_well_is_named_once(compared):
+    """Numbers of their own stay, whatever their values."""
+
+    def with_table(peak, cost):
+        table = Table(columns=["signal", "peak"], rows=[["y", peak]], caption="c")
+        whole = report([], peak=peak, cost=cost)
+        section = dataclasses.replace(whole.sections[0], items=[table])
+        return dataclasses.replace(whole, sections=[section])
+
+    page = compared(with_table(1.0, 5.0), with_table(2.0, 6.0))
+    assert sorted(row[1:3] for row in rows(page, "number_changes")) == [[1.0, 2.0], [5.0, 6.0]]
+    assert page.numbers["differences"] == 2
