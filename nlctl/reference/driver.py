@@ -301,7 +301,7 @@ class Driver:
         if left is None or not left.size:
             return
         right, first = self.jumps.watched_at(t, x), sum(self.jumps.kinds) - left.size
-        for k in np.flatnonzero(left * right < 0.0).tolist():
+        for k in np.flatnonzero(np.sign(left) * np.sign(right) < 0.0).tolist():
             self._note_change(first + k, t, bool(right[k] > 0.0), x)
 
     def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:

@@ -37,7 +37,7 @@ from .methods.stiff import UNKNOWN, stiff_attempt
 from .resets import fall
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
-from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff
+from .state import AUTO, DERIVATIVES, ENDED, INNER, METHOD, RUNNING, is_stiff, opposite
 
 
 @numba.njit(**INNER)
@@ -175,7 +175,7 @@ def _take(task, w, done):
             x[i, j] = w.x_new[i, j]
             k[0, i, j] = k[last, i, j]
         for i in range(rows.declared):
-            events.behind[i, j] = events.g_start[i, j] * events.g[i, j] < 0.0
+            events.behind[i, j] = opposite(events.g_start[i, j], events.g[i, j])
         for i in range(rows.declared, rows.guarded):
             before, now = events.g_start[i, j], events.g[i, j]
             if now != 0.0 or before != 0.0:
@@ -306,7 +306,7 @@ def _note_jumps(task, lanes, w, done):
             before, now = events.before_jump[i, j], events.g_start[i, j]
             if not done[j] or before == now:
                 continue
-            if before * now < 0.0 and _counts(task, lanes[j], i, now):
+            if opposite(before, now) and _counts(task, lanes[j], i, now):
                 note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
             events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
 
@@ -347,7 +347,7 @@ def _note_events(task, lanes, w, found, done):
             continue
         turns = 1 if rows.memory.size else 0
         for i in range(rows.guarded):
-            if events.g_start[i, j] * events.g[i, j] < 0.0:
+            if opposite(events.g_start[i, j], events.g[i, j]):
                 turns = 0
                 if _counts(task, lanes[j], i, events.g[i, j]):
                     note(task, lanes[j], w, lanes[j].t, i, events.g[i, j] > 0.0, j)
@@ -377,7 +377,7 @@ def _note_left(task, lane, w, located, j):
             continue
         is_kink = rows.bending <= i < rows.declared
         is_rounding = is_kink and abs(now) <= SMALL_KINK * task.atol
-        if came == 0.0 or (came * now < 0.0 and not is_rounding):
+        if came == 0.0 or (opposite(came, now) and not is_rounding):
             t = lane.t if located and came != 0.0 else lane.begun
             if _counts(task, lane, i, now):
                 note(task, lane, w, t, i, now > 0.0, j)

@@ -112,6 +112,12 @@ def new_lanes(times: np.ndarray, count: int) -> np.ndarray:
 
 
 @numba.njit(**INNER)
+def opposite(a, b):
+    """Whether one number is below 0 and the other above; their product may be 0 by rounding."""
+    return a < 0.0 < b or b < 0.0 < a
+
+
+@numba.njit(**INNER)
 def is_stiff(lane):
     """Whether the step being tried is one of the stiff method.
 

@@ -142,3 +142,14 @@ def test_a_break_point_at_which_a_condition_jumps_is_noted_as_well(how):
     loop = with_dropout(lambda t, x, u, p: [np.where(u[0] * (u[0] + 0.3) > 0.2, 1.0, -0.1)])
     made = nlctl.input_output_response(loop, [0, 4], 0, 0, **how)
     np.testing.assert_allclose(declared(made), [1.0, 2.5], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("off", [1e-300, 1.2e-308, 5e-324])
+def test_a_level_whose_product_with_a_value_is_rounded_to_zero(off):
+    """A relay that goes on where its input has come from 0: signs are compared, no product."""
+    loop = nlctl.interconnect(
+        {"relay": nlctl.Relay(on=1.0, off=off, height=1.0, v0=-1.0)}, inputs="u", outputs="v"
+    )
+    run = nlctl.input_output_response(loop, [0.0, 1.0, 2.0], [-1.5, 0.0, 2.0])
+    np.testing.assert_array_equal(run.outputs, [-1.0, -1.0, 1.0])
+    np.testing.assert_allclose(run.events["time"], [1.0, 1.5], atol=1e-9)

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from ..control import shorten
-from ..state import INNER, is_stiff
+from ..state import INNER, is_stiff, opposite
 from .location import AGAIN, CLEAR, EVENT, REFUSED, SMALL_KINK
 
 NOTHING = -2  # no condition lies in the step just tried
@@ -133,7 +133,7 @@ def _beyond(task, lane, w, j):
     for i in range(task.rows.declared, task.rows.guarded):
         start = w.events.g_start[i, j]
         for n in range(3):
-            if start * w.events.g_inside[n, i, j] < 0.0:
+            if opposite(start, w.events.g_inside[n, i, j]):
                 farthest = max(farthest, -w.events.g_inside[n, i, j] / start)
     return farthest
 
@@ -181,7 +181,7 @@ def left_to_other_side(task, w, i, j):
     return (
         is_condition
         and w.events.g_start[i, j] == 0.0
-        and w.events.behind[i, j] * w.events.g[i, j] < 0.0
+        and opposite(w.events.behind[i, j], w.events.g[i, j])
     )
 
 
@@ -190,7 +190,7 @@ def has_crossed(task, w, i, end, j):
     """Whether a condition has changed its sign since the start of the step, or a guard fallen."""
     if i >= task.rows.guarded:
         return w.guards.above[i - task.rows.guarded, j] != 0 and end < 0.0
-    return w.events.g_start[i, j] * end < 0.0
+    return opposite(w.events.g_start[i, j], end)
 
 
 @numba.njit(**INNER)

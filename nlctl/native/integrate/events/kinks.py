@@ -11,7 +11,7 @@ import numba
 
 from ..control import shorten
 from ..methods.dense import events_at_parts
-from ..state import INNER
+from ..state import INNER, opposite
 from .crossing import bracket, has_crossed, next_try
 from .location import AGAIN, EVENT, first_root
 
@@ -68,6 +68,6 @@ def _nearer(task, w, part, j):
     first = 2.0
     for i in range(task.rows.declared):
         here, end = w.ahead.g[i, j], w.events.g[i, j]
-        if w.events.g_start[i, j] * end < 0.0 and here != end:
+        if opposite(w.events.g_start[i, j], end) and here != end:
             first = min(first, part - here * (1.0 - part) / (end - here))
     return first if 0.0 < first < 1.0 else part

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from ..state import INNER, is_stiff
+from ..state import INNER, is_stiff, opposite
 
 SMALL_KINK = 0.01  # of the absolute tolerance
 STARTS_BEHIND = 1e-5  # part of a step in which the event before is not met again
@@ -33,7 +33,7 @@ def triggered(start, end, behind):
     With `behind` its own event was the end of the step before: on a surface that attracts from
     both sides, going back through it at once is no event.
     """
-    return start * end < 0.0 and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
+    return opposite(start, end) and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
 
 
 @numba.njit(**INNER)
@@ -69,7 +69,7 @@ def first_turn(lane, w, low, high, j):
     """
     first, start = -1.0, w.memories.rate_start
     for i in range(start.shape[0]):
-        if start[i, j] != 0.0 and not start[i, j] * high[i, j] > 0.0:
+        if start[i, j] != 0.0 and not opposite(start[i, j], -high[i, j]):
             root = _root(lane, low[i, j], high[i, j])
             if first < 0.0 or root < first:
                 first = root
@@ -79,7 +79,7 @@ def first_turn(lane, w, low, high, j):
 @numba.njit(**INNER)
 def _root(lane, low, high):
     """Return where a function is 0 between two lengths, by its values there."""
-    if not low * high < 0.0:
+    if not opposite(low, high):
         high = -low  # a memory that would stand still says no more than that: halve
     part = 0.5 if low == high else low / (low - high)
     return lane.low + part * (lane.high - lane.low)

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 from ..methods.dense import events_at_parts
-from ..state import INNER
+from ..state import INNER, opposite
 from .location import EVENT
 
 _HALVINGS = 24  # of the way to a break point that is farther back
@@ -80,7 +80,7 @@ def _until_break_point(task, w, nearer, j):
     """Return how far it is to the first break point, in distances between the last two looks."""
     first = np.inf
     for i in range(task.rows.switching):
-        if w.events.g_start[i, j] * w.events.g[i, j] < 0.0:
+        if opposite(w.events.g_start[i, j], w.events.g[i, j]):
             first = min(first, nearer[i, j] / (w.ahead.g[i, j] - nearer[i, j]))
     return min(max(first, 0.0), 1.0)
 
@@ -89,6 +89,6 @@ def _until_break_point(task, w, nearer, j):
 def _crosses(task, w, g, j):
     """Whether a switching function has another sign than at the start of a step."""
     for i in range(task.rows.switching):  # noqa: SIM110 (no generators in machine code)
-        if w.events.g_start[i, j] * g[i, j] < 0.0:
+        if opposite(w.events.g_start[i, j], g[i, j]):
             return True
     return False

@@ -25,7 +25,7 @@ from ..evaluate import input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
-from ..state import INNER, METHOD, RUNNING, STIFF
+from ..state import INNER, METHOD, RUNNING, STIFF, opposite
 
 FIRST_TURN = 20  # steps after which it is judged whether this method pays
 SLOPES = 2  # slopes at both ends of a step
@@ -298,7 +298,7 @@ def _root(task, w, i, h, j):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
         f = _value_and_slope(p, middle * h, w.taylor.terms, row, j)[0]
-        if f * f_low > 0.0:
+        if opposite(f, -f_low):
             low, f_low = middle, f
         else:
             high, f_high = middle, f
@@ -362,7 +362,7 @@ def _compare(task, lane, w, j):
     for i in range(task.rows.switching):
         if not _is_followed(p, w.h[j], taylor.terms, n + i, j):
             inside.looked[j], inside.foreseen[j] = -1.0, 0.5
-        elif not events.g_start[i, j] * events.g[i, j] < 0.0:
+        elif not opposite(events.g_start[i, j], events.g[i, j]):
             side = events.g_start[i, j]
             if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
                 side = 1.0
