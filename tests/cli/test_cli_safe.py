@@ -107,9 +107,14 @@ def test_under_a_memory_limit_a_run_ends_with_a_message(tmp_path, command, size)
     assert ("begin with: nlctl run" in told.stderr) == (command == "run")
 
 
-@pytest.mark.ci
 @pytest.mark.skipif(sys.platform != "linux", reason="address space is limited on Linux")
-@pytest.mark.parametrize("size", [1300, 1380, 1450, 1600, 2000, 2600])
+@pytest.mark.parametrize(
+    "size",
+    [
+        *(pytest.param(size, marks=pytest.mark.ci) for size in (1380, 2000)),
+        *(pytest.param(size, marks=pytest.mark.weekly) for size in (1300, 1450, 1600, 2600)),
+    ],
+)
 def test_with_some_more_memory_it_runs_or_says_so(tmp_path, size):
     """Around what it takes: no wait, no abort of a library, whatever was begun when it ran out."""
     path = write(tmp_path, HEAD, SMALL)

@@ -112,7 +112,7 @@ def judged(system, t, x, u):
     return len(found)
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_users_functions_read_back():
     """The formulas of the corpus, with two states, have the values of its functions."""
     rng, count, formulas = np.random.default_rng(3), 0, 0

@@ -78,7 +78,7 @@ def test_single_runs_and_ensembles(make, functions, varied, ensemble):
     assert during == []
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_rows_of_an_experiment_and_their_metrics():
     prepared = prepare(experiment())
     with compiling() as before:

@@ -144,6 +144,7 @@ def test_nlctl_itself_imports_nothing_of_its_analysis(tmp_path):
     assert python("-c", program, cwd=tmp_path).stdout == "[]\n"
 
 
+@pytest.mark.weekly
 def test_a_study_with_the_former_name_is_read_and_warned_of(tmp_path):
     """The rule of what may run is that of the present name."""
     path = tmp_path / "study.toml"

@@ -77,6 +77,7 @@ def test_wheel_holds_both_packages_and_their_data(wheel):
     }
 
 
+@pytest.mark.weekly
 def test_the_sdist_runs_its_own_tests(wheel, tmp_path):
     """All of them are collected there, and those of a release pass; the README's links lead on."""
     (sdist,) = wheel.parent.glob("*.tar.gz")

@@ -34,15 +34,21 @@ FIGURES = {
 EXTREMES = [np.inf, -np.inf, np.nan, 1e308, -1e308, 0.0, 1e-320]
 
 
-@pytest.mark.ci
+@pytest.mark.parametrize(
+    ("values", "parts"),
+    [
+        pytest.param((np.nan, np.inf, 1e-320), [slice(None)], marks=pytest.mark.ci, id="three"),
+        pytest.param(EXTREMES, [slice(0, 1), slice(None)], marks=pytest.mark.weekly, id="all"),
+    ],
+)
 @pytest.mark.parametrize("name", FIGURES)
-def test_numbers_of_any_size_are_drawn(name):
+def test_numbers_of_any_size_are_drawn(name, values, parts):
     """In one row or in all, each column: a figure, and no warning (which would be an error)."""
     draw, columns = FIGURES[name][0], FIGURES[name][1].split()
     plain = np.array([[0.3], [-0.2], [0.5]]) * (1.0 + np.arange(len(columns)))
     for column in columns:
-        for value in EXTREMES:
-            for rows in (slice(0, 1), slice(None)):
+        for value in values:
+            for rows in parts:
                 table = pd.DataFrame(plain, index=NAMES, columns=columns)
                 table.loc[table.index[rows], column] = value
                 file = io.BytesIO()

@@ -63,7 +63,7 @@ def start_of(loop, start):
     return start
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 @each_row("name", list(LOOPS))
 def test_a_response_of_the_loop_is_taken(name):
     """From both engines, at usual tolerances and tight ones."""

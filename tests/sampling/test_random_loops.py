@@ -110,7 +110,7 @@ def loops(draw):
     return (nlctl.with_faults(loop, *made) if made else loop), x0, w
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 @given(drawn=loops())
 @settings(max_examples=6)
 def test_machine_code_is_python_control(drawn):

@@ -188,7 +188,7 @@ def drawn_actuator(rng):
     ][rng.integers(3)]
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_whatever_is_certified_holds(seed):

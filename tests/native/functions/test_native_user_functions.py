@@ -59,7 +59,7 @@ def test_the_corpus_is_large():
     assert len(IMPURE) >= 50
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_most_pure_functions_are_accepted():
     """Refusing all would be right and of no use."""
     kinds = [judged(entry, 9).kind for entry in PURE]

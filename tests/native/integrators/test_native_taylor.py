@@ -184,7 +184,7 @@ def defect(compiled, k, t, h):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("states", [2, 9])
+@pytest.mark.parametrize("states", [2, pytest.param(9, marks=pytest.mark.weekly)])
 def test_polynomials_of_users_functions_have_the_slopes_of_their_functions(states):
     """Wherever there are coefficients, at a distance at which the last term is 1e-9.
 

@@ -500,7 +500,7 @@ STEPS = st.tuples(st.integers(0, 9), *[st.integers(0, 20)] * 3)
 
 
 @pytest.mark.slow
-@settings(max_examples=many(100))
+@settings(max_examples=many(100, part=12))
 @given(st.lists(STEPS, max_size=7), st.sampled_from([9, 16, 20]), st.sampled_from([1, 2]),
        st.booleans())  # fmt: skip
 def test_random_programs_of_vectors_agree_with_numpy(steps, n, lanes, opaque):
