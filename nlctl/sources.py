@@ -402,6 +402,14 @@ class TimeTable:
                 f"TimeTable needs increasing times, got times[{k}] = {self.times[k]:g} and "
                 f"times[{k + 1}] = {self.times[k + 1]:g}"
             )
+        with np.errstate(over="ignore"):
+            slopes = np.diff(self.values) / steps
+        if not self.hold and not np.all(np.isfinite(slopes)):
+            k = int(np.argmax(~np.isfinite(slopes)))
+            raise ParameterError(
+                f"TimeTable needs slopes that are finite, got {steps[k]:g} "
+                f"s between times[{k}] and times[{k + 1}]"
+            )
 
     def derived(self) -> dict[str, Any]:
         """Slopes of the pieces (1/s), 0 of held values."""

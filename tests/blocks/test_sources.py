@@ -198,6 +198,14 @@ class TestChirp:
 
 class TestTimeTable:
     times = st.lists(st.floats(-10, 10), min_size=2, max_size=8, unique=True).map(sorted)
+    times = times.filter(lambda times: np.diff(times).min() > 1e-300)
+
+    def test_slopes_that_overflow_are_refused(self):
+        with pytest.raises(
+            nlctl.errors.ParameterError, match=r"slopes that are finite, got 2e-311 s between"
+        ):
+            nlctl.sources.TimeTable(times=(0.0, 2e-311), values=(1.0, -0.1))
+        assert nlctl.sources.TimeTable(times=(0.0, 2e-311), values=(1.0, -0.1), hold=True)
 
     @given(times, st.floats(-12, 12))
     def test_straight_lines_are_numpys(self, times, t):

@@ -195,7 +195,7 @@ def test_a_missed_figure_is_the_first_sentence(runs):
     spoiled["1"] = dataclasses.replace(runs["1"], metrics=wrong)
     report = paper_report(spoiled)
     assert report.verdict == (
-        f"Not reproduced: 1 of {len(expectations())} numbers is missed, most of all max |u| of "
+        f"Not reproduced: 1 of {len(expectations())} numbers is off, most of all max |u| of "
         "case 1 (13 instead of 12.052217)."
     )
     assert [c.holds for c in report.claims] == [True, True, True, True, False]

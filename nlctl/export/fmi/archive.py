@@ -125,11 +125,11 @@ def fmu(
 
 def _headers(version: int) -> dict[str, str]:
     """Return the headers of FMI, which FMPy brings along."""
-    found = find_spec("fmpy")
-    if found is None or found.origin is None:
+    spec = find_spec("fmpy")
+    if spec is None or spec.origin is None:
         raise UsageError("an FMU has FMI's headers, which FMPy brings along, and it is not "
                          "installed: pip install 'nlctl[export]'")  # fmt: skip
-    folder = Path(found.origin).parent / "c-code"
+    folder = Path(spec.origin).parent / "c-code"
     return {
         name: (folder / name).read_text(encoding="utf-8").replace("\r\n", "\n")
         for name in _HEADERS[version]

@@ -58,7 +58,7 @@ def libraries(
     sources: Mapping[str, str], name: str, version: int, platforms: Sequence[str]
 ) -> dict[str, bytes]:
     """Return libraries by their paths below ``binaries``."""
-    made = {}
+    binaries = {}
     with tempfile.TemporaryDirectory() as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
@@ -71,8 +71,8 @@ def libraries(
             if version == 2:
                 whole = next(iter(compiled.values())) if len(compiled) == 1 else _united(compiled)
                 compiled = {platform.folder: whole}
-            made |= {f"{key}/{name}{platform.suffix}": code for key, code in compiled.items()}
-    return made
+            binaries |= {f"{key}/{name}{platform.suffix}": code for key, code in compiled.items()}
+    return binaries
 
 
 def check_compiler() -> None:

@@ -35,14 +35,14 @@ def build_description(model: Model, code: list[str]) -> str:
 
 def _rendered(template: str, **values: Any) -> str:
     folder = files("nlctl.export.fmi") / "templates"
-    environment = jinja2.Environment(
+    templates = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True,
     )  # fmt: skip
-    environment.filters["number"] = _number
-    environment.tests["finite"] = np.isfinite
+    templates.filters["number"] = _number
+    templates.tests["finite"] = np.isfinite
     text = (folder / f"{template}.j2").read_text(encoding="utf-8")
-    return environment.from_string(text).render(**values)
+    return templates.from_string(text).render(**values)
 
 
 def _number(value: float) -> str:

@@ -69,9 +69,9 @@ def _check(compiled: Compiled, what: str) -> None:
         )
     if compiled.schedule.lines:
         raise CompileError(f"'{what}' cannot be exported: it has transport delays")
-    for made in supplied_blocks(compiled.system, SLIDING):
+    for relay in supplied_blocks(compiled.system, SLIDING):
         raise CompileError(
-            f"'{what}' cannot be exported: block '{made.name}' is an ideal relay, whose sliding "
+            f"'{what}' cannot be exported: block '{relay.name}' is an ideal relay, whose sliding "
             "an importer does not know; nlctl.Relay has a hysteresis"
         )
     beyond = compiled.lowered.conditions.beyond
@@ -125,15 +125,15 @@ def _series(
                 f"'{what}' cannot be exported: a clock has a jitter of {clock.jitter:g} s, random "
                 "times that are the computer's; set it to 0"
             )
-    found = schedules(clocks)
-    largest = max((max(numbers) for numbers, _ in found), default=0)
-    if len(found) > _MOST_SERIES or largest >= 2**40:
+    series = schedules(clocks)
+    largest = max((max(numbers) for numbers, _ in series), default=0)
+    if len(series) > _MOST_SERIES or largest >= 2**40:
         raise CompileError(
             f"'{what}' cannot be exported: its clocks have instants in parts of 1/{largest} s, or "
-            f"{len(found)} different ones, more than its C counts; round their times"
+            f"{len(series)} different ones, more than its C counts; round their times"
         )
     meetings = tuple(
-        sum(1 << k for k, (_, together) in enumerate(found) if together <= meeting)
+        sum(1 << k for k, (_, together) in enumerate(series) if together <= meeting)
         for meeting in compiled.program.meetings
     )
-    return tuple(numbers for numbers, _ in found), meetings
+    return tuple(numbers for numbers, _ in series), meetings

@@ -95,20 +95,20 @@ def _states(
 
 def _signals(diagram: Any, at: dict[str, int], known: set[str]) -> list[Variable]:
     """Return inputs and outputs; one whose name is taken gets a path in front of it."""
-    found = []
+    signals = []
     for kind in ("inputs", "outputs"):
         for i, label in enumerate(getattr(diagram, f"{kind[:-1]}_labels") or ()):
             name = label if label not in known else f"{kind}.{label}"
             known.add(name)
             is_input = kind == "inputs"
-            found.append(
+            signals.append(
                 Variable(
                     name=name, reference=at[kind] + i, causality=kind[:-1],
                     variability="continuous", meaning=f"{kind[:-1]} of the diagram",
                     initial="" if is_input else "calculated", start=0.0 if is_input else None,
                 )
             )  # fmt: skip
-    return found
+    return signals
 
 
 def _parameters(
@@ -116,17 +116,17 @@ def _parameters(
 ) -> list[Variable]:
     """Return every number of the parameter vector, with what its record says of it."""
     declared = _declared(diagram)
-    made = []
+    parameters = []
     for slots in compiled.program.layout.values():
         for slot in slots.values():
             rule = declared.get(slot.name)
             for k, index in enumerate(np.ndindex(slot.shape)):
                 place = slot.offset + k
-                made.append(_parameter(
+                parameters.append(_parameter(
                     slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
                     first + place, float(p[place]), rule, place not in fixed,
                 ))  # fmt: skip
-    return made
+    return parameters
 
 
 def _parameter(
@@ -157,12 +157,12 @@ def _bounds(rule: Param | None, may_change: bool) -> Bounds:
 
 def _declared(diagram: Any) -> dict[str, Param]:
     """Return what records declare, by qualified names."""
-    found: dict[str, Param] = {}
+    declared: dict[str, Param] = {}
     for leaf in leaves(diagram):
         block = within(leaf.system)
         if isinstance(block, Block):
             for name, rule in declared_params(block.spec).items():
-                found[f"{leaf.parameter_path}.{name}"] = rule
+                declared[f"{leaf.parameter_path}.{name}"] = rule
     for path, owner in samplings(diagram):
-        found |= {f"{path}.{k}": rule for k, rule in declared_params(owner.spec).items()}
-    return found
+        declared |= {f"{path}.{k}": rule for k, rule in declared_params(owner.spec).items()}
+    return declared

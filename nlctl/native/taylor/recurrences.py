@@ -96,21 +96,15 @@ class Recurrences:
 
 
 def recurrences(
-    graph: Graph,
-    stores: Mapping[str, Sequence[Store]],
-    sizes: Mapping[str, int],
-    *,
-    packed: bool,
-    overflows: bool = True,
-) -> Recurrences:
+    graph: Graph, stores: Mapping[str, Sequence[Store]], sizes: Mapping[str, int], *,
+    packed: bool, overflows: bool = True,
+) -> Recurrences:  # fmt: skip
     """Return how the coefficients of a right-hand side follow.
 
-    The first rows of an order are the states, then the switching functions, then the right-hand
-    side.
+    The first rows of an order are the states, then switching functions, then the right-hand side.
     """
-    return _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows).read(
-        stores, packed
-    )
+    reader = _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows)
+    return reader.read(stores, packed)
 
 
 _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coefficients of a node
@@ -136,8 +130,7 @@ class _Reader:
     pairs : list
         See `Recurrences.sides`.
     overflows : bool
-        Whether a function that is flat at an argument that overflows is a constant there; boxes
-        have infinite bounds and no such choice.
+        Whether what is flat at arguments that overflow is constant there; not so on boxes.
     """
 
     graph: Graph
