@@ -62,6 +62,9 @@ class NumPyFunctions:
         """Return a number as one of this kind; NotImplemented for what is not a number."""
         raise NotImplementedError
 
+    def __neg__(self) -> Any:
+        raise NotImplementedError
+
     def __pos__(self) -> Any:
         return self
 

@@ -63,7 +63,8 @@ def first_difference(
     for names, a, b, most in zip(labels, one, other, allowed, strict=True):
         differ = np.flatnonzero(~agree(a, b, most))
         if differ.size:
-            return names[differ[0]], a[differ[0]], b[differ[0]]
+            k = int(differ[0])
+            return names[k], float(a[k]), float(b[k])
     return None
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ...report.document import Figure, Item, Paragraph, Report, Section, Table, versions
+from ...report.document import Figure, Paragraph, Report, Section, Table, versions
 from ...report.outline import summary
 from ...report.render import file_hashes
 from ...studies.file.asked import Varied
@@ -117,8 +117,8 @@ def study_sections(
     asked += _findings(result, prefix)
     asked += _assumed(result)
     if limits:
-        limits: list[Item] = [Paragraph(text=words) for words in how.limits(result)]
-        asked.append(Section(key="study_limits", title="Limitations", items=limits))
+        texts = [Paragraph(text=words) for words in how.limits(result)]
+        asked.append(Section(key="study_limits", title="Limitations", items=texts))
     return [
         replace(section, key=f"{prefix}{section.key}", level=section.level - 2 + level)
         for section in asked

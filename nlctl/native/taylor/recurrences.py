@@ -322,9 +322,7 @@ class _Reader:
     def _function(self, node: Expr) -> Expr | None:
         """Return the coefficient of a function of the table, as its row says."""
         terms, row = [self.term(a) for a in node.args], FUNCTIONS[node.op].series
-        if all(t is None for t in terms):
-            return None
-        if row == "steady":
+        if row == "steady" or all(t is None for t in terms):
             return None
         if row == "unknown":
             raise NoSeriesError(f"no Taylor coefficients of '{node.op}' are known")
@@ -335,7 +333,8 @@ class _Reader:
         for i, (arg, term) in enumerate(zip(node.args, terms, strict=True)):
             if term is not None:
                 derivative = _steady(self.graph, self.partial(node, i), node)
-                part = self._unless_flat(self._chained(arg, term, derivative), arg, derivative)
+                part = self._chained(arg, term, derivative)
+                part = part and self._unless_flat(part, arg, derivative)
                 found = self.graph.op("add", found, part) if found and part else found or part
         return self.graph.op("mul", found, self.weight(RECIPROCAL_ROW)) if found else None
 
@@ -356,10 +355,10 @@ class _Reader:
             found = graph.op("mul", factor, found) if factor else graph.op("neg", found)
         return found
 
-    def _unless_flat(self, part: Expr | None, arg: Expr, derivative: Expr) -> Expr | None:
+    def _unless_flat(self, part: Expr, arg: Expr, derivative: Expr) -> Expr:
         """Return what follows from an argument, 0 where that is large and nothing follows."""
         graph = self.graph
-        if part is None or not derivative.varies or not self.overflows:
+        if not derivative.varies or not self.overflows:
             return part
         large = graph.op("gt", graph.op("absolute", arg), graph.const(_LARGE))
         tells = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
