@@ -11,7 +11,7 @@ from hypothesis import settings
 settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
 settings.load_profile("nlctl")
 
-NEEDY = ("weekly", "browser", "cluster", "docs", "upstream")  # marks of what counts as ci
+NEEDY = ("weekly", "browser", "cluster", "docs", "export", "upstream")  # marks of what counts as ci
 
 
 def pytest_configure(config):
@@ -29,7 +29,7 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
 def pytest_collection_modifyitems(items):
-    """Count as ci what is weekly, needs a browser, a cluster, Sphinx or other people's tests.
+    """Count as ci what is weekly, needs what only an extra brings, or other people's tests.
 
     So is the machine code, ``native=True``, of what the same test compares as plain Python.
     What is ci is slow.

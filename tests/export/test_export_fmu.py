@@ -13,6 +13,8 @@ import nlctl
 from nlctl.errors import CompileError, ParameterError, UnknownNameError, UsageError
 from nlctl.export import fmu
 
+pytestmark = pytest.mark.export
+
 KINDS = ("ModelExchange", "CoSimulation")
 
 

@@ -13,6 +13,8 @@ from fmi_models import MODELS
 import nlctl
 from nlctl.errors import ParameterError, UnknownNameError, UsageError
 
+pytestmark = pytest.mark.export
+
 REFERENCE = {"engine": "python-control"}
 
 
