@@ -287,7 +287,7 @@ def test_the_burst_is_at_the_top_of_the_part():
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
     assert f"t = {run.burst:.1f} s" in words.text
-    assert f"forecast for {run.predictions[0].burst:.0f} s" in words.text
+    assert f"predicted for {run.predictions[0].burst:.0f} s" in words.text
     assert isinstance(figure, Figure)
     lines = [line.get_xdata() for line in figure.figure.axes[0].lines]
     marks = {float(x[0]) for x in lines if len(x) == 2 and x[0] == x[1]}
@@ -385,9 +385,9 @@ def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
     assert "Whether all signals stay bounded for all time is open" in report.verdict
     assert f"loses the sign of its gain at {run.burst:.0f} s" in report.verdict
     claims = {claim.text: claim for claim in report.claims}
-    theorem = next(c for text, c in claims.items() if "does its proof show" in text)
+    theorem = next(c for text, c in claims.items() if "theorem's proof shows" in text)
     assert claim_status(theorem) == ("refuted", "refuted")  # the paper is wrong, not the report
-    bounded = claims["Example 2: do all signals stay bounded for all time?"]
+    bounded = claims["Example 2: all signals stay bounded for all time"]
     assert claim_status(bounded) == ("undecided", "caution")
     assert f"ζ = {carried().rest:.2f}" in bounded.measured
     look, told = summary(report.claims)
@@ -403,8 +403,8 @@ def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
 def test_the_theorem_is_a_claim_without_long_runs_too():
     """Lemma 1 is false whatever a loop does; nothing is said of a burst that nobody ran."""
     report = paper_report(made_up_runs(), proofs=found())
-    assert any("does its proof show" in claim.text for claim in report.claims)
-    assert not any("stay bounded for all time?" in c.text and "Example" in c.text
+    assert any("theorem's proof shows" in claim.text for claim in report.claims)
+    assert not any("stay bounded for all time" in c.text and "Example" in c.text
                    for c in report.claims)  # fmt: skip
     assert "Far beyond" not in report.verdict
 
@@ -431,7 +431,7 @@ def test_nothing_is_called_unbounded():
     told = " ".join(words)
     assert "does not stay bounded" not in told
     assert "beyond bounds" not in told
-    assert "unbounded is not shown" in told
+    assert "This does not show that the signals are unbounded" in told
     assert "neither proved nor refuted" in told
     assert "proof-after" in {i.key for i in first.items if isinstance(i, Figure)}
 
