@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import control as ct
@@ -71,12 +71,10 @@ def _is_plain_diagram(system: Any) -> bool:
 
 
 def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    rates, n, m = np.zeros(system.nstates or 0), 0, 0
-    for part in system.syslist:
-        states, given = part.nstates or 0, part.ninputs or 0
-        if states:
-            rates[n : n + states] = rates_now(part, t, x[n : n + states], inputs[m : m + given])
-        n, m = n + states, m + given
+    rates = np.zeros(system.nstates or 0)
+    for part, states, given, _ in _places_of_parts(system):
+        if part.nstates:
+            rates[states] = rates_now(part, t, x[states], inputs[given])
     return rates
 
 
@@ -94,20 +92,29 @@ def _signals_now(
     try:
         return system._compute_static_io(t, x, u)
     except RuntimeError:
-        signals = _signals_by_passes(system, t, x, u)
+        signals = _settled_signals(system, t, x, u, outputs_now, _without_zeros, equal_nan=True)
         if signals is None:
             raise
         return signals
 
 
-def _settled_signals(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return what ``_compute_static_io`` returns, None where its passes do not come to an end.
+def _outputs_if_settled(part: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray | None:
+    if not _is_plain_diagram(part):
+        return part._out(t, x, u).reshape(-1)
+    signals = _settled_signals(part, t, x, u)
+    return None if signals is None else part.output_map @ signals[1]
 
-    The same passes: only parts whose inputs are as they were a pass before are not asked again.
+
+def _settled_signals(
+    system: Any, t: float, x: np.ndarray, u: np.ndarray,
+    answer: Callable[[Any, float, np.ndarray, np.ndarray], np.ndarray | None] = _outputs_if_settled,
+    product: Callable[[Any, Any], np.ndarray] = np.matmul, equal_nan: bool = False,
+) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
+    """Return what the passes of ``_compute_static_io`` come to, None where they come to no end.
+
+    Parts whose inputs are as they were a pass before are not asked again.
     """
-    outside = np.dot(system.input_map, u)
+    outside = product(system.input_map, u)
     inputs, places = outside, [*_places_of_parts(system)]
     count, outputs = system.connect_map.shape[1], np.zeros(sum(system.connect_map.shape))
     before: list[bytes | None] = [None] * len(places)
@@ -115,23 +122,16 @@ def _settled_signals(
         for i, (part, states, given, places_of_outputs) in enumerate(places):
             asked = inputs[given].tobytes()
             if asked != before[i]:
-                answer = _settled_outputs(part, t, x[states], inputs[given])
-                if answer is None:
+                values = answer(part, t, x[states], inputs[given])
+                if values is None:
                     return None
-                outputs[places_of_outputs], before[i] = answer, asked
-        now = system.connect_map @ outputs[:count] + outside
-        if (inputs == now).all():
+                outputs[places_of_outputs], before[i] = values, asked
+        now = product(system.connect_map, outputs[:count]) + outside
+        if np.array_equal(inputs, now, equal_nan=equal_nan):
             outputs[count:] = inputs
             return inputs, outputs
         inputs = now
     return None
-
-
-def _settled_outputs(part: Any, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray | None:
-    if not _is_plain_diagram(part):
-        return part._out(t, x, u).reshape(-1)
-    signals = _settled_signals(part, t, x, u)
-    return None if signals is None else part.output_map @ signals[1]
 
 
 def _places_of_parts(system: Any) -> Iterator[tuple[Any, slice, slice, slice]]:
@@ -141,25 +141,6 @@ def _places_of_parts(system: Any) -> Iterator[tuple[Any, slice, slice, slice]]:
         ends = n + (part.nstates or 0), m + (part.ninputs or 0), k + (part.noutputs or 0)
         yield part, slice(n, ends[0]), slice(m, ends[1]), slice(k, ends[2])
         n, m, k = ends
-
-
-def _signals_by_passes(
-    system: Any, t: float, x: np.ndarray, u: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return inputs and outputs of all parts by python-control's passes, without its 0 * NaN."""
-    inputs = _without_zeros(system.input_map, u)
-    for _ in range(len(system.syslist) + 1):
-        outputs, n, m = [], 0, 0
-        for part in system.syslist:
-            states, given = part.nstates or 0, part.ninputs or 0
-            outputs.append(outputs_now(part, t, x[n : n + states], inputs[m : m + given]))
-            n, m = n + states, m + given
-        every = np.concatenate(outputs)
-        now = _without_zeros(system.connect_map, every) + _without_zeros(system.input_map, u)
-        if np.array_equal(now, inputs, equal_nan=True):
-            return inputs, np.concatenate([every, inputs])
-        inputs = now
-    return None
 
 
 def _without_zeros(matrix: Any, values: Any) -> np.ndarray:
@@ -175,12 +156,9 @@ def parts_now(
     if not isinstance(system, ct.InterconnectedSystem):
         yield system, x, u
         return
-    given, _ = _signals_now(system, t, x, u)
-    n = m = 0
-    for part in system.syslist:
-        states, inputs = part.nstates or 0, part.ninputs or 0
-        yield from parts_now(part, t, x[n : n + states], given[m : m + inputs])
-        n, m = n + states, m + inputs
+    inputs, _ = _signals_now(system, t, x, u)
+    for part, states, given, _ in _places_of_parts(system):
+        yield from parts_now(part, t, x[states], inputs[given])
 
 
 class OwnParameters(ct.NonlinearIOSystem):
