@@ -14,8 +14,7 @@ static fmi2Status failure(Instance *i)
 
 static fmi2Status refused(Instance *i, const char *what)
 {
-  strncpy(i->machine.message, what, sizeof i->machine.message - 1);
-  return failure(i);
+  return CHECKED(complain(i, what) < 0);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -111,9 +110,7 @@ NO_VARIABLES(fmi2SetString, const fmi2String)
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
   THIS;
-  if (*state) *(Machine *)*state = i->machine;
-  else *state = copy_of(&i->machine);
-  return *state ? fmi2OK : fmi2Error;
+  return CHECKED(keep_state(i, state) < 0);
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
@@ -126,10 +123,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
   (void)c;
-  if (state) {
-    free(*state);
-    *state = NULL;
-  }
+  free_state(state);
   return fmi2OK;
 }
 
@@ -143,20 +137,14 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
   THIS;
-  if (size < sizeof(Machine)) return refused(i, "too little room for the state");
-  memcpy(bytes, state, sizeof(Machine));
-  return fmi2OK;
+  return CHECKED(write_state(i, state, bytes, size) < 0);
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
                                    fmi2FMUstate *state)
 {
   THIS;
-  if (size != sizeof(Machine)) return refused(i, "a state of another FMU");
-  if (!*state) *state = copy_of(&i->machine);
-  if (!*state) return fmi2Error;
-  memcpy(*state, bytes, size);
-  return fmi2OK;
+  return CHECKED(read_state(i, bytes, size, state) < 0);
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference z[], size_t nz,
@@ -213,33 +201,25 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  set_states(i, x);
-  return fmi2OK;
+  return CHECKED(set_continuous(i, x, n) < 0);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  get_rates(i, dx);
-  return fmi2OK;
+  return CHECKED(get_continuous(i, machine_rates(&i->machine), dx, n) < 0);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n)
 {
   THIS;
-  if (n != N_INDICATORS) return refused(i, "another number of event indicators");
-  if (n) machine_indicators(&i->machine, z);
-  return fmi2OK;
+  return CHECKED(get_indicators(i, z, n) < 0);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  get_states(i, x);
-  return fmi2OK;
+  return CHECKED(get_continuous(i, i->machine.x, x, n) < 0);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominal[], size_t n)

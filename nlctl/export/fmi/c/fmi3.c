@@ -16,8 +16,7 @@ static fmi3Status failure(Instance *i)
 static fmi3Status refused(fmi3Instance instance, const char *what)
 {
   THIS;
-  strncpy(i->machine.message, what, sizeof i->machine.message - 1);
-  return failure(i);
+  return CHECKED(complain(i, what) < 0);
 }
 
 static fmi3Instance made(fmi3String name, fmi3String token, int co_simulation, void *environment,
@@ -214,9 +213,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
 {
   THIS;
-  if (*state) *(Machine *)*state = i->machine;
-  else *state = copy_of(&i->machine);
-  return *state ? fmi3OK : fmi3Error;
+  return CHECKED(keep_state(i, state) < 0);
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
@@ -229,10 +226,7 @@ fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
 {
   (void)instance;
-  if (state) {
-    free(*state);
-    *state = NULL;
-  }
+  free_state(state);
   return fmi3OK;
 }
 
@@ -246,20 +240,15 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state,
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[],
                                  size_t size)
 {
-  if (size < sizeof(Machine)) return refused(instance, "too little room for the state");
-  memcpy(bytes, state, sizeof(Machine));
-  return fmi3OK;
+  THIS;
+  return CHECKED(write_state(i, state, bytes, size) < 0);
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[], size_t size,
                                    fmi3FMUState *state)
 {
   THIS;
-  if (size != sizeof(Machine)) return refused(instance, "a state of another FMU");
-  if (!*state) *state = copy_of(&i->machine);
-  if (!*state) return fmi3Error;
-  memcpy(*state, bytes, size);
-  return fmi3OK;
+  return CHECKED(read_state(i, bytes, size, state) < 0);
 }
 
 #define NO_DERIVATIVE(name)                                                                       \
@@ -307,33 +296,25 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 x[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  set_states(i, x);
-  return fmi3OK;
+  return CHECKED(set_continuous(i, x, n) < 0);
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 dx[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  get_rates(i, dx);
-  return fmi3OK;
+  return CHECKED(get_continuous(i, machine_rates(&i->machine), dx, n) < 0);
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 z[], size_t n)
 {
   THIS;
-  if (n != N_INDICATORS) return refused(i, "another number of event indicators");
-  if (n) machine_indicators(&i->machine, z);
-  return fmi3OK;
+  return CHECKED(get_indicators(i, z, n) < 0);
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 x[], size_t n)
 {
   THIS;
-  if (n != N_CONTINUOUS) return refused(i, "another number of continuous states");
-  get_states(i, x);
-  return fmi3OK;
+  return CHECKED(get_continuous(i, i->machine.x, x, n) < 0);
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
