@@ -52,6 +52,16 @@ class Param:
                 yield f"{sign} {limit:g}", lambda v, h=holds, b=limit: bool(h(v, float(b)))
 
     @property
+    def ends(self) -> tuple[tuple[float, bool], tuple[float, bool]]:
+        """The least and the largest value, infinite without a bound, and whether it is excluded."""
+        low = (self.at_least, False) if self.above is None else (self.above, True)
+        high = (self.at_most, False) if self.below is None else (self.below, True)
+        return (
+            (-np.inf if low[0] is None else float(low[0]), low[1]),
+            (np.inf if high[0] is None else float(high[0]), high[1]),
+        )
+
+    @property
     def bounds(self) -> str:
         """The bounds as text, for example ``> 0``; empty where there are none."""
         return ", ".join(rule for rule, _ in self.rules())

@@ -12,7 +12,7 @@ import numpy as np
 from ..annotations import as_annotated
 from ..blocks import Block, parameter_rows, sampling_of, within
 from ..names import Parameters
-from ..params import ParameterRow, declared_params, record_rows
+from ..params import Param, ParameterRow, declared_params, record_rows
 from ..upstream.control_internals import StandIn, current_parameters, set_parameters
 from ..upstream.systems import System
 from .addresses import divided
@@ -140,6 +140,18 @@ def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
     for path, owner in samplings(system):
         rows += parameter_rows(owner, f"{path}.")
     return rows
+
+
+def declared_rules(system: Any) -> dict[str, Param]:
+    """Return what records declare of parameters, by qualified names."""
+    owners = [(leaf.parameter_path, within(leaf.system)) for leaf in leaves(system)]
+    specs = [(path, block.spec) for path, block in owners if isinstance(block, Block)]
+    specs += [(path, owner.spec) for path, owner in samplings(system)]
+    return {
+        f"{path}.{name}": rule
+        for path, spec in specs
+        for name, rule in declared_params(spec).items()
+    }
 
 
 def _third_party_rows(system: Any, path: str) -> list[ParameterRow]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..errors import CompileError, ParameterError
 from ..native import Compiled
+from ..native.diagram.parameters import Slot
 
 _RESERVED = re.compile(
     "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|"
@@ -48,13 +49,20 @@ def enumeration(prefix: str, labels: Iterable[str], *, begins: bool = False) -> 
     return "\n".join(["enum {", *lines, f"  {prefix}S = {count}", "};"])
 
 
-def parameter_values(compiled: Compiled, p: np.ndarray) -> dict[str, float]:
-    """Return every number of the parameter vector by its name."""
-    names = {}
+def parameter_places(compiled: Compiled) -> Iterator[tuple[Slot, tuple[int, ...], int]]:
+    """Yield every number of the parameter vector: its parameter, its index in it, its place."""
     for slots in compiled.program.layout.values():
         for slot in slots.values():
             for k, index in enumerate(np.ndindex(slot.shape)):
-                names[slot.offset + k] = slot.name + "".join(f"[{i}]" for i in index)
+                yield slot, index, slot.offset + k
+
+
+def parameter_values(compiled: Compiled, p: np.ndarray) -> dict[str, float]:
+    """Return every number of the parameter vector by its name."""
+    names = {
+        place: slot.name + "".join(f"[{i}]" for i in index)
+        for slot, index, place in parameter_places(compiled)
+    }
     return {names.get(i, f"p[{i}]"): float(value) for i, value in enumerate(p)}
 
 

@@ -17,7 +17,8 @@ from ...arguments import RTOL, number
 from ...errors import ParameterError, UsageError
 from ...host.files import replace_file
 from ...names import unknown
-from .binaries import PLATFORMS, check_compiler, libraries
+from ..zig import check_zig
+from .binaries import PLATFORMS, libraries
 from .description import build_description, description
 from .reading import read_model
 from .source import sources, token_of
@@ -112,7 +113,7 @@ def fmu(
     text = sources(model, version)
     code = sorted(file for file in text if file.endswith(".c"))
     text |= _headers(version)
-    check_compiler()
+    check_zig("an FMU is compiled")
     content = {"modelDescription.xml": description(model, version, token_of(text), code).encode()}
     content |= {f"sources/{file}": source.encode() for file, source in text.items()}
     if version == 3:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import struct
-import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
-from ...errors import CompileError, UsageError
+from ..zig import zig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,24 +72,12 @@ def libraries(
     return binaries
 
 
-def check_compiler() -> None:
-    """Refuse to begin without the compiler."""
-    if find_spec("ziglang") is None:
-        raise UsageError("an FMU is compiled by ziglang, which is not installed: pip install "
-                         "'nlctl[export]'")  # fmt: skip
-
-
 def _compiled(folder: str, sources: Mapping[str, str], library: str, target: str) -> bytes:
     """Return a library for a processor and system."""
     code = sorted(file for file in sources if file.endswith(".c"))
-    command = [
-        *(sys.executable, "-m", "ziglang", "cc", "-target", target, *_COMMAND, "-I."),
-        *code, "-o", library, *([] if "windows" in target else ["-lm"]),
-    ]  # fmt: skip
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise CompileError(f"ziglang did not compile {library} for {target}:\n{done.stderr}")
-    return (Path(folder) / library).read_bytes()
+    arguments = ["cc", "-target", target, *_COMMAND, "-I.", *code, "-o", library]
+    arguments += [] if "windows" in target else ["-lm"]
+    return zig(arguments, folder, library, f"ziglang did not compile {library} for {target}")
 
 
 def _united(compiled: Mapping[str, bytes]) -> bytes:

@@ -13,7 +13,7 @@ from ...diagrams import initial_state as state_of
 from ...diagrams import supplied_blocks
 from ...errors import CompileError
 from ...native import Compiled
-from ...native.diagram.program import clocks_at
+from ...native.diagram.program import clocks_at, slots_of_clocks
 from ...native.timed.ahead import ahead
 from ...sampling.clock import Clock, schedules
 from ...sliding.relay import SLIDING
@@ -88,13 +88,8 @@ def _fixed(compiled: Compiled) -> set[int]:
     And those that steer which equations there are.
     """
     fixed = {*compiled.lowered.assumed, *compiled.lowered.timed.parameters.tolist()}
-    first = len(compiled.schedule.nodes)
-    for k in range(len(compiled.schedule.samplings)):
-        slots = compiled.program.layout[first + k]
-        fixed |= {
-            slots[n].offset for n in ("dt", "offset", "delay", "jitter", "seed") if n in slots
-        }
-    return fixed
+    clocks = slots_of_clocks(compiled.schedule, compiled.program)
+    return fixed | {slot.offset for slots in clocks for slot in slots.values()}
 
 
 def _happenings(compiled: Compiled, p: np.ndarray, stop_time: float, what: str) -> Happenings:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks import Block, within
-from ...diagrams import leaves, samplings, state_names
+from ...diagrams import state_names
+from ...diagrams.parameters import declared_rules
 from ...native import Compiled
-from ...params import Param, declared_params
+from ...params import Param
+from ..words import parameter_places
 from .records import Bounds, Variable
 
 _KINDS = ("states", "rates", "inputs", "outputs", "indicators", "parameters", "nothing")
@@ -115,18 +116,14 @@ def _parameters(
     compiled: Compiled, diagram: Any, first: int, p: np.ndarray, fixed: Collection[int]
 ) -> list[Variable]:
     """Return every number of the parameter vector, with what its record says of it."""
-    declared = _declared(diagram)
-    parameters = []
-    for slots in compiled.program.layout.values():
-        for slot in slots.values():
-            rule = declared.get(slot.name)
-            for k, index in enumerate(np.ndindex(slot.shape)):
-                place = slot.offset + k
-                parameters.append(_parameter(
-                    slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
-                    first + place, float(p[place]), rule, place not in fixed,
-                ))  # fmt: skip
-    return parameters
+    rules = declared_rules(diagram)
+    return [
+        _parameter(
+            slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
+            first + place, float(p[place]), rules.get(slot.name), place not in fixed,
+        )
+        for slot, index, place in parameter_places(compiled)
+    ]  # fmt: skip
 
 
 def _parameter(
@@ -144,25 +141,7 @@ def _parameter(
 def _bounds(rule: Param | None, may_change: bool) -> Bounds:
     if rule is None:
         return Bounds(may_change=may_change)
-    low, high = (
-        (strict, True) if strict is not None else (limit, False)
-        for strict, limit in ((rule.above, rule.at_least), (rule.below, rule.at_most))
-    )  # fmt: skip
+    (low, open_below), (high, open_above) = rule.ends
     return Bounds(
-        low=-np.inf if low[0] is None else float(low[0]), open_below=low[1],
-        high=np.inf if high[0] is None else float(high[0]), open_above=high[1],
-        may_change=may_change,
-    )  # fmt: skip
-
-
-def _declared(diagram: Any) -> dict[str, Param]:
-    """Return what records declare, by qualified names."""
-    declared: dict[str, Param] = {}
-    for leaf in leaves(diagram):
-        block = within(leaf.system)
-        if isinstance(block, Block):
-            for name, rule in declared_params(block.spec).items():
-                declared[f"{leaf.parameter_path}.{name}"] = rule
-    for path, owner in samplings(diagram):
-        declared |= {f"{path}.{k}": rule for k, rule in declared_params(owner.spec).items()}
-    return declared
+        low=low, open_below=open_below, high=high, open_above=open_above, may_change=may_change
+    )

@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ...diagrams import parameters, state_names
+from ...diagrams import state_names
+from ...diagrams.parameters import declared_rules
 from ...errors import ParameterError, UsageError
 from ...names import unknown
 from ...native import Compiled
 from ...native.diagram.parameters import Slot
+from ...native.diagram.program import slots_of_clocks
+from ...native.timed.ahead import ahead
+from ...params import Param
 
 _MOST = 8  # handles, where the author names none
 _OF_STATES = 2
@@ -128,8 +132,7 @@ class _Reader:
         self.slots: dict[str, Slot] = {
             slot.name: slot for block in compiled.program.layout.values() for slot in block.values()
         }
-        table = parameters(self.system)
-        self.rows: dict[str, Any] = {str(name): row for name, row in table.iterrows()}
+        self.rules = declared_rules(self.system)
         self.states = {f"{name}(0)": i for i, name in enumerate(state_names(self.system))}
         self.inputs: dict[str, int] = {
             label: i for i, label in enumerate(self.system.input_labels or ())
@@ -212,14 +215,14 @@ class _Reader:
             raise ParameterError(
                 f"'{name}' is an integer or a choice, which a page does not move: name a number"
             )
-        row: Any = self.rows.get(base, {})
-        value = float(self.p[place])
-        low, high = given or _within(_around(value), str(row.get("bounds", "")))
+        rule, value = self.rules.get(base), float(self.p[place])
+        low, high = given or _within(_around(value), rule)
         self._check_moves(name, base, slot, place, (low, high))
-        unit = str(row.get("unit", ""))
+        if rule is None:
+            return Handle(name=name, kind="p", place=place, value=value, low=low, high=high)
         return Handle(
             name=name, kind="p", place=place, value=value, low=low, high=high,
-            unit="" if unit == "1" else unit, meaning=str(row.get("meaning", "")),
+            unit="" if rule.unit == "1" else rule.unit, meaning=rule.meaning,
         )  # fmt: skip
 
     def _place(self, name: str) -> tuple[int, Slot]:
@@ -242,12 +245,8 @@ class _Reader:
         self, name: str, base: str, slot: Slot, place: int, ends: tuple[float, float]
     ) -> None:
         """Refuse a number by which another one of the program moves, or that rules forbid."""
-        clocks = {
-            slot.offset
-            for k in range(len(self.compiled.schedule.samplings))
-            for slot in self.compiled.program.layout[len(self.compiled.schedule.nodes) + k].values()
-        }
-        if place in clocks:
+        clocks = slots_of_clocks(self.compiled.schedule, self.compiled.program)
+        if place in {slot.offset for slots in clocks for slot in slots.values()}:
             raise ParameterError(
                 f"'{name}' says when samples are taken, which a page does not move"
             )
@@ -279,8 +278,6 @@ class _Reader:
         timed = self.compiled.lowered.timed
         if place not in set(timed.parameters.tolist()) or not timed.conditions.of_time:
             return
-        from ...native.timed.ahead import ahead
-
         times = np.array(self.span)
         jumps = ahead(timed, self.p[:, None], times, np.inf)["jumps"][0]
         gaps = np.diff(jumps[np.isfinite(jumps)])
@@ -297,17 +294,14 @@ def _around(value: float, least: float = 0.0) -> tuple[float, float]:
     return value - width, value + width
 
 
-def _within(ends: tuple[float, float], bounds: str) -> tuple[float, float]:
-    """Return a range cut to the bounds of a parameter, ``"> 0, <= 1"``."""
+def _within(ends: tuple[float, float], rule: Param | None) -> tuple[float, float]:
+    """Return a range cut to the bounds of a parameter; a little is left to what is excluded."""
+    if rule is None:
+        return ends
     low, high = ends
     part = 0.01 * (high - low)
-    for sign, text in re.findall(r"([<>]=?) ([-+.\deE]+)", bounds):
-        limit = float(text)
-        if sign[0] == ">":
-            low = max(low, limit + (part if sign == ">" else 0.0))
-        else:
-            high = min(high, limit - (part if sign == "<" else 0.0))
-    return low, high
+    (least, open_below), (most, open_above) = rule.ends
+    return max(low, least + part * open_below), min(high, most - part * open_above)
 
 
 def _range(text: str, ends: str) -> tuple[float, float]:

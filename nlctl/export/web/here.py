@@ -6,7 +6,6 @@ import ctypes
 import functools
 import lzma
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -14,7 +13,7 @@ import numpy as np
 
 from ...native.integrate.memory import with_fields
 from ...native.integrate.state import RUNNING
-from ...native.machine.finish import Loaded, finished
+from ...native.machine.finish import finished
 from ...native.run import Run
 from .linking import integrators_text
 
@@ -23,40 +22,17 @@ _PLACE = ctypes.c_void_p
 _NUMBER = ctypes.c_int64
 
 
-@dataclass(frozen=True, kw_only=True)
-class Here:
-    """The functions of a page's program.
+def carried_out(run: Run, text: str, names: Sequence[str], p: np.ndarray) -> Run:
+    """Return a run that has ended, by the functions of a page's program, which `text` is.
 
-    Attributes
-    ----------
-    loaded : Loaded
-        Those of the program.
+    `run` stays as it was laid out.
     """
-
-    loaded: Loaded
-
-    def address(self, name: str) -> int:
-        """Return where a function is."""
-        return self.loaded.addresses[name]
-
-    def call(self, name: str, *arrays: np.ndarray) -> None:
-        """Call a function of arrays."""
-        kind = ctypes.CFUNCTYPE(None, *[_PLACE] * len(arrays))
-        kind(self.address(name))(*(array.ctypes.data for array in arrays))
-
-
-def here(text: str, names: Sequence[str]) -> Here:
-    """Return the functions of a program, as machine code of this process."""
-    return Here(loaded=finished(text, names))
-
-
-def carried_out(run: Run, code: Here, p: np.ndarray) -> Run:
-    """Return a run that has ended, by a page's program; `run` stays as it was laid out."""
-    task = run.task
-    samples = [code.address(f"sample{k}") for k in range(len(run.machine.samples))]
-    resets = [code.address("reset")] if run.machine.resets else []
+    task, code = run.task, finished(text, names)  # to be kept as long as its addresses are used
+    address = code.addresses
+    samples = [address[f"sample{k}"] for k in range(len(run.machine.samples))]
+    resets = [address["reset"]] if run.machine.resets else []
     c = np.zeros_like(task.p)
-    code.call("prepare", p, c)
+    ctypes.CFUNCTYPE(None, _PLACE, _PLACE)(address["prepare"])(p.ctypes.data, c.ctypes.data)
     task = with_fields(
         task,
         p=c,
@@ -64,7 +40,7 @@ def carried_out(run: Run, code: Here, p: np.ndarray) -> Run:
         resets=with_fields(task.resets, functions=np.array(resets, dtype=np.int64)),
     )
     table, work = task.table.ctypes.data, run.work.table.ctypes.data
-    rhs, out, lane = code.address("rhs"), code.address("out"), run.work.lanes[0]
+    rhs, out, lane = address["rhs"], address["out"], run.work.lanes[0]
     call = _integrators()
     call("start", rhs, table, work)
     run.work.samples[0] = run.work.x

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import importlib.util
 import lzma
 import re
 import subprocess
@@ -15,44 +14,20 @@ from pathlib import Path
 
 import llvmlite.binding as llvm
 
-from ...errors import CompileError, UsageError
+from ...errors import CompileError
 from ...native import integrators
 from ...native.machine import store
+from ..zig import check_zig, zig
 from .layout import laid_out_as_here
 from .rounding import integrators_alike
 
-OF_MATH = [
-    "exp",
-    "log",
-    "log2",
-    "log10",
-    "log1p",
-    "expm1",
-    "sin",
-    "cos",
-    "tan",
-    "sinh",
-    "cosh",
-    "asin",
-    "acos",
-    "atan",
-    "asinh",
-    "acosh",
-    "atanh",
-    "cbrt",
-    "atan2",
-    "hypot",
-    "pow",
-]
+OF_MATH = (
+    "exp", "log", "log2", "log10", "log1p", "expm1", "sin", "cos", "tan", "sinh", "cosh", "asin",
+    "acos", "atan", "asinh", "acosh", "atanh", "cbrt", "atan2", "hypot", "pow",
+)  # fmt: skip
 """Functions of the C library that are JavaScript's ``Math``, by the same names."""
 PROVIDED = frozenset({*OF_MATH, "fmod", "nextafter"})
 _SCRIPT = Path(__file__).with_name("wasm_object.py")
-_NO_ZIG = (
-    "a page that runs is linked by Zig, which is not installed: pip install 'nlctl[export]' "
-    "(or ziglang)"
-)
-
-
 _STACK = 1 << 20  # bytes
 _SIZE = """
 define internal {i64, i1} @size(i64 %a, i64 %b) alwaysinline nounwind {
@@ -79,8 +54,7 @@ def check_linker() -> None:
     >>> from nlctl.export.web import check_linker
     >>> check_linker()  # doctest: +SKIP
     """
-    if importlib.util.find_spec("ziglang") is None:
-        raise UsageError(_NO_ZIG)
+    check_zig("a page that runs is linked")
 
 
 def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes:
@@ -90,17 +64,12 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
         folder = Path(name)
         (folder / "integrators.o").write_bytes(_integrators())
         objects = wasm_objects(texts, folder, what)
-        command = [
-            sys.executable, "-m", "ziglang", "wasm-ld", *(path.name for path in objects),
-            "integrators.o", "-o", "page.wasm", "--no-entry", "--gc-sections", "--strip-all",
-            "--allow-undefined", "--stack-first", "-z", f"stack-size={_STACK}",
-            *(f"--export={name}" for name in exports),
+        arguments = [
+            "wasm-ld", *(path.name for path in objects), "integrators.o", "-o", "page.wasm",
+            "--no-entry", "--gc-sections", "--strip-all", "--allow-undefined", "--stack-first",
+            "-z", f"stack-size={_STACK}", *(f"--export={name}" for name in exports),
         ]  # fmt: skip
-        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        page = folder / "page.wasm"
-        if run.returncode or not page.exists():
-            raise CompileError(f"'{what}' cannot be linked for a page: {_last(run.stderr)}")
-        return page.read_bytes()
+        return zig(arguments, folder, "page.wasm", f"'{what}' cannot be linked for a page")
 
 
 def wasm_objects(texts: Mapping[str, str], folder: Path, what: str, speed: int = 2) -> list[Path]:

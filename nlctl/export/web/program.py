@@ -24,7 +24,7 @@ from ...native.run import Run
 from ...native.settings import Settings
 from ...responses.arguments import input_array, state_array
 from ..words import check_written_out, digest, parameter_values
-from .here import carried_out, here
+from .here import carried_out
 from .host import HOST, HOST_FUNCTIONS
 from .linking import PROVIDED, check_linker, linked
 from .memory import memory_text, places_in_table
@@ -160,8 +160,7 @@ def web_program(
     }
     _check_library("\n".join(texts.values()), what)
     module = linked(texts, (*HOST_FUNCTIONS, *_read_of(texts["host"])), what)
-    code = here(texts["program"], tuple(lowered.functions))
-    run = carried_out(run, code, p)
+    run = carried_out(run, texts["program"], tuple(lowered.functions), p)
     _check_end(run, what)
     values = parameter_values(compiled, p)
     return WebProgram(

@@ -23,6 +23,7 @@ from .parameters import Slot, current_values, slots
 from .schedule import Schedule
 
 _MOST = 40  # ways in which clocks meet
+_OF_CLOCK = ("dt", "offset", "delay", "jitter", "seed")  # what says when samples are taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,15 +112,21 @@ def instants_of(
 
 def clocks_at(schedule: Schedule, program: Program, p: np.ndarray) -> dict[Any, Clock]:
     """Return the clocks of sampled blocks that a parameter vector says, by their owners."""
+    owners = (holder.system for holder in schedule.samplings)
+    every = slots_of_clocks(schedule, program)
+    return {owner: _clock(slots, p) for owner, slots in zip(owners, every, strict=True)}
+
+
+def slots_of_clocks(schedule: Schedule, program: Program) -> list[dict[str, Slot]]:
+    """Return where the parameters of each clock lie, by their names."""
     first = len(schedule.nodes)
-    places = [(h.system, program.layout[first + k]) for k, h in enumerate(schedule.samplings)]
-    return {owner: _clock(slots, p) for owner, slots in places}
+    layouts = (program.layout[first + k] for k in range(len(schedule.samplings)))
+    return [{name: layout[name] for name in _OF_CLOCK} for layout in layouts]
 
 
 def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:
     """Return the clock that a parameter vector says."""
-    names = ("dt", "offset", "delay", "jitter", "seed")
-    values = {name: p[slots[name].offset].item() for name in names}
+    values = {name: p[slots[name].offset].item() for name in _OF_CLOCK}
     return Clock(**values | {"seed": int(values["seed"])})
 
 
