@@ -5,7 +5,7 @@ import ctypes
 import control as ct
 import numpy as np
 import pytest
-from exported import recorded, run_here, run_on_chip, written
+from exported import halved, recorded, run_here, run_on_chip, written
 
 import nlctl
 from nlctl.errors import CompileError, ParameterError
@@ -183,14 +183,6 @@ def a_gain(**keywords):
     return nlctl.sampled(
         ct.ss([], [], [], -2.0, 0.1, inputs="y", outputs="u", name="law"), **keywords
     )
-
-
-def halved(t, x, u, params):
-    """How often depends on the input."""
-    y = u[0]
-    while abs(y) > 1.0:
-        y = 0.5 * y
-    return [y]
 
 
 REFUSED = {

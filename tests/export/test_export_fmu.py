@@ -6,6 +6,7 @@ import zipfile
 import control as ct
 import numpy as np
 import pytest
+from exported import halved
 from extras import needed
 from fmi_models import MODELS, linear, simulated
 
@@ -206,14 +207,6 @@ def test_all_platforms_have_all_functions(tmp_path, version):
 def closed(block, **more):
     plant = ct.ss(-1, 1, 1, 0, inputs="u", outputs="y", name="plant")
     return nlctl.interconnect({"plant": plant, "law": block}, outputs="y", **more)
-
-
-def halved(t, x, u, params):
-    """How often depends on the input."""
-    y = u[0]
-    while abs(y) > 1.0:
-        y = 0.5 * y
-    return [y]
 
 
 REFUSED = {

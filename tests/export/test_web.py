@@ -10,6 +10,8 @@ from pathlib import Path
 import control as ct
 import numpy as np
 import pytest
+from closed_form_runs import Ball
+from exported import halved
 from extras import needed
 
 import nlctl
@@ -56,53 +58,26 @@ def here(program):
     return np.array([*program.signals.values()])
 
 
-@nlctl.record
-class Ball:
-    inputs, outputs, states, feedthrough = (), ("h",), ("h", "v"), False
-    initial = {"h": 1.0}
-    g: float = nlctl.param(2.0, unit="m/s^2", meaning="gravity", above=0)
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return x[1], -p.g
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def guard(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def reset(t, x, u, p):
-        return 0.0, -0.5 * x[1]
-
-
 @nlctl.equation
 def pendulum(x, v):
     x1, x2 = x
     return -9.81 * np.sin(x1) - 0.1 * x2 + 3.0 * v
 
 
-def loop_with(actuator):
+def loop_with(actuator, **sampling):
     """A pendulum that a sampled law drives through an actuator."""
     law = ct.ss([], [], [], [[-4.0, -1.0]], 0.05, inputs=["x1", "x2"], outputs="u", name="law")
     return nlctl.interconnect(
         {
             "plant": nlctl.PureFeedback(order=2, f=pendulum, initial={"x1": 1.5}),
-            "law": nlctl.sampled(law),
+            "law": nlctl.sampled(law, **sampling),
             "actuator": actuator,
         }
     )
 
 
 def ball():
-    return nlctl.interconnect({"ball": Ball()})
+    return nlctl.interconnect({"ball": Ball(g=2.0, e=0.5)})
 
 
 def faulty():
@@ -219,10 +194,6 @@ def test_every_actuator_has_the_same_numbers_to_the_bit(in_node, name):
     assert np.array_equal(samples(found, program), here(program))
 
 
-def halved(t, x, u, params):
-    return [float(str(0.5 * u[0]))]
-
-
 REFUSED = {
     "transport delays": lambda: nlctl.block(
         nlctl.TransportDelay(inputs=("x1",), outputs=("v",), delay=0.1), "law"
@@ -290,6 +261,28 @@ def test_names_stand_for_numbers_with_ranges_and_units():
     assert (x1.kind, x1.value) == ("x", 0.5)
     assert (onset.fault, onset.is_on, onset.high) == ("fault_actuator_v", False, 20.0)
     assert (value.name, value.value) == ("fault_actuator_v.value", 0.4)
+
+
+def test_converters_of_a_sampled_law_can_be_moved():
+    """They say to what values are rounded, and not when."""
+    loop = loop_with(nlctl.Gain(), input_quantum=0.01)
+    (handle,) = moved(loop, "law.sampling.input_quantum")
+    assert (handle.value, handle.low, handle.high) == (0.01, 0.0, 0.02)
+
+
+def test_bounds_have_all_their_digits():
+    @nlctl.record
+    class Bounded:
+        inputs, outputs, states, feedthrough = ("u",), ("v",), (), True
+        a: float = nlctl.param(0.3, unit="1", meaning="gain", at_least=0.2, at_most=0.123456789 * 3)
+
+        @staticmethod
+        @nlctl.equation
+        def output(t, x, u, p):
+            return (p.a * u[0],)
+
+    (handle,) = moved(loop_with(Bounded()), "actuator.a")
+    assert (handle.low, handle.high) == (0.2, 0.123456789 * 3)
 
 
 def test_a_few_are_chosen_where_none_is_named():

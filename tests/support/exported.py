@@ -18,6 +18,14 @@ CHIP = ["-mcpu=cortex-m7", "-mthumb", "-mfpu=fpv5-d16", "-mfloat-abi=hard", "-no
 EMULATOR = ["-M", "mps2-an500", "-nographic", "-semihosting", "-kernel", "program"]
 
 
+def halved(t, x, u, params):
+    """A function that is called unchanged: how often it goes round depends on its input."""
+    y = u[0]
+    while abs(y) > 1.0:
+        y = 0.5 * y
+    return [y]
+
+
 def recorded(parts, name, dt, steps, initial_state=None):
     """Return what a sampled block of a loop gets and gives at every sample: (steps, inputs), ...
 

@@ -2,37 +2,10 @@
 
 import control as ct
 import numpy as np
+from closed_form_runs import Ball
 from extras import needed
 
 import nlctl
-
-
-@nlctl.record
-class Ball:
-    """Falls, and bounces with 0.8 of its speed."""
-
-    inputs, outputs, states, feedthrough = (), ("h",), ("height", "v"), False
-    initial = {"height": 1.0}
-
-    @staticmethod
-    @nlctl.equation
-    def update(t, x, u, p):
-        return x[1], -9.81
-
-    @staticmethod
-    @nlctl.equation
-    def output(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def guard(t, x, u, p):
-        return (x[0],)
-
-    @staticmethod
-    @nlctl.equation
-    def reset(t, x, u, p):
-        return 0.0, -0.8 * x[1]
 
 
 def linear():
@@ -126,3 +99,11 @@ def simulated(path, kind, end, *, points=200, tolerance=1e-11, **more):
         output_interval=end / points, **{"record_events": False, **more},
     )  # fmt: skip
     return run, outputs
+
+
+def check_bounces(ball, e):
+    """A ball that falls from 1 m and keeps a part `e` of its speed bounces when it must."""
+    run = nlctl.input_output_response(ball, [0.0, 1.5], 0, engine="python-control")
+    exact = np.sqrt(2.0 / 9.81) * (1.0 + 2.0 * np.cumsum([0.0, e, e**2]))
+    falls = run.events["time"][run.events["direction"] == "falling"].unique()
+    assert all(np.abs(falls - t).min() < 1e-8 for t in exact[exact < 1.5])
