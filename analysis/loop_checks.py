@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
@@ -12,6 +11,7 @@ import numpy as np
 
 from nlctl import native
 from nlctl.arguments import ATOL, RTOL
+from nlctl.attributes import described_record
 from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
@@ -36,15 +36,9 @@ _TIGHTER = 1e-2  # of the tolerances, for the comparison
 _SAME = 1e-4  # of a signal's range
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class LoopCheck:
-    """One thing that was checked.
-
-    Attributes
-    ----------
-    what, found : str
-    status : {"pass", "caution", "fail", "not applicable"}
-    """
+    """One thing that was checked."""
 
     what: str
     found: str

@@ -18,7 +18,7 @@ import heapq
 import itertools
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +26,7 @@ from flint import arb
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
@@ -42,35 +43,25 @@ _Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Range:
     """A proved enclosure of a function's values on a box.
-
-    Attributes
-    ----------
-    low, high : float
-        low <= f <= high on the whole box, proved; infinite where that did not succeed.
-    least, greatest : float
-        Extreme values that are attained (on boxes with an infinite side: that interval
-        arithmetic gives at a point of the finite ones).
-    boxes, undecided : int
-        Boxes examined, and those left without a finite bound.
-    seconds : float
-    arithmetic : {"balls", "floats"}
-        What proved it: python-flint's balls, or floats rounded outwards in machine code.
 
     Examples
     --------
     See `enclose`.
     """
 
-    low: float
+    low: float  # low <= f <= high on the whole box, proved; infinite where that did not succeed.
     high: float
+    # Extreme values that are attained (on boxes with an infinite side: that interval arithmetic
+    # gives at a point of the finite ones).
     least: float
     greatest: float
-    boxes: int
+    boxes: int  # Boxes examined, and those left without a finite bound.
     undecided: int
-    seconds: float
+    seconds: float  # How long it took.
+    # What proved it: python-flint's balls, or floats rounded outwards in machine code.
     arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
@@ -79,36 +70,24 @@ class Range:
         return float(np.maximum(abs(self.low), abs(self.high)))
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Proof:
     """The verdict on the claim low <= f <= high on a box.
-
-    Attributes
-    ----------
-    holds : bool or None
-        True: proved.  False: refuted, at the point `where`.  None: undecided.
-    boxes, undecided : int
-        Boxes examined, and those that stayed undecided.
-    where : dict or None
-        The point that refutes the claim, or the centre of an undecided box.
-    value : float
-        Value of the function there.
-    seconds : float
-    arithmetic : {"balls", "floats"}
-        What decided it: python-flint's balls, or floats rounded outwards in machine code; balls
-        have confirmed a point that refutes.
 
     Examples
     --------
     See `prove`.
     """
 
-    holds: bool | None
-    boxes: int
+    holds: bool | None  # True: proved. False: refuted, at the point `where`. None: undecided.
+    boxes: int  # Boxes examined, and those that stayed undecided.
     undecided: int
+    # The point that refutes the claim, or the centre of an undecided box.
     where: dict[str, float] | None
-    value: float
-    seconds: float
+    value: float  # Value of the function there.
+    seconds: float  # How long it took.
+    # What decided it: python-flint's balls, or floats rounded outwards in machine code; balls have
+    # confirmed a point that refutes.
     arithmetic: Literal["balls", "floats"] = "balls"
 
     @property

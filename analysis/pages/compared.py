@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from .. import figures
@@ -40,22 +40,13 @@ _LINE = re.compile(r"^numbers\.(study\.)?(tables|running estimate)\b")  # of a t
 _TOLD_APART = ("title", "verdict", "question", "revision", "date")
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Compared:
-    """A report that is compared.
+    """A report that is compared."""
 
-    Attributes
-    ----------
-    name : str
-        As the command names it.
-    content : mapping
-        What is in its ``report.json``.
-    folder : Path, optional
-        Where its page lies, with its signals; None where it was made for this comparison.
-    """
-
-    name: str
-    content: Mapping[str, Any]
+    name: str  # As the command names it.
+    content: Mapping[str, Any]  # What is in its ``report.json``.
+    # Where its page lies, with its signals; None where it was made for this comparison.
     folder: Path | None = None
 
 

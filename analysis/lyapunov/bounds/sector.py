@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
+from nlctl.attributes import described_record
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.expressions.arrays import Tracer
 from nlctl.expressions.graph import Expr, Graph, Untraceable
@@ -24,25 +24,20 @@ from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Sector:
     """Sector constants of Assumption 3 over a box.
 
     The paper prints m1 v <= F <= m2 v for v >= 0 and m3 v <= F <= m4 v for v < 0; dividing by
     v < 0 turns the second pair round, so m4 <= F/v <= m3 there.
 
-    Attributes
-    ----------
-    positive, negative : Range or None
-        Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv.  None
-        where the box has no such v.
-    box : Box
-
     Examples
     --------
     See `sector`.
     """
 
+    # Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv. None where
+    # the box has no such v.
     positive: Range | None
     negative: Range | None
     box: Box

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, of_type, one_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 from nlctl.wording import counted, some_of
 
@@ -38,24 +38,9 @@ class NoGuaranteeError(UsageError):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Violation:
     """How likely a violation is; printed, it is a sentence with its assumptions.
-
-    Attributes
-    ----------
-    violations, runs : int
-    confidence : float
-    lower, upper : float
-        Bounds of the probability that hold together with this confidence.
-    side : {"upper", "lower", "both"}
-        Which of the two is in use; the other is 0 or 1.
-    singly : tuple of 2 floats
-        A lower and an upper bound that hold with this confidence each by itself; `lower` and
-        `upper` where both are in use.
-    method : str
-    assumptions : tuple of str
-        What the statement rests on.
 
     Examples
     --------
@@ -65,12 +50,14 @@ class Violation:
     violations: int
     runs: int
     confidence: float
-    lower: float
+    lower: float  # Bounds of the probability that hold together with this confidence.
     upper: float
-    side: Side
+    side: Side  # Which of the two is in use; the other is 0 or 1.
+    # A lower and an upper bound that hold with this confidence each by itself; `lower` and `upper`
+    # where both are in use.
     singly: tuple[float, float]
     method: str
-    assumptions: tuple[str, ...]
+    assumptions: tuple[str, ...]  # What the statement rests on.
 
     def __str__(self) -> str:
         return (

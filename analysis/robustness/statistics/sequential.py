@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy import optimize, special
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..uncertainty.design import Design
@@ -99,16 +99,9 @@ def _zero(
     return scale(root)
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class SequentialTest:
     """Whether a probability lies below or above a threshold; printed, it is a sentence.
-
-    Attributes
-    ----------
-    threshold : float
-    decision : {"below", "above", "undecided"}
-    statement : Violation
-        What is known when it was decided, or now.
 
     Examples
     --------
@@ -117,7 +110,7 @@ class SequentialTest:
 
     threshold: float
     decision: Literal["below", "above", "undecided"]
-    statement: Violation
+    statement: Violation  # What is known when it was decided, or now.
 
     def __str__(self) -> str:
         runs = f"after {counted(self.statement.runs, 'run')}"

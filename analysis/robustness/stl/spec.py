@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, tuple_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers
@@ -93,33 +94,24 @@ _PIECES = 16  # of a window, where a requirement is taken apart
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Requirement:
     """A named formula that has to hold at the start of a response.
 
     It is also a metric of `nlctl.ensemble_response`.
-
-    Attributes
-    ----------
-    key : str
-        Short name for tables and files.
-    formula : Formula
-        See `formula.in_band`, `formula.always`, `formula.eventually` and ``&``, ``|``, ``~``.
-    meaning : str
-        In words, for the report.
-    until : float
-        Time (s) that a run has to reach and that windows without an end stop at.  A run that ends
-        before has failed.
 
     Examples
     --------
     See `margin`.
     """
 
-    key: str
+    key: str  # Short name for tables and files.
+    # See `formula.in_band`, `formula.always`, `formula.eventually` and ``&``, ``|``, ``~``.
     formula: Formula
+    # Time (s) that a run has to reach and that windows without an end stop at. A run that ends
+    # before has failed.
     until: float
-    meaning: str = ""
+    meaning: str = ""  # In words, for the report.
 
     start = -np.inf
     end = np.inf

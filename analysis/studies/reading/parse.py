@@ -6,13 +6,14 @@ import copy
 import json
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.record import study_digest
@@ -42,13 +43,9 @@ STAND_INS = {  # while the rest of a mistaken file is validated
 _SPOKEN_OF = ("spec", "space", "runs")  # tables whose entries other parts of a study name
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class StudyFile(Setup):
     """A study without mistakes, with the settings of the command line.
-
-    Attributes
-    ----------
-    path : Path
 
     Examples
     --------

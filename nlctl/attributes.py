@@ -1,0 +1,143 @@
+"""Records of results: what a field is stands next to it, and docstrings have it from there.
+
+A comment behind a field, or above it, is its entry in the section Attributes; ``# (m,): times``
+begins with a shape.  Fields without one that have the type of the field before share its entry.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import inspect
+import io
+import re
+import sys
+import textwrap
+import tokenize
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, TypeVar, dataclass_transform, get_args, get_origin, overload
+
+_T = TypeVar("_T", bound=type)
+_MODULES = {"np": "", "pd": "pandas.", "ct": "control.", "Any": "object"}
+_SHAPE = re.compile(r"(\([\w, ()+.*-]*\))(?:: |$)(.*)", re.DOTALL)
+_SECTION = re.compile(r"^\w+\n-+$", re.M)
+
+
+@overload
+def described_record(cls: _T, /) -> _T: ...
+@overload
+def described_record(*, eq: bool = True, repr: bool = True) -> Callable[[_T], _T]: ...
+@dataclass_transform(
+    frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,)
+)
+def described_record(cls: Any = None, /, **options: bool) -> Any:
+    """Return a frozen dataclass of a class, made by name, whose docstring describes its fields."""
+    if cls is None:
+        return functools.partial(described_record, **options)
+    cls = dataclasses.dataclass(frozen=True, kw_only=True, **options)(cls)
+    cls.__doc__ = _Docstring(cls.__doc__ or "")
+    return cls
+
+
+class _Docstring:
+    """A docstring that is completed when somebody reads it."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.whole = text, ""
+
+    def __get__(self, instance: object, owner: type) -> str:
+        if not self.whole:
+            self.whole = _completed(inspect.cleandoc(self.text), _entries(owner))
+        return self.whole
+
+
+def _completed(text: str, entries: str) -> str:
+    """Return a docstring with a section Attributes in front of all others."""
+    section = f"Attributes\n----------\n{entries}" if entries else ""
+    next_one = _SECTION.search(text)
+    at = next_one.start() if next_one else len(text)
+    parts = text[:at], section, text[at:]
+    return "\n\n".join(part.strip() for part in parts if part)
+
+
+def _entries(cls: type) -> str:
+    """Return the entries of a class's own fields."""
+    comments, classes = _read(cls.__module__)
+    names = vars(sys.modules[cls.__module__])
+    entries: list[list[str]] = []
+    for node in classes.get(cls.__qualname__, ()):
+        lines, above = [comments.get(node.end_lineno, "")], node.lineno - 1
+        while not lines[0] and above in comments and comments[above].startswith("\n"):
+            lines[1:1] = [comments[above][1:]]
+            above -= 1
+        name, text = node.target.id, " ".join(filter(None, lines))
+        shape = _SHAPE.match(text)
+        kind = _kind(node.annotation, names) + (f" of shape {shape[1]}" if shape else "")
+        kind += ", optional" if _has_default(node) else ""
+        if entries and not text and entries[-1][1].partition(" of shape")[0] == kind:
+            entries[-1][0] += f", {name}"
+        else:
+            entries.append([name, kind, shape[2] if shape else text])
+    return "\n".join(
+        f"{names} : {kind}\n{textwrap.indent(textwrap.fill(text, 90), '    ')}".rstrip()
+        for names, kind, text in entries
+    )
+
+
+@functools.cache
+def _read(module: str) -> tuple[dict[int, str], dict[str, list[Any]]]:
+    """Return a module's comments by line, those alone in one after "\\n", and fields by class."""
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except OSError:  # installed without it
+        return {}, {}
+    comments = {}
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and not token.string.startswith(("# type:", "# noqa")):
+            alone = "\n" * token.line.lstrip().startswith("#")
+            comments[token.start[0]] = alone + token.string.lstrip("# ")
+    fields = {
+        node.name: [
+            field
+            for field in node.body
+            if isinstance(field, ast.AnnAssign) and not ast.unparse(field.target).startswith("_")
+        ]
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.ClassDef)
+    }
+    return comments, fields
+
+
+def _has_default(node: ast.AnnAssign) -> bool:
+    """Whether a field has one; ``field(...)`` alone is none."""
+    words = {word.arg for word in getattr(node.value, "keywords", ())}
+    is_field = isinstance(node.value, ast.Call) and ast.unparse(node.value.func) == "field"
+    return node.value is not None and (not is_field or bool(words & {"default", "default_factory"}))
+
+
+def _kind(node: Any, names: Mapping[str, Any]) -> str:
+    """Return an annotation in numpydoc's words."""
+    match node:
+        case ast.BinOp(left=left, right=right):
+            return f"{_kind(left, names)} or {_kind(right, names)}"
+        case ast.Subscript(value=ast.Name(id="Literal"), slice=ast.Tuple(elts=values)):
+            return f"{{{', '.join(map(ast.unparse, values))}}}".replace("'", '"')
+        case ast.Subscript(value=ast.Name(id="tuple"), slice=ast.Tuple(elts=[of, last])) if (
+            isinstance(last, ast.Constant)
+        ):
+            return f"tuple of {_kind(of, names)}"
+        case ast.Subscript(value=ast.Name(id="tuple"), slice=ast.Tuple(elts=parts)):
+            return f"({', '.join(_kind(part, names) for part in parts)})"
+        case ast.Subscript(value=ast.Name(id="Sequence" | "list" as many), slice=of):
+            return f"{many.lower()} of {_kind(of, names)}"
+        case ast.Subscript(value=value):
+            return _kind(value, names)
+        case ast.Attribute(value=ast.Name(id=module), attr=name):
+            return f"{_MODULES.get(module, f'{module}.')}{name}"
+        case ast.Name(id="Mapping" | "Callable" as name):
+            return name.lower()
+        case ast.Name(id=name) if get_origin(names.get(name)) is Literal:
+            return f"{{{', '.join(map(repr, get_args(names[name])))}}}".replace("'", '"')
+    text = ast.unparse(node)
+    return _MODULES.get(text, text)
