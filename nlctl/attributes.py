@@ -27,16 +27,22 @@ _SECTION = re.compile(r"^\w+\n-+$", re.M)
 @overload
 def described_record(cls: _T, /) -> _T: ...
 @overload
-def described_record(*, eq: bool = True, repr: bool = True) -> Callable[[_T], _T]: ...
+def described_record(
+    *, made_by: str = "", eq: bool = True, repr: bool = True
+) -> Callable[[_T], _T]: ...
 @dataclass_transform(
     frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,)
 )
-def described_record(cls: Any = None, /, **options: bool) -> Any:
-    """Return a frozen dataclass of a class, made by name, whose docstring describes its fields."""
+def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) -> Any:
+    """Return a frozen dataclass of a class, made by name, whose docstring describes its fields.
+
+    For an example it refers to the function that makes such a record, if that is named.
+    """
     if cls is None:
-        return functools.partial(described_record, **options)
+        return functools.partial(described_record, made_by=made_by, **options)
     cls = dataclasses.dataclass(frozen=True, kw_only=True, **options)(cls)
-    cls.__doc__ = _Docstring(cls.__doc__ or "")
+    example = f"\n\nExamples\n--------\nSee `{made_by}`." if made_by else ""
+    cls.__doc__ = _Docstring(inspect.cleandoc(cls.__doc__ or "") + example)
     return cls
 
 
@@ -48,7 +54,7 @@ class _Docstring:
 
     def __get__(self, instance: object, owner: type) -> str:
         if not self.whole:
-            self.whole = _completed(inspect.cleandoc(self.text), _entries(owner))
+            self.whole = _completed(self.text, _entries(owner))
         return self.whole
 
 

@@ -43,14 +43,9 @@ _Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
 
 
-@described_record
+@described_record(made_by="enclose")
 class Range:
-    """A proved enclosure of a function's values on a box.
-
-    Examples
-    --------
-    See `enclose`.
-    """
+    """A proved enclosure of a function's values on a box."""
 
     low: float  # low <= f <= high on the whole box, proved; infinite where that did not succeed.
     high: float
@@ -70,14 +65,9 @@ class Range:
         return float(np.maximum(abs(self.low), abs(self.high)))
 
 
-@described_record
+@described_record(made_by="prove")
 class Proof:
-    """The verdict on the claim low <= f <= high on a box.
-
-    Examples
-    --------
-    See `prove`.
-    """
+    """The verdict on the claim low <= f <= high on a box."""
 
     holds: bool | None  # True: proved. False: refuted, at the point `where`. None: undecided.
     boxes: int  # Boxes examined, and those that stayed undecided.

@@ -37,14 +37,9 @@ class Share:
     share: float  # of C_0^2 / 2
 
 
-@described_record
+@described_record(made_by="observed")
 class DirectBound:
-    """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1.
-
-    Examples
-    --------
-    See `observed`.
-    """
+    """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1."""
 
     start: float  # Interval (s); infinite bounds where k G N is not negative throughout.
     end: float
@@ -58,14 +53,9 @@ class DirectBound:
         return self.bound / self.max_r
 
 
-@described_record
+@described_record(made_by="conservatism")
 class Conservatism:
-    """C_0 against what happens.
-
-    Examples
-    --------
-    See `conservatism`.
-    """
+    """C_0 against what happens."""
 
     C_0: float
     max_r: float

@@ -31,15 +31,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@described_record
+@described_record(made_by="literal")
 class Constants:
     """All constants of the proof for one loop and one box.
 
     ``constants["delta*"]`` is a value.  The bounds hold while the trajectory stays in the box.
-
-    Examples
-    --------
-    See `literal`.
     """
 
     entries: tuple[Constant, ...]

@@ -52,14 +52,9 @@ class _Runs:
         return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
 
 
-@described_record
+@described_record(made_by="ledger")
 class Examination:
-    """What the ledger and the conservatism are made of.
-
-    Examples
-    --------
-    See `ledger`.
-    """
+    """What the ledger and the conservatism are made of."""
 
     loop: ct.InterconnectedSystem
     runs: _Runs

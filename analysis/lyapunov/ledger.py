@@ -37,14 +37,9 @@ if TYPE_CHECKING:
 _SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
 
 
-@described_record
+@described_record(made_by="ledger")
 class Ledger:
-    """Assumptions and inequalities of the proof for one loop, one line each.
-
-    Examples
-    --------
-    See `ledger`.
-    """
+    """Assumptions and inequalities of the proof for one loop, one line each."""
 
     loop: str  # Name of the diagram.
     # What the diagram consists of, see `nlctl.analysis.loop_record`.

@@ -51,14 +51,9 @@ NEXT = "the steps that build on it do not follow along this run."
 LITERAL = "A2", "(10)", "(18)", "(20)", "(22)", "(30)", "(31)", "(32)", "(36)"
 
 
-@described_record
+@described_record(made_by="ledger")
 class Line:
-    """One line of the ledger.
-
-    Examples
-    --------
-    See `ledger`.
-    """
+    """One line of the ledger."""
 
     key: str  # Number in the paper, or name of the assumption.
     statement: str  # What is claimed.

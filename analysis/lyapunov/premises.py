@@ -22,14 +22,9 @@ from .constants import Constants, bound
 from .loop.integral import sharpest
 
 
-@described_record
+@described_record(made_by="literal")
 class Premises:
-    """What the proof supposes of a loop, as numbers.
-
-    Examples
-    --------
-    See `literal`.
-    """
+    """What the proof supposes of a loop, as numbers."""
 
     gains: Gains
     lambdas: tuple[float, ...]  # Of the filtered error (14).

@@ -53,14 +53,9 @@ class TrialBound:
     u: float  # max |u| along the run; infinite if it diverged
 
 
-@described_record
+@described_record(made_by="tighten")
 class Tightened:
-    """The gains that were found, and the constants of the proof for them.
-
-    Examples
-    --------
-    See `tighten`.
-    """
+    """The gains that were found, and the constants of the proof for them."""
 
     gains: dict[str, float]  # Values by qualified name, for ``params=`` of a run.
     # The run with these gains and the constants on its set, by branch and bound; a ledger can be

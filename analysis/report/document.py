@@ -184,14 +184,9 @@ Item = Paragraph | Equation | Table | Figure | History | Live
 
 
 @as_annotated
-@described_record
+@described_record(made_by="Report")
 class Section:
-    """A headed part of a report; `key` is its anchor.
-
-    Examples
-    --------
-    See `Report`.
-    """
+    """A headed part of a report; `key` is its anchor."""
 
     key: str  # Its anchor.
     title: str  # Its heading.

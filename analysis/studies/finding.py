@@ -13,14 +13,9 @@ from nlctl.attributes import described_record
 from .sealed import as_json
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="finding_of")
 class Finding:
-    """What one analysis found.
-
-    Examples
-    --------
-    See `finding_of`.
-    """
+    """What one analysis found."""
 
     key: str  # Name of its folder, kind of analysis, heading.
     kind: str

@@ -15,14 +15,9 @@ from .intact.contents import CONTENTS, is_part, problems_in, sealed_record
 from .intact.page import PAGE_FILES, page_problems
 
 
-@described_record
+@described_record(made_by="verify")
 class Integrity:
-    """What `verify` found of a run folder.
-
-    Examples
-    --------
-    See `verify`.
-    """
+    """What `verify` found of a run folder."""
 
     folder: Path
     files: int  # Number of files that are as they were written.

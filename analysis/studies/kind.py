@@ -72,14 +72,9 @@ class Setup:
     experiment: Experiment  # What is simulated for each row.
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="Kind")
 class Ground:
-    """What an analysis uses while it runs.
-
-    Examples
-    --------
-    See `Kind`.
-    """
+    """What an analysis uses while it runs."""
 
     study: Study
     folder: Path  # What paths in the study are relative to.

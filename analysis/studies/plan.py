@@ -22,14 +22,9 @@ _NUMBER = 8
 """Bytes of one number on disk; compression makes it less."""
 
 
-@described_record
+@described_record(made_by="plan")
 class Plan:
-    """What a study will take.
-
-    Examples
-    --------
-    See `plan`.
-    """
+    """What a study will take."""
 
     runs: dict[str, int]  # Number of simulations by analysis, ``"rows"`` for the main table.
     at_most: tuple[str, ...]  # Those that may end earlier.

@@ -28,14 +28,9 @@ from .sealed import RunFolderError, as_json, origin_key
 _MOST = 8  # panels of a figure
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="replay")
 class Replay:
-    """A row that was run again.
-
-    Examples
-    --------
-    See `replay`.
-    """
+    """A row that was run again."""
 
     row: int
     stored: Mapping[str, Any]  # The row of the folder, and what came out now.

@@ -23,14 +23,9 @@ LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="run")
 class Result:
-    """A study and what it has found; nothing is run to read it.
-
-    Examples
-    --------
-    See `run`.
-    """
+    """A study and what it has found; nothing is run to read it."""
 
     folder: Path
     study: Study  # The study file, with the settings of the command line.

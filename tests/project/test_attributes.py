@@ -16,14 +16,9 @@ from nlctl.attributes import described_record
 Answer = Literal["yes", "no"]
 
 
-@described_record
+@described_record(made_by="watch")
 class Watched:
-    """A signal that was watched.
-
-    Examples
-    --------
-    None.
-    """
+    """A signal that was watched."""
 
     time: np.ndarray  # (m,): sample times (s)
     # What it was asked, in a sentence that does not
@@ -43,7 +38,7 @@ def test_a_docstring_has_each_field_with_type_shape_and_meaning():
         ("low, high : float, optional", "its ends"),
         ("found : mapping or None, optional", ""),
     ]
-    assert inspect.getdoc(Watched).endswith("Examples\n--------\nNone.")
+    assert inspect.getdoc(Watched).endswith("Examples\n--------\nSee `watch`.")
     assert inspect.getdoc(Watched).startswith("A signal that was watched.\n\nAttributes\n")
 
 

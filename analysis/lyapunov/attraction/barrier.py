@@ -40,15 +40,11 @@ _ADDED = 40  # of these in a round
 _StateFunction = Callable[[Any], Any]
 
 
-@described_record
+@described_record(made_by="barrier")
 class Barrier(ProofResult):
     """A polynomial B with B <= 0 at all starts, B > 0 in all that is unsafe, B' < 0 where B = 0.
 
     No trajectory from a start comes to what is unsafe, or leaves the box, at any time.
-
-    Examples
-    --------
-    See `barrier`.
     """
 
     names: tuple[str, ...]  # States.

@@ -28,14 +28,9 @@ _CELLS = 200  # parts of the time for which there are bounds
 _Status = Literal["proved", "refuted", "undecided"]
 
 
-@described_record
+@described_record(made_by="reachable_set")
 class ReachableSet:
-    """Boxes that hold all solutions from `start`, over each part of the time.
-
-    Examples
-    --------
-    See `reachable_set`.
-    """
+    """Boxes that hold all solutions from `start`, over each part of the time."""
 
     names: tuple[str, ...]  # States.
     start: Box  # Initial states.

@@ -27,14 +27,9 @@ _AT_REST = 1e-9  # of the rates at an equilibrium
 _ROUNDS = 3  # of proposals that grow
 
 
-@described_record
+@described_record(made_by="region_of_attraction")
 class AttractionRegion(ProofResult):
-    """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`.
-
-    Examples
-    --------
-    See `region_of_attraction`.
-    """
+    """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`."""
 
     names: tuple[str, ...]  # States.
     at: np.ndarray  # (n,): The equilibrium, where |f| <= 1e-9: what is proved takes it for one.

@@ -41,14 +41,9 @@ class DecompositionError(UsageError):
     """
 
 
-@described_record
+@described_record(made_by="decompose")
 class Decomposition:
-    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3).
-
-    Examples
-    --------
-    See `decompose`.
-    """
+    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3)."""
 
     k_1: float  # 0 < k_1 <= k <= k_2.
     k_2: float

@@ -24,16 +24,12 @@ from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
 
-@described_record
+@described_record(made_by="sector")
 class Sector:
     """Sector constants of Assumption 3 over a box.
 
     The paper prints m1 v <= F <= m2 v for v >= 0 and m3 v <= F <= m4 v for v < 0; dividing by
     v < 0 turns the second pair round, so m4 <= F/v <= m3 there.
-
-    Examples
-    --------
-    See `sector`.
     """
 
     # Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv. None where

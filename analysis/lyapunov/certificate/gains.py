@@ -36,14 +36,9 @@ class GainCandidate:
     u: float  # max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made
 
 
-@described_record
+@described_record(made_by="design")
 class GainDesign:
-    """The gains that were found, and the proof for them.
-
-    Examples
-    --------
-    See `design`.
-    """
+    """The gains that were found, and the proof for them."""
 
     gains: dict[str, float]  # Values by qualified name, for ``params=`` of a run.
     certificate: Certificate  # Proved for these gains.

@@ -81,14 +81,9 @@ class KnownSignLoop(FilteredLoop):
         return len(self.parts.gains.W_hat_0)
 
 
-@described_record
+@described_record(made_by="certify")
 class KnownSignCertificate(FilteredCertificate):
-    """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time.
-
-    Examples
-    --------
-    See `certify`.
-    """
+    """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time."""
 
     alpha_0: float  # The constants of V' <= -alpha_1 V + alpha_0, and V(0).
     alpha_1: float

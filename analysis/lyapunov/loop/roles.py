@@ -322,14 +322,9 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
 DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)
 
 
-@described_record
+@described_record(made_by="read_parts")
 class Parts:
-    """The records of a loop, by the part that they play in the proof.
-
-    Examples
-    --------
-    See `read_parts`.
-    """
+    """The records of a loop, by the part that they play in the proof."""
 
     plant: Any  # With the parameters of the run.
     actuator: Any

@@ -18,14 +18,9 @@ POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
 
 
-@described_record
+@described_record(made_by="signals_of")
 class Signals:
-    """Signals of `nlctl.analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``.
-
-    Examples
-    --------
-    See `signals_of`.
-    """
+    """Signals of `nlctl.analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``."""
 
     t: np.ndarray  # (m,)
     values: Mapping[str, np.ndarray] = field(repr=False)  # Arrays of shape (m,) by output name.
@@ -119,14 +114,9 @@ def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
     return float(max(np.max(np.abs(y)), np.max(inside, initial=0.0)))
 
 
-@described_record
+@described_record(made_by="observed")
 class Margin:
-    """Margin of one statement over time; it holds where it is not below -tolerance * scale.
-
-    Examples
-    --------
-    See `observed`.
-    """
+    """Margin of one statement over time; it holds where it is not below -tolerance * scale."""
 
     equation: str  # Number in the paper, ``"(31)"``.
     statement: str  # In corrected form.

@@ -29,16 +29,12 @@ from .region import region
 _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigma))"
 
 
-@described_record
+@described_record(made_by="certify")
 class ModelReferenceCertificate(Certificate):
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
     every initial state of `starts`: of the plant, the model, and the weights.
-
-    Examples
-    --------
-    See `certify`.
     """
 
     e: float  # Bound of |e| = |E_1| for all time, from all `starts`.

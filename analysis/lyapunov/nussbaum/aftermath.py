@@ -29,14 +29,9 @@ from nlctl.params import as_numbers
 from .property import Antiderivative, GainFunction, Lobe, antiderivative, lobe_around, root
 
 
-@described_record
+@described_record(made_by="aftermath")
 class Aftermath:
-    """Bounds of a burst through one lobe of the wrong sign, and of where zeta rests after it.
-
-    Examples
-    --------
-    See `aftermath`.
-    """
+    """Bounds of a burst through one lobe of the wrong sign, and of where zeta rests after it."""
 
     wrong: Lobe  # Lobe that feeds r, and the one after it, which stops it.
     right: Lobe

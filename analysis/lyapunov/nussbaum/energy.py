@@ -29,14 +29,9 @@ from nlctl.names import unknown
 from .property import GainFunction, antiderivative, lobes
 
 
-@described_record
+@described_record(made_by="drift")
 class Drift:
-    """Energies that the Nussbaum term moves along a response.
-
-    Examples
-    --------
-    See `drift`.
-    """
+    """Energies that the Nussbaum term moves along a response."""
 
     time: np.ndarray  # (m,)
     zeta: np.ndarray

@@ -89,14 +89,9 @@ class Balance:
         return f"A' = {self.p:.4g} / |N| {'+' if self.q < 0 else '-'} {abs(self.q):.4g}"
 
 
-@described_record
+@described_record(made_by="slow_drift")
 class SlowDrift:
-    """Where zeta stands in its lobe at the end of a response, and where it drifts.
-
-    Examples
-    --------
-    See `slow_drift`.
-    """
+    """Where zeta stands in its lobe at the end of a response, and where it drifts."""
 
     time: float  # End of the response (s), and zeta there.
     zeta: float

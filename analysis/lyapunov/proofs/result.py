@@ -65,14 +65,9 @@ def per_second(power: int) -> str:
     return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
 
 
-@described_record
+@described_record(made_by="certify")
 class ProofResult:
-    """What every proof finds.
-
-    Examples
-    --------
-    See `certify`.
-    """
+    """What every proof finds."""
 
     holds: bool  # Whether it is proved; a statement that is not is not refuted by that.
     reason: str  # Why it holds, or what is missing.
@@ -101,15 +96,11 @@ class ProofResult:
         return f"{self.claim}: {self.reason}"
 
 
-@described_record
+@described_record(made_by="certify")
 class Certificate(ProofResult):
     """What `certify` proved: bounds of a loop for all time, from a set of starts.
 
     Each kind of proof adds its own constants and bounds; these are infinite if nothing is proved.
-
-    Examples
-    --------
-    See `certify`.
     """
 
     kind: str  # The kind of proof, as its file and the recheck call it.

@@ -31,7 +31,7 @@ from ..uncertainty.space import Space, arguments, checked_rows
 
 
 @as_annotated
-@described_record(eq=False)
+@described_record(eq=False, made_by="prepare")
 class Experiment:
     """A loop, what is uncertain in it, and what is asked of it.
 
@@ -42,10 +42,6 @@ class Experiment:
         quantities have the same name, or a tolerance or a number of steps is not positive.
     UnknownNameError
         If there is no such method.
-
-    Examples
-    --------
-    See `prepare`.
     """
 
     space: Space
@@ -99,14 +95,9 @@ class Experiment:
         return ["status", "time", "steps", *keys, "spec"]
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="prepare")
 class Prepared:
-    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes.
-
-    Examples
-    --------
-    See `prepare`.
-    """
+    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes."""
 
     # Its space has full names, and units and nominal values from the nominal diagram.
     experiment: Experiment

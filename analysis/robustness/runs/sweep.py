@@ -40,14 +40,9 @@ def _check_columns(names: Iterable[str], columns: list[str]) -> None:
             raise unknown("column", name, columns, "of the sweep")
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="sweep")
 class Sweep:
-    """Rows of a design that were run.
-
-    Examples
-    --------
-    See `sweep`.
-    """
+    """Rows of a design that were run."""
 
     design: Design | None = field(repr=False)  # None where a folder was read without it.
     folder: Path | None  # Where the rows are kept.

@@ -31,14 +31,9 @@ _BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
 _SAME = 0.01  # bursts are the same if their times differ by at most this part of the later one
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="confirm")
 class Confirmation:
-    """Whether a violation stays one in other integrations; printed, it is a sentence.
-
-    Examples
-    --------
-    See `confirm`.
-    """
+    """Whether a violation stays one in other integrations; printed, it is a sentence."""
 
     row: Mapping[str, Any]
     # One row per replay: engine, method, rtol, atol, status, time (s) reached and margin. The first

@@ -18,14 +18,9 @@ from ..uncertainty.space import Space, scaled
 from .evaluation import Evaluate, evaluated
 
 
-@described_record
+@described_record(made_by="degradation_curve")
 class Degradation:
-    """Statements about the probability of a violation at several sizes of the uncertainty.
-
-    Examples
-    --------
-    See `degradation_curve`.
-    """
+    """Statements about the probability of a violation at several sizes of the uncertainty."""
 
     factors: tuple[float, ...]  # All deviations from the nominal values are multiplied by these.
     statements: tuple[Violation, ...]  # One for each factor, with its interval and assumptions.

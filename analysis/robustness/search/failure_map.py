@@ -27,14 +27,9 @@ _WORK = 40  # what a point of the first grid takes next to its row, in numbers
 NEW = 5  # points that the refinement of a cell adds at most
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="failure_map")
 class FailureMap:
-    """Margins over the plane of two quantities.
-
-    Examples
-    --------
-    See `failure_map`.
-    """
+    """Margins over the plane of two quantities."""
 
     x: str  # Names of the quantities.
     y: str

@@ -25,15 +25,11 @@ _SMALLEST = 1e-3  # smaller sizes are not searched, as a part of the largest
 RAY = 12  # bisections along the ray to a witness
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="robustness_radius")
 class Radius:
     """The smallest size of the uncertainty at which a violation was found; prints a sentence.
 
     Sizes are factors by which the box is scaled about the nominal values.
-
-    Examples
-    --------
-    See `robustness_radius`.
     """
 
     # A violation exists in the box of this size: the radius is at most that. Infinite if none was

@@ -22,14 +22,9 @@ _Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
 
 
-@described_record
+@described_record(made_by="shrink")
 class Shrunk:
-    """A violation by few deviating quantities; printed, it is a sentence.
-
-    Examples
-    --------
-    See `shrink`.
-    """
+    """A violation by few deviating quantities; printed, it is a sentence."""
 
     row: Mapping[str, Any]  # Violates the spec; all but `names` are nominal.
     margin: float  # Of this row.

@@ -20,14 +20,9 @@ from .evaluation import Evaluate, margins_of, row_text
 from .first_order import FirstOrderOf
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="worst_case")
 class WorstCase:
-    """The rows that a search ran, and the worst of them; printed, it is a sentence.
-
-    Examples
-    --------
-    See `worst_case`.
-    """
+    """The rows that a search ran, and the worst of them; printed, it is a sentence."""
 
     # All rows in the order in which they ran. They were chosen by looking at earlier results, so
     # statements about probabilities refuse them.

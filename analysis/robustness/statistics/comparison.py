@@ -25,14 +25,9 @@ from .paired import Better, differences, mcnemar, wins
 _Columns = dict[str, np.ndarray]
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="compare")
 class Comparison:
-    """What a comparison found.
-
-    Examples
-    --------
-    See `compare`.
-    """
+    """What a comparison found."""
 
     choice: str  # What was compared, ``"controller"``.
     size: int  # Number of samples, each of which was run with every option.

@@ -38,14 +38,9 @@ class NoGuaranteeError(UsageError):
     """
 
 
-@described_record
+@described_record(made_by="violation_probability")
 class Violation:
-    """How likely a violation is; printed, it is a sentence with its assumptions.
-
-    Examples
-    --------
-    See `violation_probability`.
-    """
+    """How likely a violation is; printed, it is a sentence with its assumptions."""
 
     violations: int
     runs: int

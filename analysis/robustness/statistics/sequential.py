@@ -99,14 +99,9 @@ def _zero(
     return scale(root)
 
 
-@described_record
+@described_record(made_by="decide")
 class SequentialTest:
-    """Whether a probability lies below or above a threshold; printed, it is a sentence.
-
-    Examples
-    --------
-    See `decide`.
-    """
+    """Whether a probability lies below or above a threshold; printed, it is a sentence."""
 
     threshold: float
     decision: Literal["below", "above", "undecided"]

@@ -19,14 +19,9 @@ from .sequential import SequentialTest, log_evidence
 Answer = Literal["shown", "refuted", "not shown yet"]
 
 
-@described_record
+@described_record(made_by="bound_verdict")
 class Verdict:
-    """What runs say of a claim; printed, ``not shown yet (needs at least 132 more runs ...)``.
-
-    Examples
-    --------
-    See `bound_verdict`.
-    """
+    """What runs say of a claim; printed, ``not shown yet (needs at least 132 more runs ...)``."""
 
     # Shown and refuted with the confidence of the statement that the claim is about.
     answer: Answer

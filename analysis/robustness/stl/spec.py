@@ -94,15 +94,11 @@ _PIECES = 16  # of a window, where a requirement is taken apart
 
 
 @as_annotated
-@described_record
+@described_record(made_by="margin")
 class Requirement:
     """A named formula that has to hold at the start of a response.
 
     It is also a metric of `nlctl.ensemble_response`.
-
-    Examples
-    --------
-    See `margin`.
     """
 
     key: str  # Short name for tables and files.

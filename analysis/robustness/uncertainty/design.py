@@ -27,14 +27,9 @@ _Kind = Literal[
 ]  # fmt: skip
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="independent")
 class Design:
-    """Rows to run.
-
-    Examples
-    --------
-    See `independent`.
-    """
+    """Rows to run."""
 
     space: Space
     kind: _Kind  # How the rows were chosen.

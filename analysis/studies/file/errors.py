@@ -21,14 +21,9 @@ OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
 _LARGEST = 10**40  # integers beyond are not printed
 
 
-@described_record
+@described_record(made_by="StudyError")
 class Problem:
-    """One mistake.
-
-    Examples
-    --------
-    See `StudyError`.
-    """
+    """One mistake."""
 
     place: KeyPath  # Keys and list indices that lead to it.
     message: str

@@ -43,14 +43,9 @@ STAND_INS = {  # while the rest of a mistaken file is validated
 _SPOKEN_OF = ("spec", "space", "runs")  # tables whose entries other parts of a study name
 
 
-@described_record(eq=False)
+@described_record(eq=False, made_by="read_study")
 class StudyFile(Setup):
-    """A study without mistakes, with the settings of the command line.
-
-    Examples
-    --------
-    See `read_study`.
-    """
+    """A study without mistakes, with the settings of the command line."""
 
     path: Path
 
