@@ -54,10 +54,8 @@ def named_block(name: str) -> type:
 
 
 def block_summaries() -> dict[str, dict[str, str]]:
-    """Return the first line of each block record's docstring: ``{group: {name: line}}``.
-
-    The names are those of `block_records`, in the same order.
-    """
+    """Return the first line of each block record's docstring: ``{group: {name: line}}``."""
+    # The names are those of `block_records`, in the same order.
     return {group: _summaries(group, _is_record) for group in _GROUPS}
 
 

@@ -81,10 +81,8 @@ def facts_and_unseen(
 
 
 def _steady(system: ct.InputOutputSystem, content: Mapping[str, _T]) -> dict[str, _T]:
-    """Number the names that python-control gives, ``sys[7]``, by where they stand.
-
-    It counts the systems of a process.
-    """
+    """Number the names that python-control gives, ``sys[7]``, by where they stand."""
+    # It counts the systems of a process.
     every = " ".join(place.system.name for place in places(system))
     numbers = {name: f"sys {i}" for i, name in enumerate(dict.fromkeys(GIVEN.findall(every)))}
     return {GIVEN.sub(lambda m: numbers.get(m[0], m[0]), k): v for k, v in content.items()}

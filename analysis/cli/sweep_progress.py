@@ -24,11 +24,9 @@ PERIOD = 0.25  # s between updates: drawing a bar takes as long as a run
 def sweep_bar(
     what: str, console: Console | None = None, confidence: float = 0.99
 ) -> Iterator[Callable[[SweepProgress], None]]:
-    """Show a bar on stderr while the body runs; elsewhere a line now and then.
-
-    With the bar stand the rows, the rate, the remaining time, the violations so far and, for
-    independent draws, bounds of their probability that hold at any time.
-    """
+    """Show a bar on stderr while the body runs; elsewhere a line now and then."""
+    # With the bar stand the rows, the rate, the remaining time, the violations so far and, for
+    # independent draws, bounds of their probability that hold at any time.
     console = console or Console(stderr=True)
     if not console.is_terminal:
         now: list[SweepProgress] = []

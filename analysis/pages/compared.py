@@ -144,11 +144,9 @@ def _verdict(
 
 
 def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
-    """Return differences of numbers, those with the largest share first, and the others.
-
-    Those of claims are in their own table; a number that a table shows as well is named once, as
-    there.
-    """
+    """Return differences of numbers, those with the largest share first, and the others."""
+    # Those of claims are in their own table; a number that a table shows as well is named once, as
+    # there.
     numbers, words = [], []
     cells = [d for d in differences if d.where.startswith("section '")]
     in_tables = {_pair(cell) for cell in cells if not _LINE.search(cell.where)}

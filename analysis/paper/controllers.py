@@ -117,12 +117,10 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
 
 
 def baselines(example: str) -> dict[str, Any]:
-    """Return a PID and a boundary-layer sliding-mode controller for an example.
-
-    Tuned by ``campaign/baselines.py``: the least IAE over 20 s of the nominal loop with measurement
-    noise, for the paper's max |u| in the same noise.  They know the sign of the input gain and have
-    gains made for this plant; the paper's controller has neither.
-    """
+    """Return a PID and a boundary-layer sliding-mode controller for an example."""
+    # Tuned by ``campaign/baselines.py``: the least IAE over 20 s of the nominal loop with
+    # measurement noise, for the paper's max |u| in the same noise. They know the sign of the input
+    # gain and have gains made for this plant; the paper's controller has neither.
     surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
         "PID": PID(**gains.pid, u_max=100.0),

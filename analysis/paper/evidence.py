@@ -117,11 +117,10 @@ class FarRuns:
 
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[FarRuns]]:
-    """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs.
-
-    Example 2 is run as far as its burst is predicted from, and continues the record of
-    `nlctl.analysis.paper.reference_run`; with `whole` it is run to its burst, which takes minutes.
-    """
+    """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs."""
+    # Example 2 is run as far as its burst is predicted from, and continues the record of
+    # `nlctl.analysis.paper.reference_run`; with `whole` it is run to its burst, which takes
+    # minutes.
     stop = Event()
     with ThreadPoolExecutor(1) as pool:
         try:

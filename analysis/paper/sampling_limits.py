@@ -114,10 +114,8 @@ def meets_the_spec(table: pd.DataFrame) -> np.ndarray:
 
 
 def where_it_ends(table: pd.DataFrame) -> tuple[float, float]:
-    """Return up to which value all runs meet the spec, and the next one, which does not.
-
-    NaN where there is none: the first value violates, or all are good.
-    """
+    """Return up to which value all runs meet the spec, and the next one, which does not."""
+    # NaN where there is none: the first value violates, or all are good.
     ordered = table.sort_values("value")
     bad, values = np.flatnonzero(~meets_the_spec(ordered)), ordered["value"].to_numpy()
     if not bad.size:

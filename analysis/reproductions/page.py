@@ -147,10 +147,8 @@ def compose_paper(
     watch: ProgressWatch = unwatched,
     **unused: object,
 ) -> Composed:
-    """Run a paper's examples, and compose its page; nothing is written.
-
-    Threads and a second process are of no use to runs of seconds.
-    """
+    """Run a paper's examples, and compose its page; nothing is written."""
+    # Threads and a second process are of no use to runs of seconds.
     if whole:
         raise UsageError(f"{paper.key} has no runs beyond its examples: leave --far out")
     with watch("simulating", paper.cases) as advance:

@@ -334,10 +334,8 @@ def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
-    """Return what replaces an analysis that its `runs` or the loop do not admit.
-
-    What the study claims of it is neither shown nor refuted.
-    """
+    """Return what replaces an analysis that its `runs` or the loop do not admit."""
+    # What the study claims of it is neither shown nor refuted.
     finding = finding_of(
         asked,
         f"Not answered: {error}.",

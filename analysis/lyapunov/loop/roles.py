@@ -85,10 +85,8 @@ def declared(place: Place, kind: str) -> list[str]:
 
 
 def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
-    """Find the blocks of a closed loop and check every wire between them.
-
-    `content` is a key of its functions: which ones were read before is remembered.
-    """
+    """Find the blocks of a closed loop and check every wire between them."""
+    # `content` is a key of its functions: which ones were read before is remembered.
     diagram = isinstance(loop, ct.InterconnectedSystem)
     if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
         raise DiagramError("the proof needs a closed loop, a diagram with the output r")

@@ -97,13 +97,10 @@ def signals_of(response: Any) -> Signals:
 
 
 def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
-    r"""Return max \|y\| of a signal whose derivative is known at the samples.
-
-    Between two samples it is the cubic with their values and derivatives, which needs no sign that
-    the signal is smooth: r of (14) bends where the actuator does, and never jumps.
-
-    Shapes: `t, y, rate` (m,).
-    """
+    r"""Return max \|y\| of a signal whose derivative is known at the samples."""
+    # Between two samples it is the cubic with their values and derivatives, which needs no sign
+    # that the signal is smooth: r of (14) bends where the actuator does, and never jumps.
+    # Shapes: `t, y, rate` (m,).
     if not np.all(np.isfinite(y) & np.isfinite(rate)):
         return float(np.max(np.abs(y)))
     if t.size < 2:

@@ -27,17 +27,14 @@ PRIOR = 0.5  # both parameters of the Beta distribution that alternatives are mi
 
 
 def log_evidence(violations: Any, runs: Any, p: float) -> Any:
-    """Return log M of the evidence against a probability p of a violation.
-
-        M_n(p) = int q^k (1-q)^(n-k) dBeta(q) / (p^k (1-p)^(n-k))
-               = B(k + 1/2, n - k + 1/2) / B(1/2, 1/2) / (p^k (1-p)^(n-k))
-
-    the likelihood of k violations in n runs, mixed over all probabilities by Beta(1/2, 1/2), over
-    that of p.  Under p it is a nonnegative martingale that starts from 1, so that it ever reaches
-    1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n are
-    a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe, Sekhon,
-    Ann. Statist. 49, 2021).
-    """
+    """Return log M of the evidence against a probability p of a violation."""
+    #     M_n(p) = int q^k (1-q)^(n-k) dBeta(q) / (p^k (1-p)^(n-k))
+    #            = B(k + 1/2, n - k + 1/2) / B(1/2, 1/2) / (p^k (1-p)^(n-k))
+    # the likelihood of k violations in n runs, mixed over all probabilities by Beta(1/2, 1/2), over
+    # that of p. Under p it is a nonnegative martingale that starts from 1, so that it ever reaches
+    # 1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n
+    # are a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe,
+    # Sekhon, Ann. Statist. 49, 2021).
     k, n = violations, runs
     mixed = special.betaln(k + PRIOR, n - k + PRIOR) - special.betaln(PRIOR, PRIOR)
     return mixed - special.xlogy(k, p) - special.xlog1py(n - k, -p)

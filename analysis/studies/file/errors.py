@@ -182,10 +182,8 @@ def _text(value: object) -> str:
 
 
 def _in_file(loc: KeyPath, data: Any, absent: bool) -> KeyPath:
-    """Drop the names of union members that pydantic puts between keys and behind them.
-
-    Only if `absent` may the last part be a key that is not there.
-    """
+    """Drop the names of union members that pydantic puts between keys and behind them."""
+    # Only if `absent` may the last part be a key that is not there.
     place: list[str | int] = []
     for i, part in enumerate(loc):
         try:

@@ -153,13 +153,10 @@ def _refused(study: Study, grant: Grant) -> list[Problem]:
 def _validated(
     data: dict[str, Any], model: type[Study], mistaken: Sequence[Problem] = ()
 ) -> tuple[Study | None, list[Problem], list[int]]:
-    """Return the study, its mistakes, and which entries of ``analysis`` it has.
-
-    `mistaken` are mistakes that are known already.
-
-    Where there are mistakes, it is the study without the mistaken parts, if that is one: so
-    mistakes of form and wrong names are found in one go.
-    """
+    """Return the study, its mistakes, and which entries of ``analysis`` it has."""
+    # `mistaken` are mistakes that are known already.
+    # Where there are mistakes, it is the study without the mistaken parts, if that is one: so
+    # mistakes of form and wrong names are found in one go.
     rest, problems = copy.deepcopy(data), list(mistaken)
     for problem in mistaken:
         _remove(rest, problem.place)

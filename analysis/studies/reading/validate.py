@@ -68,13 +68,10 @@ class _Notes:
 def checked_experiment(
     study: Study, folder: Path, named: Mapping[str, Collection[str]] | None = None
 ) -> tuple[Experiment | None, list[Problem]]:
-    """Return the experiment of a study, and all mistakes; None if there are any.
-
-    `named` are the names in the tables of the file, those of mistaken entries too, which the
-    study lacks: what speaks of them is not a mistake of its own.
-
-    Errors of another kind than `UsageError` come from the user's own functions and pass.
-    """
+    """Return the experiment of a study, and all mistakes; None if there are any."""
+    # `named` are the names in the tables of the file, those of mistaken entries too, which the
+    # study lacks: what speaks of them is not a mistake of its own.
+    # Errors of another kind than `UsageError` come from the user's own functions and pass.
     notes = _Notes()
     tables = {"spec": study.spec, "space": study.space} | dict(named or {})
     _check_tables(study, tables, notes)
