@@ -25,53 +25,27 @@ from nlctl.params import checked_times
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Paragraph:
-    """A paragraph of plain text, and what is to be typed below it, such as a command.
-
-    Examples
-    --------
-    See `Report`.
-    """
+    """A paragraph of plain text, and what is to be typed below it, such as a command."""
 
     text: str
     code: str = ""
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Equation:
-    """A formula in LaTeX, with the paper's number where it has one.
-
-    Examples
-    --------
-    >>> import json
-    >>> from nlctl.analysis.report import Equation, Report, Section, render_json
-    >>> law = Equation(latex=r"\\dot{x} = -\beta x", number="(1)")
-    >>> shown = Section(key="law", title="The law", items=[law])
-    >>> report = Report(title="A law", verdict="", claims=[], sections=[shown], command="")
-    >>> json.loads(render_json(report))["sections"]["law"]["items"][0]["number"]
-    '(1)'
-    """
+    """A formula in LaTeX, with the paper's number where it has one."""
 
     latex: str
     number: str = ""
 
 
 @as_annotated
-@described_record
+@described_record(made_by="Report")
 class Table:
-    """A table: column titles, rows of text or numbers, and a caption.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.report import Report, Section, Table, render_html
-    >>> table = Table(caption="Gains", columns=["gain", "value"], rows=[["beta", 2.5]])
-    >>> shown = Section(key="gains", title="Gains", items=[table])
-    >>> report = Report(title="Gains", verdict="", claims=[], sections=[shown], command="")
-    >>> "<caption" in render_html(report)
-    True
-    """
+    """A table: column titles, rows of text or numbers, and a caption."""
 
     caption: str  # What it shows, above it.
     columns: Sequence[str]  # Titles.
@@ -234,20 +208,9 @@ class Claim:
 
 
 @as_annotated
-@described_record
+@described_record(made_by="Report")
 class Headline:
-    """What a report without claims is headed with.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.report import Headline, Report, render_html
-    >>> headline = Headline(look="pass", text="3 of 3 checks hold.")
-    >>> report = Report(
-    ...     title="Arm", verdict="", claims=[], sections=[], command="", headline=headline
-    ... )
-    >>> "<strong>3 of 3 checks hold.</strong>" in render_html(report)
-    True
-    """
+    """What a report without claims is headed with."""
 
     look: str  # Its colour and its sign.
     text: str  # A sentence.
@@ -260,15 +223,25 @@ class Report:
 
     Examples
     --------
-    A page with one claim and its evidence:
+    A page with one claim and its evidence, and one that claims nothing and has a headline:
 
-    >>> from nlctl.analysis.report import Claim, Paragraph, Report, Section, render_html
-    >>> shown = Section(key="one", title="A sum", items=[Paragraph(text="Two and two are four.")])
+    >>> from nlctl.analysis.report import Claim, Equation, Headline, Paragraph, Report, Section
+    >>> from nlctl.analysis.report import Table, render_html
+    >>> words = Paragraph(text="Two and two are four.")
+    >>> law = Equation(latex="2 + 2 = 4", number="(1)")
+    >>> table = Table(caption="Sums", columns=["sum", "value"], rows=[["2 + 2", 4.0]])
+    >>> shown = Section(key="one", title="A sum", items=[words, law, table])
     >>> claim = Claim(text="2 + 2 = 4", measured="4", limit="4", holds=True, evidence="one")
     >>> report = Report(title="Sum", verdict="Known.", claims=[claim], sections=[shown], command="")
     >>> page = render_html(report)
-    >>> "Two and two are four." in page, "https://" in page
-    (True, False)
+    >>> [part in page for part in ("Two and two are four.", "(1)", "<caption", "https://")]
+    [True, True, True, False]
+    >>> headline = Headline(look="pass", text="3 of 3 checks hold.")
+    >>> other = Report(
+    ...     title="Sum", verdict="", claims=[], sections=[], command="", headline=headline
+    ... )
+    >>> "<strong>3 of 3 checks hold.</strong>" in render_html(other)
+    True
     """
 
     title: str  # The verdict is what was found, in a sentence or two, and comes first.

@@ -13,7 +13,7 @@ only within a piece.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -166,7 +166,7 @@ class Requirement:
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="margins")
 class Spec:
     """Requirements that all have to hold.
 
@@ -174,10 +174,6 @@ class Spec:
     ------
     ParameterError
         If there is none, or two have the same key.
-
-    Examples
-    --------
-    See `margins`.
     """
 
     requirements: tuple[Requirement, ...]
