@@ -2,6 +2,7 @@
 
 A comment behind a field, or above it, is its entry in the section Attributes; ``# (m,): times``
 begins with a shape.  Fields without one that have the type of the field before share its entry.
+A function that returns such a record, and has no section Returns, has the record's first sentence.
 """
 
 from __future__ import annotations
@@ -46,6 +47,18 @@ def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) 
     return cls
 
 
+def with_returned(function: Any) -> str | None:
+    """Return the docstring of a function, with the section Returns for a described record."""
+    text, name = function.__doc__, function.__annotations__.get("return")
+    made = vars(function.__globals__.get(name, object)).get("__doc__")
+    if not text or not isinstance(made, _Docstring) or "Returns\n    ---" in text:
+        return text
+    summary = made.text.partition("\n\n")[0]
+    return _with_section(
+        inspect.cleandoc(text), f"Returns\n-------\n{name}\n    {summary}", after_parameters=True
+    )
+
+
 class _Docstring:
     """A docstring that is completed when somebody reads it."""
 
@@ -54,15 +67,17 @@ class _Docstring:
 
     def __get__(self, instance: object, owner: type) -> str:
         if not self.whole:
-            self.whole = _completed(self.text, _entries(owner))
+            entries = _entries(owner)
+            section = f"Attributes\n----------\n{entries}" if entries else ""
+            self.whole = _with_section(self.text, section)
         return self.whole
 
 
-def _completed(text: str, entries: str) -> str:
-    """Return a docstring with a section Attributes in front of all others."""
-    section = f"Attributes\n----------\n{entries}" if entries else ""
-    next_one = _SECTION.search(text)
-    at = next_one.start() if next_one else len(text)
+def _with_section(text: str, section: str, *, after_parameters: bool = False) -> str:
+    """Return a docstring with one more section in front of the others, but for Parameters."""
+    starts = [found.start() for found in _SECTION.finditer(text)]
+    has_parameters = text[starts[0] :].startswith("Parameters") if starts else False
+    at = [*starts, len(text)][int(after_parameters and has_parameters)]
     parts = text[:at], section, text[at:]
     return "\n\n".join(part.strip() for part in parts if part)
 

@@ -124,11 +124,6 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     max_boxes : int, optional
         Limit for each end; where it is reached the range is wider, and still proved.
 
-    Returns
-    -------
-    Range
-        A proved lower and upper bound, in the unit of the function.
-
     Raises
     ------
     ParameterError
@@ -189,11 +184,6 @@ def prove(
         The claim.
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
-
-    Returns
-    -------
-    Proof
-        Proved, refuted at a point, or undecided.
 
     Raises
     ------

@@ -127,11 +127,6 @@ def conservatism(
     **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
 
-    Returns
-    -------
-    Conservatism
-        The terms of C_0, the run next to it, and bounds by direct comparison.
-
     Raises
     ------
     DiagramError, DecompositionError, ParameterError, UnknownNameError

@@ -205,11 +205,6 @@ def constants(
     tol : float, optional
         Of every branch and bound.
 
-    Returns
-    -------
-    Constants
-        Every constant with the proof that it rests on.
-
     Raises
     ------
     DiagramError

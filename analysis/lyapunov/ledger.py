@@ -156,11 +156,6 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
     **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
 
-    Returns
-    -------
-    Ledger
-        One line for each assumption and inequality, with its margin.
-
     Raises
     ------
     DiagramError, DecompositionError, ParameterError, UnknownNameError

@@ -82,11 +82,6 @@ def premises(
     split : Decomposition, optional
         By default `sharpest` of the constants' split.
 
-    Returns
-    -------
-    Premises
-        The numbers that (29)-(36) are evaluated with.
-
     Examples
     --------
     See `literal`.

@@ -138,11 +138,6 @@ def tighten(
     max_steps : int, optional
         Steps of a run beyond which gains count as too stiff.
 
-    Returns
-    -------
-    Tightened
-        The best gains with their bound, and all trials.
-
     Raises
     ------
     ParameterError

@@ -288,11 +288,6 @@ def framed(report: Report) -> Framed:
     report : Report
         What is shown.
 
-    Returns
-    -------
-    Framed
-        Shown by a notebook as HTML.
-
     Examples
     --------
     >>> from nlctl.analysis.report import Report, framed

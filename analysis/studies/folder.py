@@ -183,11 +183,6 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     trust : bool, optional
         As in `read_study`.
 
-    Returns
-    -------
-    Result
-        Rows, and the analyses that are finished.
-
     Raises
     ------
     RunFolderError

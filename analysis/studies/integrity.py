@@ -56,11 +56,6 @@ def verify(folder: str | Path) -> Integrity:
     folder : str or Path
         Where `run` has kept its results.
 
-    Returns
-    -------
-    Integrity
-        With every difference, in words.
-
     Raises
     ------
     RunFolderError

@@ -49,11 +49,6 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
     threads : int, optional
         On which it would run; all cores by default.
 
-    Returns
-    -------
-    Plan
-        Numbers of runs, and the expected time (s) and disk (bytes).
-
     Raises
     ------
     UsageError

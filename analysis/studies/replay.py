@@ -85,11 +85,6 @@ def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False)
     trust : bool, optional
         As in `read_study`.
 
-    Returns
-    -------
-    Replay
-        What came out now next to the row of the folder, and what differs.
-
     Raises
     ------
     RunFolderError, StudyError

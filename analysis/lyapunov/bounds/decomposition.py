@@ -143,11 +143,6 @@ def decompose(
     The bounds hold for all t >= 0: time is a side of the boxes.  What a record declares itself is
     "proved" where branch and bound confirms it, and "given" otherwise, whatever the record says.
 
-    Returns
-    -------
-    Decomposition
-        The split with bounds of k and eps_u, and how they are known.
-
     Raises
     ------
     DecompositionError

@@ -114,11 +114,6 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     max_boxes : int, optional
         Limit for each constant.
 
-    Returns
-    -------
-    Sector
-        The constants, each as a proved range.
-
     Raises
     ------
     UnknownNameError

@@ -105,11 +105,6 @@ def design(
         Steps of the simulation beyond which gains are refused as too stiff.  Without a limit
         the bound could be made as small as one likes: tau and b to 0, gamma to infinity.
 
-    Returns
-    -------
-    GainDesign
-        The gains, their proved bound, and what the run with them shows.
-
     Raises
     ------
     ParameterError

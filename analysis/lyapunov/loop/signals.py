@@ -66,11 +66,6 @@ def signals_of(response: Any) -> Signals:
     response : control.TimeResponseData
         With several outputs.
 
-    Returns
-    -------
-    Signals
-        Times (s), and samples of shape (m,) by name.
-
     Raises
     ------
     ParameterError

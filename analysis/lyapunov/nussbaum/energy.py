@@ -71,11 +71,6 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     N : callable, optional
         The Nussbaum function of the law.
 
-    Returns
-    -------
-    Drift
-        zeta, r and the energies E_+ and E_- over time.
-
     Raises
     ------
     UnknownNameError, ParameterError
@@ -218,11 +213,6 @@ def safe_horizon(
         zeta(0).
     N : callable, optional
         Nussbaum function.
-
-    Returns
-    -------
-    SafeHorizon
-        The time (s), and the end of the lobe.
 
     Raises
     ------

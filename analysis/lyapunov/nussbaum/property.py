@@ -196,11 +196,6 @@ def nussbaum_property(
         again and again until it holds four lobes or N is no longer finite, 1152 at most.  A
         function that has fewer zeros up to there has neither property on it.
 
-    Returns
-    -------
-    NussbaumProperty
-        Means at the ends of the lobes, and whether those of both signs grow.
-
     Raises
     ------
     ParameterError

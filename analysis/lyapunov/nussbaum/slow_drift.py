@@ -242,11 +242,6 @@ def slow_drift(
     kG : float, optional
         Input gain for the peak of a burst.
 
-    Returns
-    -------
-    SlowDrift
-        Rates per window, and what they predict.
-
     Raises
     ------
     DiagramError

@@ -114,11 +114,6 @@ def prepare(experiment: Experiment) -> Prepared:
     experiment : Experiment
         A space, what builds the loop, times, inputs and a spec.
 
-    Returns
-    -------
-    Prepared
-        With every diagram as machine code.
-
     Raises
     ------
     UsageError

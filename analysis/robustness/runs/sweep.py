@@ -102,11 +102,6 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
     design : Design, optional
         Of the sweep, for what asks for it.
 
-    Returns
-    -------
-    Sweep
-        With the rows that are finished.
-
     Raises
     ------
     StoreError

@@ -81,11 +81,6 @@ def confirm(
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
         the diagram.
 
-    Returns
-    -------
-    Confirmation
-        Each replay with its margin, and why the violation is not confirmed, if it is not.
-
     Raises
     ------
     UnknownNameError, ParameterError

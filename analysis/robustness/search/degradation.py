@@ -84,11 +84,6 @@ def degradation_curve(
         may miss.  True makes all of them hold together with at least this confidence, by widening
         each to 1 - (1 - confidence) / (number of factors) (Bonferroni).
 
-    Returns
-    -------
-    Degradation
-        Rate and bounds of the probability at each factor.
-
     Raises
     ------
     ParameterError

@@ -80,11 +80,6 @@ def failure_map(
     most : int, optional
         Largest number of runs; the first grid always runs.
 
-    Returns
-    -------
-    FailureMap
-        Points with their margins, and the triangles between them.
-
     Raises
     ------
     UnknownNameError

@@ -136,11 +136,6 @@ def robustness_radius(
     entropy : int, optional
         Of searches and draws; drawn itself if left out.
 
-    Returns
-    -------
-    Radius
-        The factor of the smallest such box that was found, and each step of the search.
-
     Raises
     ------
     ParameterError

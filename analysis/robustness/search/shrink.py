@@ -74,11 +74,6 @@ def shrink(
     most : int, optional
         Largest number of runs that 2 may take.
 
-    Returns
-    -------
-    Shrunk
-        The row with the fewest deviations that was found to violate.
-
     Raises
     ------
     UnknownNameError

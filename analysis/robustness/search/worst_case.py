@@ -138,11 +138,6 @@ def worst_case(
     derivatives : callable, optional
         ``functools.partial(first_order, prepared)``: takes a row, returns its `FirstOrder`.
 
-    Returns
-    -------
-    WorstCase
-        The row, its margin, and every run of the search.
-
     Raises
     ------
     ParameterError

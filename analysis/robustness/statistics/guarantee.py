@@ -243,11 +243,6 @@ def violation_probability(
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
 
-    Returns
-    -------
-    Violation
-        Share, bounds, and the sentence with its assumptions.
-
     Raises
     ------
     NoGuaranteeError

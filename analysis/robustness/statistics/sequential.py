@@ -189,11 +189,6 @@ def decide(
     confidence : float, optional
         Between 0 and 1.
 
-    Returns
-    -------
-    SequentialTest
-        The decision, and after how many rows.
-
     Raises
     ------
     ParameterError

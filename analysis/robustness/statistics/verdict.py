@@ -47,11 +47,6 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
     limit : float
         Between 0 and 1.
 
-    Returns
-    -------
-    Verdict
-        Shown, refuted, or not shown yet.
-
     Raises
     ------
     ParameterError
@@ -89,11 +84,6 @@ def test_verdict(test: SequentialTest) -> Verdict:
     ----------
     test : SequentialTest
         As `decide` returns it.
-
-    Returns
-    -------
-    Verdict
-        Shown, refuted, or not shown yet.
 
     Examples
     --------

@@ -79,11 +79,6 @@ def read_study(
         Whether the file came with a folder of results: then code of that folder runs only if this
         user has run or trusted it.
 
-    Returns
-    -------
-    StudyFile
-        The study, its loop and its experiment.
-
     Raises
     ------
     StudyError
