@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import control as ct
@@ -11,7 +12,6 @@ import numpy as np
 
 from nlctl import native
 from nlctl.arguments import ATOL, RTOL
-from nlctl.attributes import described_record
 from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
@@ -36,9 +36,15 @@ _TIGHTER = 1e-2  # of the tolerances, for the comparison
 _SAME = 1e-4  # of a signal's range
 
 
-@described_record
+@dataclass(frozen=True, kw_only=True)
 class LoopCheck:
-    """One thing that was checked."""
+    """One thing that was checked.
+
+    Attributes
+    ----------
+    what, found : str
+    status : {"pass", "caution", "fail", "not applicable"}
+    """
 
     what: str
     found: str

@@ -27,9 +27,11 @@ CONTROL = {code: "\ufffd" for code in [*range(32), *range(127, 160)] if chr(code
 
 
 def fill(template: str, *, interactive: bool = False, live: bool = False, **content: object) -> str:
-    """Return a template filled in, with the page's style and script, and the policy for them."""
-    # An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one
-    # what runs its loops, and may make code of WebAssembly.
+    """Return a template filled in, with the page's style and script, and the policy for them.
+
+    An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one what
+    runs its loops, and may make code of WebAssembly.
+    """
     style, script = font_face() + _own("templates/report.css"), _own("templates/report.js")
     if interactive:
         style += _own(f"{UPLOT}/uPlot.min.css") + "\n" + _own("templates/history.css")
