@@ -68,34 +68,60 @@ class FoundNumber:
         return self.error <= self.statement.tolerance
 
 
-@described_record(eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class PaperFigure:
-    """A figure of the page: its anchor, its caption, and how it is drawn from the runs."""
+    """A figure of the page: its anchor, its caption, and how it is drawn from the runs.
 
-    key: str  # Its anchor.
-    caption: str  # What it shows.
+    Attributes
+    ----------
+    description : str or callable
+        For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The
+        caption where it is empty.
+    folded : bool
+        Whether it stands behind a heading that is opened.
+    """
+
+    key: str
+    caption: str
     draw: Callable[[PaperRuns], MatplotlibFigure]
-    # For those who cannot see it; ``description(runs) -> str`` for one with numbers. The caption
-    # where it is empty.
     description: str | Callable[[PaperRuns], str] = ""
-    folded: bool = False  # Whether it stands behind a heading that is opened.
+    folded: bool = False
 
 
-@described_record(eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Part:
-    """One example of a paper on its page."""
+    """One example of a paper on its page.
 
-    key: str  # Its anchor and its heading.
+    Attributes
+    ----------
+    key, title : str
+        Its anchor and its heading.
+    make : callable
+        Returns the diagram.
+    blocks : tuple of str
+        Blocks whose equations stand on the page.
+    number : str
+        In front of each equation; empty for none.
+    picture : str
+        Caption of the diagram.
+    figures : tuple of PaperFigure
+    more : str
+        Heading of the figures that are folded.
+    parameters : tuple of (str, str, str, str)
+        Name, as printed, as used, remark; the third is filled in from the blocks by name.
+    items : callable, optional
+        ``items(runs)``, what else stands behind its figures.
+    """
+
+    key: str
     title: str
-    make: Callable[[], Any]  # Returns the diagram.
-    blocks: tuple[str, ...]  # Blocks whose equations stand on the page.
-    number: str = ""  # In front of each equation; empty for none.
-    picture: str = "The loop as simulated."  # Caption of the diagram.
+    make: Callable[[], Any]
+    blocks: tuple[str, ...]
+    number: str = ""
+    picture: str = "The loop as simulated."
     figures: tuple[PaperFigure, ...] = ()
-    more: str = "More figures"  # Heading of the figures that are folded.
-    # Name, as printed, as used, remark; the third is filled in from the blocks by name.
+    more: str = "More figures"
     parameters: tuple[tuple[str, str, str, str], ...] = ()
-    # ``items(runs)``, what else stands behind its figures.
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
 
 
