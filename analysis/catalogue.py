@@ -28,14 +28,10 @@ _GROUPS = (
 _OF_FUNCTIONS = (*_GROUPS, "sampling", "faults")
 
 
-def _modules() -> list[Any]:
-    return [importlib.import_module(f"nlctl.{group}") for group in _GROUPS]
-
-
 def block_records() -> dict[str, type]:
     """Return every block record of nlctl by name."""
     records = {}
-    for module in _modules():
+    for module in (importlib.import_module(f"nlctl.{group}") for group in _GROUPS):
         for name in module.__all__:
             thing = getattr(module, name)
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):

@@ -122,15 +122,11 @@ def _parts(system: System) -> list[Any]:
     if isinstance(system, ct.StateSpace):
         return [[system.A, system.B, system.C, system.D], timebase]
     if isinstance(system, ct.TransferFunction):
-        return [*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase]
+        arrays = system.num_array, system.den_array
+        return [*([np.asarray(p).tolist() for p in np.ravel(a)] for a in arrays), timebase]
     functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
     signals = [system.input_labels, system.output_labels, system.state_labels]
     return [type(system).__qualname__, functions, signals, timebase]
-
-
-def _numbers_of(polynomials: Any) -> list[Any]:
-    """Return the coefficients of an array of polynomials."""
-    return [np.asarray(p).tolist() for p in np.ravel(polynomials)]
 
 
 def _wiring(diagram: Any) -> str:

@@ -30,7 +30,11 @@ def sweep_bar(
     console = console or Console(stderr=True)
     if not console.is_terminal:
         now: list[SweepProgress] = []
-        with progress_lines(what, lambda: _line(now[-1], confidence) if now else "begun"):
+
+        def line() -> str:
+            return f"{rows_text(now[-1])}, {found_text(now[-1], confidence)}" if now else "begun"
+
+        with progress_lines(what, line):
             yield lambda progress: now.__setitem__(slice(None), [progress])
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))
@@ -58,10 +62,6 @@ def sweep_bar(
             )
 
         yield show
-
-
-def _line(progress: SweepProgress, confidence: float) -> str:
-    return f"{rows_text(progress)}, {found_text(progress, confidence)}"
 
 
 def rows_text(progress: SweepProgress) -> str:

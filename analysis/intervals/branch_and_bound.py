@@ -313,7 +313,7 @@ def _supremum(
         for cell in todo:
             boxes += 1
             bound, centre, gradient = _bounds(function, cell)
-            met = centre.upper() if _is_infinite(cell) else centre.lower()
+            met = centre.upper() if not np.all(np.isfinite(cell)) else centre.lower()
             best = max(best, float(met)) if met.is_finite() else best
             heapq.heappush(heap, (-upper(bound), next(order), cell, gradient))
         end, _, cell, gradient = heap[0]
@@ -345,10 +345,6 @@ def upper(ball: Any) -> float:
         return np.inf
     nearest = float(end)
     return nearest if arb(nearest) >= end else float(np.nextafter(nearest, np.inf))
-
-
-def _is_infinite(cell: Cell) -> bool:
-    return not np.all(np.isfinite(cell))
 
 
 def _centre(cell: Cell) -> tuple[float, ...]:

@@ -153,7 +153,7 @@ def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], li
     for one in differences:
         if one.where.startswith("claim '"):
             continue
-        if not _both_numbers(one):
+        if not (sort_key(one.first) and sort_key(one.second)):
             words.append(one)
         elif one.where.startswith("section '") or _pair(one) not in in_tables:
             numbers.append(one)
@@ -162,10 +162,6 @@ def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], li
 
 def _pair(one: Difference) -> tuple[str, str]:
     return sort_key(one.first), sort_key(one.second)
-
-
-def _both_numbers(one: Difference) -> bool:
-    return bool(sort_key(one.first) and sort_key(one.second))
 
 
 def _share(one: Difference) -> float:

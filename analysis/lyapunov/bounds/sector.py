@@ -137,14 +137,8 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     if not tol > 0:
         raise ParameterError(f"sector needs tol > 0, got {tol}")
     box = box.only(*coordinate_names(len(plant.states)), "v")
-    return quotient_range(lambda x, v: f(tuple(x), v), box, tol=tol, max_boxes=max_boxes)
-
-
-def quotient_range(
-    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
-) -> Sector:
-    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v."""
-    return range_of_quotient(quotient_function(function), box, tol=tol, max_boxes=max_boxes)
+    quotient = quotient_function(lambda x, v: f(tuple(x), v))
+    return range_of_quotient(quotient, box, tol=tol, max_boxes=max_boxes)
 
 
 def quotient_function(
@@ -166,7 +160,7 @@ def quotient_function(
 
 
 def range_of_quotient(gain: Readable, box: Box, *, tol: float, max_boxes: int) -> Sector:
-    """Prove the range of a quotient over a box whose last side is v, see `quotient_range`."""
+    """Prove the range of a quotient over a box whose last side is v."""
     (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):

@@ -213,7 +213,8 @@ def sweep(
     below True False
     """
     _check(prepared, design, executor, threads, resume and folder is None)
-    chunk = _chunk_size(design) if chunk is None else integer("a sweep", "chunk", chunk, 1)
+    fitting = min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
+    chunk = fitting if chunk is None else integer("a sweep", "chunk", chunk, 1)
     tally, frames, notes = Tally(design), [], []
     keep: Callable[[pd.DataFrame], object] = frames.append
     with ExitStack() as stack:
@@ -270,10 +271,6 @@ def _check(
             raise unknown("quantity", name, names, "in the design: take prepared.experiment.space")
     if names != given:
         raise ParameterError(f"the experiment's space has {names}, the design's has {given}")
-
-
-def _chunk_size(design: Design) -> int:
-    return min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
 
 
 def _continued(store: ChunkStore, tally: Tally) -> list[str]:

@@ -62,14 +62,10 @@ def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]
     return limits
 
 
-def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
-    """Return formulas whose margins have that of `formula` as the least, at the start."""
+def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula, ...]]:
+    """Yield formulas whose margins have that of `formula` as the least, at the start."""
     # Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
     # same window follow each other in a row of their own. What is not a conjunction is alone.
-    return tuple(_rows(formula, until, pieces))
-
-
-def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula, ...]]:
     match formula:
         case And():
             for part in formula.parts:
@@ -136,7 +132,7 @@ class Requirement:
         In a row are pieces of the window: which time decides changes less often in a piece, so
         that margins of parts have fewer kinks.
         """
-        rows = conjunction(self.formula, self.until, _PIECES)
+        rows = _rows(self.formula, self.until, _PIECES)
         return tuple(
             tuple(Requirement(key=f"{self.key}, {part}", formula=part, until=self.until)
                   for part in row)

@@ -111,7 +111,7 @@ def checked_experiment(
         for i, asked in _comparable(study, folder, notes):
             if (check := asked.definition.check) is not None:
                 notes.attempt(("analysis", i), check, asked, setup)
-    return checked, _unique(notes.problems)
+    return checked, list(dict.fromkeys(notes.problems))  # several diagrams have some in common
 
 
 def _check_tables(study: Study, tables: Mapping[str, Collection[str]], notes: _Notes) -> None:
@@ -158,11 +158,6 @@ class _Empty:
     """Stands for a loop that could not be built."""
 
     output_labels = ()
-
-
-def _unique(problems: Sequence[Problem]) -> list[Problem]:
-    """Leave out what several diagrams have in common."""
-    return list(dict.fromkeys(problems))
 
 
 def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputSystem]:
