@@ -50,10 +50,10 @@ def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) 
 def with_returned(function: Any) -> str | None:
     """Return the docstring of a function, with the section Returns for a described record."""
     text, name = function.__doc__, function.__annotations__.get("return")
-    made = vars(function.__globals__.get(name, object)).get("__doc__")
-    if not text or not isinstance(made, _Docstring) or "Returns\n    ---" in text:
+    docstring = vars(function.__globals__.get(name, object)).get("__doc__")
+    if not text or not isinstance(docstring, _Docstring) or "Returns\n    ---" in text:
         return text
-    summary = made.text.partition("\n\n")[0]
+    summary = docstring.text.partition("\n\n")[0]
     return _with_section(
         inspect.cleandoc(text), f"Returns\n-------\n{name}\n    {summary}", after_parameters=True
     )
@@ -75,7 +75,7 @@ class _Docstring:
 
 def _with_section(text: str, section: str, *, after_parameters: bool = False) -> str:
     """Return a docstring with one more section in front of the others, but for Parameters."""
-    starts = [found.start() for found in _SECTION.finditer(text)]
+    starts = [heading.start() for heading in _SECTION.finditer(text)]
     has_parameters = text[starts[0] :].startswith("Parameters") if starts else False
     at = [*starts, len(text)][int(after_parameters and has_parameters)]
     parts = text[:at], section, text[at:]
