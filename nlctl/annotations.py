@@ -25,7 +25,6 @@ from typing import Any, Literal, TypeVar, Union
 import numpy as np
 import numpy.typing as npt
 
-from .attributes import with_returned
 from .errors import DivergedError, ParameterError, UsageError
 from .host.checkout import SOURCES
 
@@ -53,6 +52,8 @@ def as_annotated(function: _F) -> _F:
         reported: Any = function
         reported.__init__ = reporting(reported.__init__, reported.__name__)
         return reported
+    from .attributes import with_returned
+
     called = reporting(function, function.__name__)
     called.__doc__ = with_returned(function)
     return called

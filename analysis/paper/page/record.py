@@ -8,7 +8,7 @@ from collections.abc import Callable
 from nlctl import paper
 
 from ...report.document import History, Paragraph
-from ...reproductions.paper import FoundNumber, Paper, PaperFigure, Part, Statement
+from ...reproductions.paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part, Statement
 from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expectations, run_all
 from .. import figures as histories
 from . import text as text
@@ -61,6 +61,10 @@ def _statement(expected: Expectation) -> Statement:
         tolerance=expected.tolerance,
         value=lambda runs: runs[expected.case].metrics.get(expected.metric, math.nan),
     )
+
+
+def _simulate(done: Callable[[float], object]) -> PaperRuns:
+    return run_all(CASES, done=lambda _: done(1))
 
 
 def _part(number: int) -> Part:
@@ -123,7 +127,7 @@ LV_2017 = Paper(
         *text.CONTROLLER_PART,
     ),
     parts=(_part(1), _part(2)),
-    simulate=lambda done: run_all(CASES, done=lambda _: done(1)),
+    simulate=_simulate,
     cases=len(CASES),
     statements=lambda: [_statement(expected) for expected in expectations()],
     reproduced="both examples over 20 s, with either actuator",
