@@ -117,6 +117,29 @@ class PaperFigure:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class MovedLoop:
+    """What the reader of a page that runs may move of an example.
+
+    Attributes
+    ----------
+    make : callable
+        Returns the diagram, with faults that may be switched on.
+    until, step : float
+        Of the run (s).
+    names : tuple of str
+        Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
+    requirements : tuple of (str, str)
+        What the page watches, as study files have it, and what it means.
+    """
+
+    make: Callable[[], Any]
+    until: float
+    step: float = 0.01
+    names: tuple[str, ...] = ()
+    requirements: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Part:
     """One example of a paper on its page.
 
@@ -139,6 +162,8 @@ class Part:
         Name, as printed, as used, remark; the third is filled in from the blocks by name.
     items : callable, optional
         ``items(runs)``, what else stands behind its figures.
+    moved : MovedLoop, optional
+        What a page that runs moves.
     """
 
     key: str
@@ -151,6 +176,7 @@ class Part:
     more: str = "More figures"
     parameters: tuple[tuple[str, str, str, str], ...] = ()
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
+    moved: MovedLoop | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
