@@ -49,17 +49,19 @@ def live_item(
     response: Any,
     names: Sequence[str],
     *,
-    signals: Sequence[str] = (),
+    signals: Sequence[str | Sequence[str]] = (),
     requirements: Sequence[Requirement] = (),
     histories: Histories | None = None,
     command: Sequence[str] = (),
     base: Mapping[str, Any] | None = None,
     called: str = "loop",
+    origin: str = "as reported",
 ) -> Live:
     """Return the part of a page that runs a loop.
 
     `names` are what may be moved, a sensible few by default; `command` repeats the run as it
-    stands, else the call of Python with the settings `base` does, of the loop as it is `called`.
+    stands, else the call of Python with the settings `base` does, of the loop as it is `called`;
+    `origin` says in a few words where the run of the page is from.
     """
     moved = handles(
         program.compiled, names, program.p, program.x0, program.u,
@@ -72,6 +74,7 @@ def live_item(
         "facts": program.facts,
         "handles": [_plain(handle) for handle in moved],
         "never": NEVER,
+        "origin": origin,
         "outputs": list(program.outputs),
         "rows": _rows(response, known, signals, limits),
         "limits": {name: [[*line] for line in lines] for name, lines in limits.items()},
@@ -88,7 +91,7 @@ def live_item(
     return Live(
         key="live",
         caption="This page runs the loop itself, by the integrators and equations that made it. "
-        "Grey: as reported.",
+        f"Grey: {origin}.",
         description=f"Sliders for {what}.",
         program=content,
     )
@@ -142,7 +145,7 @@ def _plain(handle: Handle) -> dict[str, Any]:
 def _rows(
     response: Any,
     known: Mapping[str, np.ndarray],
-    signals: Sequence[str],
+    signals: Sequence[str | Sequence[str]],
     watched: Collection[str],
 ) -> list[dict[str, Any]]:
     """Return the rows of the static figure, with the outputs that the page computes.

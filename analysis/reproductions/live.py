@@ -49,7 +49,10 @@ def _live(key: str, moved: MovedLoop) -> tuple[WebProgram, Live]:
     times = np.linspace(0.0, moved.until, round(moved.until / moved.step) + 1)
     response = input_output_response(loop, times)
     program = live_program(loop, response, {})
-    item = live_item(program, response, moved.names, requirements=_requirements(moved))
+    item = live_item(
+        program, response, moved.names, signals=moved.signals, requirements=_requirements(moved),
+        called=moved.call,
+    )  # fmt: skip
     return program, replace(item, key=key)
 
 

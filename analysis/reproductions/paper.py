@@ -124,18 +124,24 @@ class MovedLoop:
     ----------
     make : callable
         Returns the diagram, with faults that may be switched on.
+    call : str
+        The Python that makes it.
     until, step : float
         Of the run (s).
     names : tuple of str
         Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
+    signals : tuple of str or of lists of str
+        What is drawn, a row each; all outputs where it is empty.
     requirements : tuple of (str, str)
         What the page watches, as study files have it, and what it means.
     """
 
     make: Callable[[], Any]
+    call: str
     until: float
     step: float = 0.01
     names: tuple[str, ...] = ()
+    signals: tuple[str | list[str], ...] = ()
     requirements: tuple[tuple[str, str], ...] = ()
 
 

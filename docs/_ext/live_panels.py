@@ -79,7 +79,9 @@ def moved(loop, response, wanted, called):
     system = getattr(loop, "system", loop)  # of what was compiled
     given = own_parameters(system, response)
     program = live_program(system, response, given)
-    return live_item(program, response, wanted, base=given, called=called)
+    return live_item(
+        program, response, wanted, base=given, called=called, origin="as in the script"
+    )
 
 
 def write_files(app):

@@ -175,7 +175,7 @@ class LivePart {
     knobs.addEventListener("submit", (event) => event.preventDefault());
     this.knobs = content.handles.map((handle, k) => this.knob(handle, k, knobs));
     const tools = put("div", "tools", body);
-    this.reset = put("button", "", tools, "As reported");
+    this.reset = put("button", "", tools, content.origin[0].toUpperCase() + content.origin.slice(1));
     this.reset.addEventListener("click", () => {
       this.values = content.handles.map((handle) => handle.value);
       this.on = content.handles.map((handle) => Boolean(handle.is_on));
