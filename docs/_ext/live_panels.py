@@ -2,9 +2,11 @@
 
 What a script runs with ``nlctl.input_output_response`` is noted.  Behind its first picture stands the
 first of these loops that a page can run, by the functions of ``nlctl report --live``.  Sliders are a
-sensible few, or those that the script names in one line::
+sensible few.  Each in one line, a script may name others, and a run where it makes none itself
+(the panel then stands behind its first lines)::
 
     # sphinx_gallery_live = ["controller.law.beta=1:5", "plant.x1(0)"]
+    # sphinx_gallery_live_run = "nlctl.input_output_response(loop, np.linspace(0, 20, 2001))"
 
 Without the extra ``export`` there are no panels, and the build says so.
 """
@@ -51,11 +53,16 @@ def note_runs(gallery_conf, script):
 def panel_scraper(block, block_vars, gallery_conf):
     """Return the lines that show a page's panel, behind its first picture, and no others."""
     page = Path(block_vars["target_file"])
-    has_picture = len(block_vars["image_path_iterator"]) > 0
-    if page in reasons or not (noted and has_picture):
+    names, asked = block_vars["example_globals"], block_vars["file_conf"]
+    is_place = len(block_vars["image_path_iterator"]) or "live_run" in asked
+    if page in reasons or not (MADE and is_place):
         return ""
-    wanted = block_vars["file_conf"].get("live", [])
-    content, reasons[page] = panel(block_vars["example_globals"], wanted)
+    if "live_run" in asked:
+        noted.clear()
+        eval(asked["live_run"], names)  # which is noted
+    if not noted:
+        return ""
+    content, reasons[page] = panel(names, asked.get("live", []))
     path = page.parent / "live" / f"{page.stem}.html"
     path.parent.mkdir(exist_ok=True)
     path.write_text(content, encoding="utf-8")
@@ -106,7 +113,7 @@ def count(app, error):
     """Say how many pages have a panel, and why some have none."""
     if reasons:
         made = sum(not reason for reason in reasons.values())
-        logger.info("[live] %d pages with sliders, %d that say why not", made, len(reasons) - made)
+        logger.info("[live] pages: %d with sliders, %d that say why not", made, len(reasons) - made)
     for page, reason in reasons.items():
         if reason:
             logger.info("[live] %s: %s", page.stem, reason)
