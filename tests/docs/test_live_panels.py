@@ -16,6 +16,7 @@ CONF = f"""
 import sys
 sys.path[:0] = [{str(ROOT / "docs" / "_ext")!r}]
 extensions = ["sphinx_gallery.gen_gallery", "live_panels"]
+project = html_title = "nlctl"
 html_theme = "pydata_sphinx_theme"
 html_static_path = [{str(ROOT / "docs" / "_static")!r}]
 html_css_files, html_js_files = ["site.css"], ["site.js"]
