@@ -206,7 +206,7 @@ def _command(
     if words:
         return {"shell": shlex.join(words)}
     times = np.asarray(response.time)
-    ends = [repr(float(each)).removesuffix(".0") for each in (times[0], times[-1])]
+    ends = [repr(float(end)).removesuffix(".0") for end in (times[0], times[-1])]
     even = np.array_equal(times, np.linspace(times[0], times[-1], times.size))
     usual = state_array(program.compiled.system, None)
     names = state_names(program.compiled.system)

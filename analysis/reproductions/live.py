@@ -28,11 +28,11 @@ def check_moved(paper: Paper) -> None:
 def with_parts_live(paper: Paper, report: Report) -> Report:
     """Return a paper's report with examples that its page runs."""
     moved = {part.key: part.moved for part in paper.parts if part.moved}
-    made = {key: _live(f"{key}-live", loop) for key, loop in moved.items()}
-    programs = [program for program, _ in made.values()]
-    items = modules_together([item for _, item in made.values()], programs)
-    behind = dict(zip(made, items, strict=True))
-    numbers = {f"{key}-live": live_numbers(program) for key, (program, _) in made.items()}
+    runs = {key: _live(f"{key}-live", loop) for key, loop in moved.items()}
+    programs = [program for program, _ in runs.values()]
+    items = modules_together([item for _, item in runs.values()], programs)
+    behind = dict(zip(runs, items, strict=True))
+    numbers = {f"{key}-live": live_numbers(program) for key, (program, _) in runs.items()}
     return replace(
         report,
         sections=[
@@ -66,5 +66,5 @@ def _requirements(moved: MovedLoop) -> Sequence[Requirement]:
 def _behind_figures(section: Section, item: Live) -> Section:
     """Put what runs behind the last figure of a section."""
     items = [*section.items]
-    last = max(k for k, each in enumerate(items) if isinstance(each, Figure))
+    last = max(k for k, shown in enumerate(items) if isinstance(shown, Figure))
     return replace(section, items=[*items[: last + 1], item, *items[last + 1 :]])

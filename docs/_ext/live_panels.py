@@ -27,6 +27,7 @@ from nlctl.errors import DivergedError, UsageError
 logger = logging.getLogger(__name__)
 DARK = 'html[data-theme="dark"]'
 PANEL = '<figure class="live"'  # in the text of pages that have one
+MOST = 150_000  # characters that a page may be longer
 MADE = importlib.util.find_spec("ziglang") is not None
 
 run = nlctl.input_output_response
@@ -75,10 +76,22 @@ def panel(names, wanted):
     for loop, response in noted:
         called = next((name for name, value in names.items() if value is loop), "loop")
         try:
-            return live_figure(moved(loop, response, wanted, called)), ""
+            return checked(live_figure(moved(loop, response, wanted, called))), ""
         except (UsageError, DivergedError) as error:
-            refused.append(str(error))
+            refused.append(
+                str(error).replace(f"'{loop.name}' cannot run on a page: it", "the loop")
+            )
     return f'<p class="not-live">No sliders here: {escape(refused[0])}.</p>\n', refused[0]
+
+
+def checked(figure):
+    """Return a panel, unless it is too long."""
+    if len(figure) > MOST:
+        raise UsageError(
+            f"the samples of its inputs make this page {len(figure) / 1000:.0f} kB longer, "
+            f"{MOST / 1000:.0f} kB at most"
+        )
+    return figure
 
 
 def moved(loop, response, wanted, called):

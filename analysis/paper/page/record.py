@@ -110,14 +110,14 @@ def _part(number: int) -> Part:
 
 def _moved(number: int) -> MovedLoop:
     """Return an example whose actuator may lose nine tenths of its gain."""
-    (most, own), make = _MOVED[number], paper.EXAMPLES[f"example_{number}"]
+    (most, sliders), make = _MOVED[number], paper.EXAMPLES[f"example_{number}"]
     return MovedLoop(
         make=lambda: with_faults(make(), Fault("actuator.v", "gain", 0.1, at=NEVER)),
         call=f"nlctl.with_faults(nlctl.paper.example_{number}(), "
         'nlctl.Fault("actuator.v", "gain", 0.1, at=nlctl.faults.NEVER))',
         until=HORIZON,
         signals=(["yd", "y"], "e", "u", "zeta"),
-        names=("fault_actuator_v", "plant.x1(0)", "controller.law.beta", *own),
+        names=("fault_actuator_v", "plant.x1(0)", "controller.law.beta", *sliders),
         requirements=(
             (f"always from {TAIL:g} s on |e| <= {BOUND:g}", "the claim"),
             (f"always |u| <= {most:g}", "ours: the paper bounds no input"),
