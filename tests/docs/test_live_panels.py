@@ -151,6 +151,7 @@ def test_without_script_only_the_picture_is_seen(browser, site):
     assert page.locator(".sphx-glr-single-img").is_visible()
 
 
+@pytest.mark.weekly
 def test_without_zig_the_site_has_no_panels_and_says_so(tmp_path):
     folder, said = built(tmp_path, 'import sys\nsys.modules["ziglang"] = None\n')
     assert "[live] no panels: Zig is not installed" in said
