@@ -1,5 +1,6 @@
 """What tests have in common: hypothesis settings, one cache of machine code, marks, Ctrl-C."""
 
+import gc
 import os
 import signal
 import tempfile
@@ -25,6 +26,21 @@ def pytest_configure(config):
         folder = tempfile.TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         os.environ["NLCTL_CONFIG_DIR"] = folder.name
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Spare the garbage collector what imports leave: it is there until the end.
+
+    Looking through it again and again takes as long as the imports do, and later runs would.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
