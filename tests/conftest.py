@@ -6,10 +6,13 @@ import signal
 import tempfile
 
 import pytest
+from examples import many
 from hypothesis import settings
 
-# The same examples in every run, and no clocks.
-settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
+# The same examples in every run, and no clocks; more of them once a week.
+settings.register_profile(
+    "nlctl", deadline=None, derandomize=True, database=None, max_examples=many(50, part=3)
+)
 settings.load_profile("nlctl")
 
 NEEDY = ("weekly", "browser", "cluster", "docs", "export", "upstream")  # marks of what counts as ci
