@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from examples import many, some
+from examples import many, parted, some
 
 import nlctl
 from nlctl.native.jacobians import float_parameters
 
 TIMES = np.linspace(0, 10, 41)
-EXAMPLES = {
+EXAMPLES = {  # every second of them each day
     "example_1": (nlctl.paper.example_1, {}),
-    "example_2": (nlctl.paper.example_2, {}),
     "example_1, backlash": (nlctl.paper.example_1, {"actuator": nlctl.Backlash()}),
+    "example_2": (nlctl.paper.example_2, {}),
     "example_2, dead zone": (nlctl.paper.example_2, {"actuator": nlctl.DeadZone()}),
 }
 WIDTHS = (2e-3, 2e-4)  # of differences: a kink makes wide ones wrong, rounding narrow ones
@@ -48,7 +48,7 @@ def extrapolated(function, at, h):
     return (4 * value(h / 2) - value(h)) / 3
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", parted(EXAMPLES, part=2))
 def test_examples(name):
     """Every parameter of plant, actuator and controller, and where the run begins.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import nlctl_here
-from examples import some
+from examples import parted, some
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from resealed import reseal, write_chunk
@@ -133,7 +133,7 @@ def edit(path, old, new):
     path.write_bytes(content.replace(old, new))
 
 
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", parted(PAGES))
 def test_an_edited_page_is_named_and_made_again(copied, name):
     """By verify, compare and the gallery; the data are as they were, so that it can be remade."""
     PAGES[name](copied)

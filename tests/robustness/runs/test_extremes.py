@@ -11,11 +11,9 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from nlctl.analysis import metrics
-from nlctl.analysis.metrics import in_machine_code
+from nlctl.analysis.metrics import highest, in_machine_code, lowest
 from nlctl.analysis.metrics.curves import limits_at_breaks, path
 
-highest = in_machine_code(metrics.highest)
-lowest = in_machine_code(metrics.lowest)
 NONE = np.empty(0)
 
 waves = st.lists(
