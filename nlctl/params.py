@@ -18,6 +18,7 @@ import numpy as np
 from .annotations import as_numbers, reporting
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
+from .pickles import state_of, with_state
 
 _T = TypeVar("_T")
 _KEY = "nlctl"
@@ -194,6 +195,10 @@ def record(cls: type[_T]) -> type[_T]:
         init(self, *arguments, **given)
 
     described.__init__ = reporting(by_name, described.__name__)
+    if "__getstate__" not in cls.__dict__:
+        names = tuple(f.name for f in dataclasses.fields(described))
+        described.__getstate__ = functools.partialmethod(state_of, names)
+        described.__setstate__ = with_state
     return described
 
 
