@@ -96,7 +96,7 @@ def param(
     symbol : str, optional
         What formulas call it, where that is not its name: ``"mu"`` for centres.
     may_be_empty : bool, optional
-        Whether a vector may have no element.
+        Whether a vector may have no element, and a matrix no column.
 
     Returns
     -------
@@ -279,8 +279,11 @@ def check_params(spec: Any) -> None:
 def _normalised(who: str, name: str, value: object, rule: Param, kind: Any) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
     ndim = rule.ndim
-    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray) and not len(value):
-        return ()
+    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray):
+        if not len(value):
+            return ()
+        if np.shape(value)[1:] == (0,) and ndim == 2:  # rows without a column
+            return ((),) * len(value)
     if kind in (bool, "bool"):
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")

@@ -1,4 +1,4 @@
-"""A block's equations, called once: what they take, read, return, and whether inputs act at once."""
+"""Equations of a block, called once: what they take and return, and whether inputs act at once."""
 
 from __future__ import annotations
 
