@@ -373,6 +373,8 @@ def _check_has_equations(spec: Any) -> None:
     """Refuse what lacks signals or an equation; all that is missing is named."""
     if isinstance(spec, type):
         raise BlockError(f"{spec.__name__} is a class: make a record of it first")
+    if isinstance(spec, str):
+        raise BlockError(f"block needs a record and then its name, got the text {spec!r} first")
     needed = ["inputs", "outputs", "states", "feedthrough", "output"]
     needed += ["update"] if getattr(spec, "states", ()) else []
     if hasattr(spec, "guard") != hasattr(spec, "reset"):

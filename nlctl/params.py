@@ -192,7 +192,13 @@ def record(cls: type[_T]) -> type[_T]:
         for name in given:
             if name not in known:
                 raise unknown("parameter", name, known, f"of {cls.__name__}", UnknownKeywordError)
-        init(self, *arguments, **given)
+        if arguments:
+            example = f"{cls.__name__}({known[0]}=...)" if known else f"{cls.__name__}()"
+            raise UnknownKeywordError(
+                f"{cls.__name__} takes no positional argument, got {str(arguments[0])[:40]!r}: "
+                f"parameters go by name, {example}"
+            )
+        init(self, **given)
 
     described.__init__ = reporting(by_name, described.__name__)
     if "__getstate__" not in cls.__dict__:

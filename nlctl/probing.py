@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,6 @@ from .errors import BlockError, UsageError
 from .names import unknown
 from .wording import counted
 
-_TAKEN = ("t", "x", "u", "p")
 _Names = Sequence[str]
 
 
@@ -41,7 +40,7 @@ def probed(
 def _called(who: str, spec: Any, what: str, x: np.ndarray, u: np.ndarray, p: Any) -> Any:
     """Return what an equation returns; what it raises becomes a sentence."""
     function = getattr(spec, what)
-    _check_arguments(who, what, function)
+    check_arguments(who, what, function, ("t", "x", "u", "p"))
     try:
         return function(0.0, x, u, p)
     except UsageError:
@@ -57,16 +56,17 @@ def _called(who: str, spec: Any, what: str, x: np.ndarray, u: np.ndarray, p: Any
         ) from error
 
 
-def _check_arguments(who: str, what: str, function: Callable[..., Any]) -> None:
+def check_arguments(who: str, what: str, function: Any, taken: tuple[str, ...]) -> None:
     """Refuse what is not a function, and one that cannot be called as equations are."""
+    needed = f"{what}({', '.join(taken)})"
     if not callable(function):
-        raise BlockError(f"{who} needs a function {what}(t, x, u, p), got {function!r}")
+        raise BlockError(f"{who} needs a function {needed}, got {function!r}")
     try:
         signature = inspect.signature(function)
-        signature.bind(*_TAKEN)
+        signature.bind(*taken)
     except TypeError:
-        taken = f"{what}{signature}"
-        raise BlockError(f"{who} needs {what}(t, x, u, p), a static method, got {taken}") from None
+        static = ", a static method" if taken[-1] == "p" else ""
+        raise BlockError(f"{who} needs {needed}{static}, got {what}{signature}") from None
     except ValueError:  # a function in C that does not say what it takes
         return
 

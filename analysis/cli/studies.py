@@ -255,7 +255,9 @@ def check_run_path(run: Path) -> None:
     from nlctl.errors import UsageError
 
     if run.exists() and not run.is_dir():
-        raise UsageError(f"'{run}' is a file, and a run is a folder: name '{run.parent}'")
+        loop = f"a loop of it is {run.as_posix()}:NAME" if run.suffix == ".py" else ""
+        advice = loop or f"name '{run.parent}'"
+        raise UsageError(f"'{run}' is a file, and a run is a folder: {advice}")
 
 
 def run_folder(study: Path) -> Path:
