@@ -10,7 +10,7 @@ import typer
 
 from .loops import STEP
 from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line, say
+from .printing import error_line, in_words, say
 from .report import Input, Set, register_reports
 from .studies import FAILS, OPEN, register_studies
 from .tune import register_tuning
@@ -308,13 +308,6 @@ def _say_warnings() -> None:
     warnings.showwarning = shown
 
 
-def _in_words(error: Exception) -> str:
-    """Return what an error says; of the system's without its number."""
-    if isinstance(error, OSError) and error.strerror and error.filename:
-        return f"{error.strerror}: '{error.filename}'"
-    return str(error)
-
-
 def main() -> None:
     """Run the command line; what the user can put right ends in one sentence and exit code 2.
 
@@ -326,7 +319,7 @@ def main() -> None:
     try:
         app()
     except (UsageError, DivergedError, OSError) as error:
-        error_line(f"nlctl: {_in_words(error)}")
+        error_line(f"nlctl: {in_words(error)}")
         raise SystemExit(2) from None
     except KeyboardInterrupt:
         error_line("nlctl: interrupted")
