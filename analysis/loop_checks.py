@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
-_LATE = 0.05  # of the run: its end, of which samples are looked at
+_LATE = 0.05  # of the run: its end, whose samples are compared
 _TIGHTER = 1e-2  # of the tolerances, for the comparison
 _SAME = 1e-4  # of a signal's range
 
@@ -171,11 +171,11 @@ def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
         return LoopCheck(what=what, found="the loop has no rates", status="not applicable")
     delayed = supplied_blocks(loop, PAST)
     if delayed:
-        found = (
-            f"'{delayed[0].name}' delays its signals, and what is on the way is no state; "
+        finding = (
+            f"'{delayed[0].name}' delays its signals, and what is on the way is not a state; "
             "nlctl.frequency_response is exact with delays, and so are margins of it"
         )
-        return LoopCheck(what=what, found=found, status="not applicable")
+        return LoopCheck(what=what, found=finding, status="not applicable")
     t, x, u = float(response.time[-1]), response.x[:, -1], response.u[:, -1]
     share = _still_moves(loop, response, params)
     if not np.max(share) <= _REST:

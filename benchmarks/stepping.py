@@ -98,7 +98,7 @@ def together(system: Any, size: int) -> tuple[float, float]:
         for one, u in zip(alone, row, strict=True):
             one.step(u)
 
-    found = []
+    best = []
     for step in (many.step, each_alone):
         times = []
         for _ in range(ROUNDS):
@@ -107,8 +107,8 @@ def together(system: Any, size: int) -> tuple[float, float]:
             for row in inputs[1:]:
                 step(row)
             times.append((time.process_time() - start) / STEPS / size)
-        found.append(min(times))
-    return found[0], found[1]
+        best.append(min(times))
+    return best[0], best[1]
 
 
 def show_members(console: Console, systems: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from nlctl.errors import ParameterError, UsageError
 
-STEP = 0.01  # s, between samples of a run where none is given
+USUAL_STEP = 0.01  # s, between samples of a run where none is given
 _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
 
@@ -70,10 +70,10 @@ def sampled_times(until: float, step: float, loop: Any) -> Any:
     import numpy as np
 
     if loop.isdtime(strict=True):
-        own = 1.0 if loop.dt is True else float(loop.dt)
-        if step not in (STEP, own):
-            raise ParameterError(f"'{loop.name}' is sampled every {own:g} s: leave --step out")
-        step = own
+        period = 1.0 if loop.dt is True else float(loop.dt)
+        if step not in (USUAL_STEP, period):
+            raise ParameterError(f"'{loop.name}' is sampled every {period:g} s: leave --step out")
+        step = period
 
     if not (0 < step < until < float("inf")):
         raise ParameterError(f"simulate needs 0 < step < until, got step {step:g}, until {until:g}")

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .loops import STEP
+from .loops import USUAL_STEP
 from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line, in_words, say
+from .printing import error_line, error_text, say
 from .report import Input, Set, register_reports
 from .studies import FAILS, OPEN, register_studies
 from .tune import register_tuning
@@ -61,7 +61,7 @@ def simulate(
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
     ] = "auto",
     until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
-    step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = STEP,
+    step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = USUAL_STEP,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
@@ -319,7 +319,7 @@ def main() -> None:
     try:
         app()
     except (UsageError, DivergedError, OSError) as error:
-        error_line(f"nlctl: {in_words(error)}")
+        error_line(f"nlctl: {error_text(error)}")
         raise SystemExit(2) from None
     except KeyboardInterrupt:
         error_line("nlctl: interrupted")

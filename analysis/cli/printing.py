@@ -25,7 +25,7 @@ def error_line(text: object) -> None:
     print(printable(text), file=sys.stderr)
 
 
-def in_words(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Return what an error says; of the system's without its number."""
     if isinstance(error, OSError) and error.strerror and error.filename:
         return f"{error.strerror}: '{error.filename}'"

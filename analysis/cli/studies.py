@@ -22,7 +22,7 @@ from nlctl.wording import counted
 
 from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
-from .printing import error_line, in_json, in_words, say
+from .printing import error_line, error_text, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
@@ -329,7 +329,7 @@ def _fail(error: Exception, json: bool) -> None:
     message = (
         f"{TOO_LITTLE} ({error or type(error).__name__})"
         if is_short_of_memory(error)
-        else in_words(error)
+        else error_text(error)
     )
     if not json:
         error_line(f"nlctl: {message}")

@@ -97,7 +97,7 @@ class _AsItStands:
         return values
 
     def _numbers(self, values: Any) -> np.ndarray:
-        """Return what a function returns as a vector; what is no number is refused."""
+        """Return what a function returns as a vector; what is not a number is refused."""
         array = np.asarray(values).reshape(-1)
         if array.dtype.kind not in "biufc":
             raise BlockError(

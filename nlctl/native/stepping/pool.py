@@ -1,4 +1,4 @@
-"""Runs side by side in shared arrays, so that a step of all of them is a few operations on arrays.
+"""Runs in shared arrays, so that a step of all of them is a few operations on arrays.
 
 Each is a `HeldRun` with a window of its own, and makes the steps that it makes alone, by the same
 machine code.  What is written before a step and read after it lies in one array for all of them.

@@ -52,7 +52,7 @@ class VectorStepper:
     def __init__(self, compiled: Compiled, dt: float, size: int, **settings: Any) -> None:
         self.compiled, self.dt, self.size = compiled, dt, size
         self._members = [stepper(compiled, dt, ignore_errors=True, **settings) for _ in range(size)]
-        runs = [each.run for each in self._members]
+        runs = [one.run for one in self._members]
         self._pool = Pool(runs) if isinstance(runs[0], HeldRun) else None
         self._y = np.zeros((size, compiled.system.noutputs or 0))
         self.reset()
@@ -60,29 +60,29 @@ class VectorStepper:
     @property
     def time(self) -> np.ndarray:
         """Times that are reached (s), of shape (size,)."""
-        return np.array([each.time for each in self._members])
+        return np.array([one.time for one in self._members])
 
     @property
     def states(self) -> np.ndarray:
         """States at these times, of shape (size, nstates): before samples that are due there."""
-        return np.array([each.run.states for each in self._members])
+        return np.array([one.run.states for one in self._members])
 
     @property
     def success(self) -> np.ndarray:
         """Which runs have not ended early, of shape (size,)."""
-        return np.array([each.success for each in self._members])
+        return np.array([one.success for one in self._members])
 
     @property
     def messages(self) -> tuple[str | None, ...]:
         """Why runs have ended early, None of those that have not."""
-        return tuple(each.message for each in self._members)
+        return tuple(one.message for one in self._members)
 
     @property
     def events(self) -> pd.DataFrame:
         """What has happened in the last step: member, time (s), block, which, direction."""
         import pandas as pd
 
-        tables = [each.events for each in self._members]
+        tables = [one.events for one in self._members]
         for i, table in enumerate(tables):
             table.insert(0, "member", i)
         filled = [table for table in tables if len(table)] or tables[:1]
@@ -179,9 +179,9 @@ class VectorStepper:
         if self._pool is None:
             return np.zeros(0, dtype=int)
         numbers = [
-            i for i, each in enumerate(self._members)
-            if each.success and each.run.k
-            and each.run.k < each.run.window.first + HELD_STEPS and self._pool.adopt(i)
+            i for i, one in enumerate(self._members)
+            if one.success and one.run.k
+            and one.run.k < one.run.window.first + HELD_STEPS and self._pool.adopt(i)
         ]  # fmt: skip
         return np.array(numbers, dtype=int)
 
@@ -220,11 +220,11 @@ class VectorStepper:
         if given is not None and count == 1 and given.shape == (self.size,):
             given = given[:, None]
         if given is None or given.shape not in ((), (count,), (self.size, count)):
-            found = "no numbers" if given is None else f"shape {given.shape}"
+            shape = "no numbers" if given is None else f"shape {given.shape}"
             names = ", ".join(self.compiled.system.input_labels)
             raise ParameterError(
                 f"{who} needs inputs of shape ({self.size}, {count}), members by inputs ({names}), "
-                f"or one row for all, got {found}"
+                f"or one row for all, got {shape}"
             )
         return np.array(np.broadcast_to(given, (self.size, count)))
 
@@ -280,7 +280,7 @@ def vector_stepper(
 
     Notes
     -----
-    Each member is what a `Stepper` of it alone is, bit for bit, whatever becomes of the others.
+    Each member is what a `Stepper` of it alone is, bit for bit, however the others end.
     A member that has ended early has outputs of NaN until it is `reset`.  Where the diagram has
     neither delays, functions of t alone nor functions that are called in Python, members are kept
     in arrays that they share, and a step costs several times less than one of as many steppers;
