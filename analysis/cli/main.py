@@ -309,10 +309,8 @@ def _say_warnings() -> None:
 
 
 def main() -> None:
-    """Run the command line; what the user can put right ends in one sentence and exit code 2.
-
-    An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
-    """
+    """Run the command line; what the user can put right ends in one sentence and exit code 2."""
+    # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     from nlctl.errors import DivergedError, UsageError
 
     _say_warnings()
