@@ -61,7 +61,7 @@ GUIDES = (
         proof="sliding mode",
         states=0,
         parameters=3,
-        time=1.5,
+        time=1.4,
         code="nlctl.sliding_mode()",
         instead=("SlidingModeLaw",),
     ),
@@ -73,7 +73,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} r = 0 in finite time for r' = u + d without the boundary layer",
         states=1,
         parameters=4,
-        time=1.5,
+        time=1.6,
         code="nlctl.sliding_mode(law=nlctl.controllers.SuperTwistingLaw())",
     ),
     ControllerGuide(
@@ -84,7 +84,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that e stays in the funnel; at its boundary u is NaN",
         states=0,
         parameters=4,
-        time=6.4,
+        time=4.1,
         code="nlctl.controllers.FunnelControl()",
     ),
     ControllerGuide(
@@ -95,7 +95,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that e stays within its bound; at the bound u is NaN",
         states=0,
         parameters=4,
-        time=2.0,
+        time=1.9,
         code="nlctl.controllers.PrescribedPerformance()",
     ),
     ControllerGuide(
@@ -106,7 +106,7 @@ GUIDES = (
         proved="nothing for all time: the theorem fails as printed; the ledger checks its lines",
         states=29,
         parameters=9,
-        time=1.9,
+        time=2.1,
         code="nlctl.adaptive_neural(order=2)",
         instead=("LeakyNussbaumLaw", "DeadZoneNussbaumLaw", "MonotoneNussbaumLaw", "FixedGainLaw"),
     ),
@@ -119,7 +119,7 @@ GUIDES = (
         proof="known sign",
         states=28,
         parameters=11,
-        time=1.6,
+        time=1.8,
         code="nlctl.adaptive_neural(order=2, law=nlctl.controllers.KnownSignLaw())",
     ),
     ControllerGuide(
@@ -130,7 +130,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that all signals stay bounded from a compact set",
         states=28,
         parameters=7,
-        time=1.4,
+        time=1.5,
         code="nlctl.dynamic_surface_control()",
     ),
     ControllerGuide(
@@ -142,7 +142,7 @@ GUIDES = (
         proof="reference model",
         states=5,
         parameters=7,
-        time=1.4,
+        time=1.3,
         code="nlctl.mrac()",
         instead=(
             *("EModifiedWeights", "ProjectedWeights", "ConcurrentWeights", "HistoryStack"),
@@ -158,7 +158,7 @@ GUIDES = (
         proof="reference model",
         states=5,
         parameters=6,
-        time=1.4,
+        time=1.1,
         code="nlctl.mrac(law=nlctl.controllers.DirectLaw())",
     ),
     ControllerGuide(
@@ -183,7 +183,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} a bound of the error under an L1 condition that you check",
         states=6,
         parameters=10,
-        time=4.4,
+        time=4.1,
         code="nlctl.l1_adaptive()",
     ),
     ControllerGuide(

@@ -32,8 +32,8 @@ def simulated(
     from .loops import assignments, input_values, named_loop, sampled_times
     from .terminal import progress_bar
 
-    times = sampled_times(until, step)
     loop = named_loop(name)
+    times = sampled_times(until, step, loop)
     params, start = assignments(loop, settings)
     u = input_values(loop, inputs)[:, None] + 0 * times
     with progress_bar(f"simulating {name}", until) as advance:

@@ -93,7 +93,7 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
     for name, y in signals.items():
         late = over(times, y, half, times[-1])
         numbers = (peak(times, y), peak(*late), rms(*late), final(times, y))
-        table.add_row(name, *(f"{v:.6g}" for v in numbers))
+        table.add_row(name, *(f"{v + 0.0:.6g}" for v in numbers))  # no -0
     Console().print(table)
 
 

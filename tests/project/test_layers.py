@@ -12,7 +12,7 @@ from places import ROOT
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
     ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
-    + ["nlctl.equations", "nlctl.annotations"],
+    + ["nlctl.equations", "nlctl.annotations", "nlctl.probing", "nlctl.pickles"],
     [
         "nlctl.supplied",
         "nlctl.blocks",

@@ -158,6 +158,10 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
         if one["type"] == "extra_forbidden":
             names = _keys_at(model, one["loc"][:-1])
             message = str(unknown("key", str(one["loc"][-1]), names))
+            if len(one["loc"]) == 3 and one["loc"][0] == "space" and "." not in str(one["loc"][1]):
+                message += f'; a name with a dot needs quotes: "{".".join(one["loc"][1:])}"'
+        elif one["type"] == "tuple_type":
+            message = "needs a list of values"
         elif one["type"] == "missing":
             message = "is missing"
         elif one["type"] == "union_tag_not_found":
