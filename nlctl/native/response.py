@@ -9,6 +9,7 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
+from ..accumulation import limit_of
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
@@ -83,7 +84,7 @@ def failure(
     if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
         block = compiled.schedule.nodes[guards[made.culprit]].path
         if run.status is Status.ZENO:
-            return ZenoError.of(block, _falls(compiled, made), made.since)
+            return ZenoError.of(block, limit_of(_falls(compiled, made), made.since))
         if not np.isfinite(made.guard):
             why = f"block '{block}' has a guard that is NaN at t = {run.time:.6g} s"
             return DivergedError(why, run.time)
