@@ -37,8 +37,8 @@ _FINITE = 0.9  # of two periods: those that fall as 1 / n do not fall so much fo
 
 PACE = 8  # numbers that are kept of a guard's jumps
 _LAST, _APART, _BEGUN, _HALF, _AT, _TOOK, _HALVED, _JUMPS = range(PACE)
-_SHORTER, _AT_ONCE = 0.9, 1e-4  # of the time of the halving before: that of 1 / n is as long
-_FEW, _NEAR = 4, 1e-9  # halvings, of a sequence whose rest is this part of its time so far
+_SHORTER, _AT_ONCE = 0.9, 1e-3  # of the time of the halving before: that of 1 / n is as long
+_FEW, _NEAR = 6, 1e-9  # halvings, of a sequence whose rest is this part of its time so far
 _LONG, _COUNT = 13, 1000  # halvings and jumps after which none is waited for
 
 StateValue = Callable[[float, np.ndarray], float]

@@ -8,8 +8,8 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from ..annotations import as_annotated
 from ..accumulation import limit_of
+from ..annotations import as_annotated
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of

@@ -1,8 +1,8 @@
 """Guards: where one has fallen through 0, its block jumps to what its reset says.
 
 All guards that have fallen at an instant jump together, from the values before; what falls by that
-jumps next, and so on until none falls.  A run in which that has no end, or jumps accumulate, or follow
-each other without progress of time, ends as ZENO.
+jumps next, and so on until none falls.  A run in which that has no end ends as ZENO, and one whose
+jumps accumulate, or follow each other without progress of time.
 """
 
 from __future__ import annotations
