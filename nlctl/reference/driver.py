@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
+import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -98,6 +99,8 @@ class Driver:
         with ExitStack() as stack:
             stack.enter_context(supplying(self.known.lines))
             stack.enter_context(happening())
+            stack.enter_context(warnings.catch_warnings())
+            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)  # a step says so as well
             while True:
                 self.known.reach(t, is_break)
                 stop = (
@@ -141,9 +144,9 @@ class Driver:
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
-            message = solver.step()
-            if solver.status == "failed":
-                raise RuntimeError(f"solve_ivp failed: {message}")
+            if (message := solver.step()) is not None:
+                solver = self._begun_again(solver, stop, bounded, message)
+                continue
             state = self._solution(solver)
             allowed = self._allowed(solver, state, bound, stop)
             if allowed:
@@ -170,6 +173,14 @@ class Driver:
                 own = self.jumps.switching
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
+
+    def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str) -> Any:
+        """Return an integrator that forgets what LSODA has foreseen, where that fails it once."""
+        t = float(solver.t)
+        if t == self._failed or solver.status != "failed":
+            raise RuntimeError(f"solve_ivp failed: {message}")
+        self._failed = t
+        return self.method(self._rates, t, self._held, stop, **bounded)
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
@@ -328,7 +339,7 @@ class Driver:
         if self.progress is not None:
             self.progress(self.reached)
 
-    _repeated, _longest, _ended = 0, 0.0, False
+    _repeated, _longest, _ended, _failed = 0, 0.0, False, np.nan
     _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:

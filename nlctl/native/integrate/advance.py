@@ -105,7 +105,7 @@ def _accept(task, lanes, w, found, done, passed):
             _sample(lane, j, task, t_new, w)
         _counted(task, lane, w, event, j)
         lane.begun, lane.t = lane.t, t_new
-        if task.timed.opaque:
+        if task.timed.opaque > 0.0:
             lane.rests = _rests(task, w, j)
         if lane.across:
             lane.left_zero = _from_zero(task, w, False, j)
