@@ -93,6 +93,7 @@ class Driver:
     def run(self, begin: float, end: float, x: np.ndarray) -> None:
         """Go from the first time to the last; `rows` grow on the way."""
         self.reached, self._span = begin, end - begin
+        self.jumps.span = self._span
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
         t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
@@ -274,7 +275,8 @@ class Driver:
     def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
         x = state(event.time)
-        self._switches.note(event.number, event.time)
+        if event.number >= self.jumps.kinds[0]:  # jumps of guards have a test of their own
+            self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
         came, sides, own = self._came, self._signs(after), self.jumps.switching

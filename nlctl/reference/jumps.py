@@ -82,6 +82,7 @@ class Jumps:
         self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
         self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
         self.kinds: tuple[int, int] = (0, 0)
+        self.span = 0.0  # of the run
         self.switching = slice(0, 0)  # rows that blocks declare, of what `look` returns
         self.labels: list[tuple[str, str]] | None = None
         self._own = any(self._blocks.values())
@@ -244,7 +245,8 @@ class Jumps:
     def _check_progress(self, i: int, t: float) -> None:
         """End a run whose jumps accumulate, or are without progress of time."""
         times = self._taken[i]
-        if len(times) > _MOST and t - times[-_MOST - 1] <= _STILL * max(abs(t), 1e-300):
+        still = _STILL * max(abs(t), self.span)
+        if len(times) > _MOST and t - times[-_MOST - 1] <= still:
             raise self._zeno(i, t)
         if jumps_end(self._paces.setdefault(i, np.zeros(PACE)), t):
             raise self._zeno(i, t)

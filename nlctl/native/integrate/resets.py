@@ -22,6 +22,7 @@ from .state import DIVERGED, INNER, RUNNING, ZENO
 
 _MOST = 100  # jumps at one instant, or without progress of time
 _STILL = 1e-11  # of a time: less is no progress
+_HOVERS = 1e-13  # of a run: a ball that lies on the ground hops as far as rounding lets it
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
 _jumps_end = numba.njit(**INNER)(jumps_end)
 
@@ -131,7 +132,7 @@ def _jump(task, lanes, w, fallen, chosen):
             for m in range(task.resets.states.size):
                 if task.resets.owned[i, m]:
                     w.x[task.resets.states[m], j] = w.s[m, j]
-        _counted(lane)
+        _counted(task, lane)
         lane.jacobian_at = np.nan
         if task.times[lane.segment] == lane.t:
             for i in range(w.x.shape[0]):
@@ -141,13 +142,14 @@ def _jump(task, lanes, w, fallen, chosen):
 
 
 @numba.njit(**INNER)
-def _counted(lane):
+def _counted(task, lane):
     """Count jumps without progress of time, or in the first step after another.
 
     Too many have no end.  That they do not end is so from the first of them on.
     """
     gone = lane.t - lane.fell_at
-    lane.crowd = lane.crowd + 1 if gone <= max(_STILL * abs(lane.t), 1.5 * lane.last) else 0
+    still = max(_STILL * abs(lane.t), _HOVERS * (task.times[-1] - task.times[0]))
+    lane.crowd = lane.crowd + 1 if gone <= max(still, 1.5 * lane.last) else 0
     lane.fell_at = lane.t
     lane.since = lane.since if lane.crowd else lane.t
     if lane.crowd > _MOST:
