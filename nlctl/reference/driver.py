@@ -10,6 +10,7 @@ from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
+from scipy.integrate import RK45
 
 from ..errors import DivergedError
 from ..sampling.system import happening
@@ -27,6 +28,7 @@ _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there
 _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
+_FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
 _ROUNDED = 1.0 + 1e-9
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
@@ -176,12 +178,16 @@ class Driver:
                 return until, x, sides, pieces, event
 
     def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str) -> Any:
-        """Return an integrator that forgets what LSODA has foreseen, where that fails it once."""
-        t = float(solver.t)
-        if t == self._failed or solver.status != "failed":
+        """Return an integrator that begins where one has failed, explicit where that fails too."""
+        t, failed = float(solver.t), self._failed
+        if isinstance(solver, RK45) or not np.all(np.isfinite(self._rates(t, self._held))):
             raise RuntimeError(f"solve_ivp failed: {message}")
         self._failed = t
-        return self.method(self._rates, t, self._held, stop, **bounded)
+        if t != failed:
+            return self.method(self._rates, t, self._held, stop, **bounded)
+        own = {name: bounded[name] for name in ("rtol", "atol", "max_step")}
+        first = min(_FIRST * self._span, own["max_step"], stop - t)
+        return RK45(self._rates, t, self._held, stop, first_step=first, **own)
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
