@@ -8,6 +8,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..accumulation import limit_of
 from ..annotations import as_annotated
 from ..diagrams import state_names
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
@@ -86,7 +87,7 @@ def failure(
     if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
         block = compiled.schedule.nodes[guards[made.culprit]].path
         if run.status is Status.ZENO:
-            return ZenoError.of(block, _falls(compiled, made), made.since)
+            return ZenoError.of(block, limit_of(_falls(compiled, made), made.since))
         if not np.isfinite(made.guard):
             why = f"block '{block}' has a guard that is NaN at t = {run.time:.6g} s"
             return DivergedError(why, run.time)

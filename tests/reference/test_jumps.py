@@ -405,3 +405,12 @@ def test_wrong_resets_and_guards_are_refused_by_name():
     clocked = made(**common, guard=lambda t, x, u, p: x, reset=lambda t, x, u, p: x).spec
     with pytest.raises(nlctl.errors.UsageError, match="block 'one' has a guard, which falls in"):
         nlctl.sampled(nlctl.block(clocked(), "one"), 0.1, method="euler")
+
+
+@pytest.mark.parametrize("how", [{"engine": "python-control"}, {"method": "tsit5"}])
+def test_a_ball_that_lies_on_the_ground_has_no_end_of_bounces(how):
+    """It hops as far as rounding lets it, and no time passes."""
+    ball = nlctl.block(Landed(), "ball")
+    with pytest.raises(nlctl.errors.ZenoError) as caught:
+        nlctl.input_output_response(ball, [0, 10], 0, [0.0, 0.0], **how)
+    assert abs(caught.value.time) < 1e-9
