@@ -76,7 +76,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["stepping", "operating_points", "frequency"],
     ],
     "nlctl.expressions": [
-        ["graph"],
+        ["graph", "source"],
         ["functions", "elimination"],
         ["arrays", "operators", "masked", "indexing"],
         [
@@ -88,6 +88,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
             "quotients",
         ],
         ["library"],
+        ["rewritten"],
         ["staged", "stage"],
         ["derivatives", "trace"],
         ["jacobian_source"],

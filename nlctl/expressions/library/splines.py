@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
+from .surfaces import surface
 from .table import enter
 from .tables import MOST_PIECES, interval_choice, polynomial
 
@@ -31,6 +32,7 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.BSpline, b_spline),
         (interpolate.interp1d, table_of_one),
         (interpolate.UnivariateSpline, fitted_spline),
+        (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
         (np.polynomial.Polynomial, _mapped_polynomial),

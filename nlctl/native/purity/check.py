@@ -19,7 +19,7 @@ from typing import Any
 from . import known_calls, made
 from .captured import Captured, noted_function, noted_partial
 from .expressions import Frame
-from .source import Definition, Unreadable, definition, source_file
+from ...expressions.source import Definition, Unreadable, definition, source_file
 from .statements import CallWalker
 from .values import (
     FRESH,

@@ -15,7 +15,7 @@ import numpy as np
 
 from . import known_calls, made
 from .known_calls import MEMORY
-from .source import cells_of, source_file
+from ...expressions.source import cells_of, source_file
 from .values import (
     FRESH,
     OUTSIDE,
