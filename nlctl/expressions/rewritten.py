@@ -17,6 +17,7 @@ from typing import Any
 from .arrays import Tracer, traced
 from .graph import Expr, Graph, Untraceable
 from .library.python import is_of_arrays
+from .merged import Merger, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
 
@@ -27,13 +28,15 @@ _NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
 
 
-def rewritten(function: FunctionType) -> CodeType:
+def rewritten(function: FunctionType, merging: bool) -> CodeType:
     """Return the code of a function as it is traced: its own, if there is nothing to rewrite."""
+    # With `merging` both branches of a condition are followed at once where they only compute.
+    words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
     try:
         tree = definition(function)
     except Unreadable:
         return function.__code__
-    found = {type(node) for node in ast.walk(tree)}.intersection(_WORDS)
+    found = {type(node) for node in ast.walk(tree)}.intersection(words)
     if not found or not isinstance(tree, ast.FunctionDef):
         return function.__code__
     if "__class__" in function.__code__.co_freevars:  # only within a class it is what it is
@@ -41,6 +44,7 @@ def rewritten(function: FunctionType) -> CodeType:
             raise Untraceable("try in a method that calls super()")
         return function.__code__
     body = _Rewriter().visit(copy.deepcopy(tree))
+    body = Merger().visit(body) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
 
@@ -75,7 +79,7 @@ class _Rewriter(ast.NodeTransformer):
     def visit_Dict(self, node: ast.Dict) -> Any:
         self.generic_visit(node)
         numbers = [k for k in node.keys if isinstance(k, ast.Constant) and type(k.value) in _KEYS]
-        return _called("choices", [node]) if node.keys and len(numbers) == len(node.keys) else node
+        return _called("numbered", [node]) if node.keys and len(numbers) == len(node.keys) else node
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -133,8 +137,8 @@ def _is(name: str, node: ast.expr) -> bool:
 
 def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that a rewritten function has."""
-    return {
-        _NAME.format("choices"): Choices,
+    return names_of_choices(graph) | {
+        _NAME.format("numbered"): Choices,
         _NAME.format("attempt"): functools.partial(Attempt, graph),
         _NAME.format("moved"): functools.partial(moved, graph),
     }

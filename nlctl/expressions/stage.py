@@ -51,8 +51,8 @@ _LARGE = 65536  # elements of an array that stays as it is
 class Stage:
     """Everything that a traced function sees instead of the real thing."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, *, merging: bool = False) -> None:
+        self.graph, self.merging = graph, merging
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
@@ -72,7 +72,8 @@ class Stage:
             names["__name__"] = function.__module__  # of classes that are defined inside
             cells = tuple(CellType() for _ in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
-            code = rewritten(function) if not is_of_a_library(function) else function.__code__
+            own = not is_of_a_library(function)
+            code = rewritten(function, self.merging) if own else function.__code__
             names.update(names_for(self.graph))
             copy = FunctionType(code, names, function.__name__, defaults, cells)
             self._copies[id(function)] = (function, copy)  # before what may refer back to it

@@ -88,6 +88,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
             "quotients",
         ],
         ["library"],
+        ["merged"],
         ["rewritten"],
         ["staged", "stage"],
         ["derivatives", "trace"],

@@ -1,4 +1,4 @@
-"""Eigenvalues and pseudoinverses of small matrices, by formulas and rotations."""
+"""Eigenvalues and pseudoinverses of small matrices, by formulas."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ import numpy as np
 from ..arrays import traced
 from ..graph import Graph, Untraceable
 from .complex_numbers import ComplexPair
-from .table import Facade, of
+from .table import Facade, constant_value, of
 
 __all__: list[str] = []
-
-_SWEEPS = {1: 0, 2: 2, 3: 6}  # of rotations, by the number of columns
 
 
 def _matrix(graph: Graph, a: Any) -> Any:
@@ -28,6 +26,8 @@ def _matrix(graph: Graph, a: Any) -> Any:
 def eigvals(graph: Graph, a: Any) -> Any:
     """Return the eigenvalues of a matrix of two rows, in the order that LAPACK has them."""
     matrix, np_ = _matrix(graph, a), Facade(graph)
+    if isinstance(numbers := constant_value(matrix), np.ndarray):
+        return np.linalg.eigvals(numbers)
     if matrix.shape != (2, 2):
         raise Untraceable("eigenvalues of a matrix of more than two rows")
     (p, q), (r, s) = matrix
@@ -48,56 +48,43 @@ def eigvals(graph: Graph, a: Any) -> Any:
 
 @of(np.linalg.pinv)
 def pinv(graph: Graph, a: Any, rcond: float = 1e-15) -> Any:
-    """Return the pseudoinverse of a matrix of at most three rows or columns."""
-    # Its columns are rotated until they are orthogonal; their lengths are the singular values.
+    """Return the pseudoinverse of a matrix of at most two rows or columns."""
     matrix = _matrix(graph, a)
+    if isinstance(numbers := constant_value(matrix), np.ndarray):
+        return traced(graph, np.linalg.pinv(numbers, rcond))
     wide = matrix.shape[0] < matrix.shape[1]
-    columns = [list(c) for c in (matrix if wide else matrix.T)]
-    if len(columns) not in _SWEEPS:
-        raise Untraceable("a pseudoinverse of a matrix of more than three rows and columns")
+    columns = list(matrix if wide else matrix.T)
+    if len(columns) > 2:
+        raise Untraceable("a pseudoinverse of a matrix of more than two rows and columns")
     np_ = Facade(graph)
-    turned, turns = _orthogonal(np_, columns)
-    squares = [_product(c, c) for c in turned]
-    largest = squares[0]
-    for square in squares[1:]:
-        largest = np_.maximum(largest, square)
-    weights = [np_.where(v > rcond * rcond * largest, 1.0 / v, 0.0 * v) for v in squares]
-    rows = [[_product([w * v[i] for w, v in zip(weights, turns, strict=True)],
-                      [c[k] for c in turned]) for k in range(len(columns[0]))]
-            for i in range(len(columns))]  # fmt: skip
+    rows = _of_lines(np_, columns)
+    if len(columns) == 2:
+        rows = _of_two(np_, *columns, rows, rcond)
     result = traced(graph, rows)
     return result.T if wide else result
 
 
-def _orthogonal(np_: Facade, columns: list[list[Any]]) -> tuple[list[list[Any]], list[list[Any]]]:
-    """Return columns turned until they are orthogonal, and what the unit vectors turn to."""
-    n = len(columns)
-    turns = [[1.0 if i == k else 0.0 for i in range(n)] for k in range(n)]
-    for _ in range(_SWEEPS[n]):
-        for i in range(n):
-            for k in range(i + 1, n):
-                a, b = columns[i], columns[k]
-                c, s = _rotation(np_, _product(a, a), _product(a, b), _product(b, b))
-                for kept in (columns, turns):
-                    kept[i], kept[k] = (
-                        [c * x - s * y for x, y in zip(kept[i], kept[k], strict=True)],
-                        [s * x + c * y for x, y in zip(kept[i], kept[k], strict=True)],
-                    )
-    return columns, turns
+def _of_lines(np_: Facade, columns: Sequence[Any]) -> list[Any]:
+    """Return the pseudoinverse of columns that are parallel."""
+    square = sum(np_.sum(c * c) for c in columns)
+    weight = np_.where(square == 0.0, 0.0, 1.0 / np_.where(square == 0.0, 1.0, square))
+    return [c * weight for c in columns]
 
 
-def _rotation(np_: Facade, p: Any, q: Any, r: Any) -> tuple[Any, Any]:
-    """Return cosine and sine of the smaller rotation that makes [[p, q], [q, r]] diagonal."""
-    is_diagonal = q == 0.0
-    slope = (r - p) / (2.0 * np_.where(is_diagonal, 1.0, q))
-    tangent = np_.copysign(1.0, slope) / (np_.abs(slope) + np_.sqrt(1.0 + slope * slope))
-    tangent = np_.where(is_diagonal, 0.0, tangent)
-    cosine = 1.0 / np_.sqrt(1.0 + tangent * tangent)
-    return cosine, tangent * cosine
-
-
-def _product(a: Sequence[Any], b: Sequence[Any]) -> Any:
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
-        total = total + x * y
-    return total
+def _of_two(np_: Facade, a: Any, b: Any, parallel: Sequence[Any], rcond: float) -> list[Any]:
+    """Return the pseudoinverse of two columns, by an orthogonal one for each."""
+    size = np_.sqrt(np_.sum(a * a))
+    first = a / np_.where(size == 0.0, 1.0, size)
+    share = np_.sum(first * b)
+    apart = b - share * first
+    more = np_.sum(first * apart)  # what rounding has left
+    share, apart = share + more, apart - more * first
+    height = np_.sqrt(np_.sum(apart * apart))
+    # of the singular values: their product, and the sum of their squares
+    both, squares = size * height, size * size + share * share + height * height
+    half = 0.5 * squares
+    largest = half + np_.sqrt(np_.maximum(half * half - both * both, 0.0))
+    regular = both > rcond * largest
+    second = apart / np_.where(regular, height * height, 1.0)
+    lines = [(first - share * second) / np_.where(regular, size, 1.0), second]
+    return [np_.where(regular, one, other) for one, other in zip(lines, parallel, strict=True)]

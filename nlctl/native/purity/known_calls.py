@@ -30,6 +30,7 @@ from .values import (
     OneOf,
     Parent,
     Pure,
+    Row,
     Unknown,
     captured,
     element,
@@ -261,7 +262,7 @@ def _walkable(function: FunctionType) -> bool:
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
+    if isinstance(thing, Unknown | Local | Bound | Pure | Row | enum.Enum | BuiltinFunctionType):
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
@@ -300,7 +301,8 @@ def _builtin(
         )
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
-        return KnownValue(True, all(v.inside for v in given), True, known=_functions_in(given))
+        inside = all(v.inside for v in given)
+        return KnownValue(True, inside, True, known=_rows(thing, given))
     if name == "next":
         _written(given[0], "next()")
         return element(given[0])
@@ -334,6 +336,17 @@ def _functions_in(given: list[KnownValue]) -> Any:
         v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
     ]
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
+
+
+def _rows(thing: object, given: list[KnownValue]) -> Any:
+    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
+    kept = _functions_in(given)
+    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
+        return kept
+    parts = tuple(map(element, given))
+    parts = parts if thing is zip else (FRESH, parts[0])
+    every = all(v.own and v.inside for v in parts)
+    return ListOf((KnownValue(True, every, True, known=Row(parts)),))
 
 
 def _library(

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
-from ...expressions.source import Definition
 from .values import (
     FRESH,
     OUTSIDE,

@@ -58,6 +58,13 @@ class ListOf:
 
 
 @dataclass(frozen=True)
+class Row:
+    """What `zip` or `enumerate` makes of one of several objects or functions and others."""
+
+    parts: tuple[KnownValue, ...]
+
+
+@dataclass(frozen=True)
 class Bound:
     """A function some of whose arguments are given: a method, a `functools.partial`."""
 
@@ -130,6 +137,8 @@ def _marks(known: Any) -> Any:
     """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)
+    if isinstance(known, Row):
+        return "row", tuple(part.marks for part in known.parts)
     if isinstance(known, Local):
         return "local", id(known.node), id(known.frame)
     if isinstance(known, Bound):

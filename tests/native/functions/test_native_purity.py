@@ -15,8 +15,8 @@ import source_text
 
 import nlctl
 from nlctl.errors import CompileError, EngineWarning, UsageError
-from nlctl.native.purity.check import check_pure
 from nlctl.expressions.source import Unreadable, definition
+from nlctl.native.purity.check import check_pure
 from nlctl.native.purity.values import FRESH, VECTOR, Impure, captured
 
 GAIN, HISTORY, TABLE = 2.0, [], {"k": 1.0}
