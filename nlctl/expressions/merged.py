@@ -189,19 +189,17 @@ def logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
     """Return whether all or any of several hold, asked one after the other."""
     value = parts[0]()
     for part in parts[1:]:
-        condition = _open(graph, value)
-        if condition is None:
-            value = (value and part()) if kind == "and" else (value or part())
-            continue
-        both = choices(graph, value, *((lambda part=part: (_asked(graph, part()),), lambda: (False,))
-                                       if kind == "and" else
-                                       (lambda: (True,), lambda part=part: (_asked(graph, part()),))
-                                       ))  # fmt: skip
-        if both is None:
-            value = (value and part()) if kind == "and" else (value or part())
-        else:
-            value = both[0]
+        value = _with(graph, kind, value, part)
     return value
+
+
+def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
+    ask = lambda: (_asked(graph, part()),)  # noqa: E731
+    if kind == "and":
+        both = choices(graph, value, ask, lambda: (False,))
+        return both[0] if both else value and part()
+    either = choices(graph, value, lambda: (True,), ask)
+    return either[0] if either else value or part()
 
 
 def opposite(graph: Graph, value: Any) -> Any:

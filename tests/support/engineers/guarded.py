@@ -59,7 +59,7 @@ def schedule_dict(t, x, u, params):
 
 
 @engineered(3)
-def vectorized(t, x, u, params):
+def vectorized_by_a_decorator(t, x, u, params):
     @np.vectorize
     def dz(v):
         if v > 0.5:
@@ -150,18 +150,6 @@ def interpn_lookup(t, x, u, params):
 @engineered(2)
 def chebyshev_drag(t, x, u, params):
     return [x[1], -cheb(x[1]) - leg(x[0]) + u[0]]
-
-
-@engineered(2)
-def bisection_inside(t, x, u, params):
-    lo, hi = -10.0, 10.0
-    for _ in range(20):
-        mid = 0.5 * (lo + hi)
-        if mid + np.tanh(mid) > x[0]:
-            hi = mid
-        else:
-            lo = mid
-    return [u[0] - mid, -x[1]]
 
 
 @engineered(4)
