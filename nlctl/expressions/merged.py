@@ -21,7 +21,7 @@ _Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, an
 
 
 class Merger(ast.NodeTransformer):
-    """Puts choices in the place of branches."""
+    """Writes choices instead of branches."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -56,7 +56,7 @@ class Merger(ast.NodeTransformer):
         branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
         branches = [self.visit(ast.parse(ast.unparse(b), mode="eval").body) for b in branches]
         chosen = _called("choices", node.test, *map(_later, branches))
-        found = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
+        is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
         stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
         whole = [asked, ast.Assign([ast.Name(result, ast.Store())], chosen),
                  ast.If(found, [node], [stored])]  # fmt: skip
@@ -153,16 +153,16 @@ def _called(name: str, *given: ast.expr) -> ast.Call:
     return ast.Call(ast.Name(f"{name}@traced", ast.Load()), list(given), [])
 
 
-# -- what stands in the place of branches ----------------------------------------------------------
+# -- what is written instead of branches -----------------------------------------------------------
 
 
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
-    functions = {"choice": choice, "choices": choices, "logic": logic, "opposite": opposite}
+    functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite}
     return {f"{k}@traced": functools.partial(f, graph) for k, f in functions.items()}
 
 
-def choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return what either branch assigns, by a condition that is not known; None if it is."""
     condition = _open(graph, test)
     if condition is None:
@@ -177,15 +177,15 @@ def choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], An
         return None
 
 
-def choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return ``yes() if test else no()``."""
-    found = choices(graph, test, lambda: (yes(),), lambda: (no(),))
-    if found is None:
+    chosen = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
+    if chosen is None:
         return yes() if test else no()
-    return found[0]
+    return chosen[0]
 
 
-def logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
+def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
     """Return whether all or any of several hold, asked one after the other."""
     value = parts[0]()
     for part in parts[1:]:
@@ -196,13 +196,13 @@ def logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
 def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
     ask = lambda: (_asked(graph, part()),)  # noqa: E731
     if kind == "and":
-        both = choices(graph, value, ask, lambda: (False,))
+        both = _choices(graph, value, ask, lambda: (False,))
         return both[0] if both else value and part()
-    either = choices(graph, value, lambda: (True,), ask)
+    either = _choices(graph, value, lambda: (True,), ask)
     return either[0] if either else value or part()
 
 
-def opposite(graph: Graph, value: Any) -> Any:
+def _opposite(graph: Graph, value: Any) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
     return not value if condition is None else elementwise(graph, "not", _asked(graph, value))

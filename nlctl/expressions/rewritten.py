@@ -28,7 +28,7 @@ _NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
 
 
-def rewritten(function: FunctionType, merging: bool) -> CodeType:
+def followable_code(function: FunctionType, merging: bool) -> CodeType:
     """Return the code of a function as it is traced: its own, if there is nothing to rewrite."""
     # With `merging` both branches of a condition are followed at once where they only compute.
     words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
@@ -36,11 +36,11 @@ def rewritten(function: FunctionType, merging: bool) -> CodeType:
         tree = definition(function)
     except Unreadable:
         return function.__code__
-    found = {type(node) for node in ast.walk(tree)}.intersection(words)
-    if not found or not isinstance(tree, ast.FunctionDef):
+    kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
+    if not kinds or not isinstance(tree, ast.FunctionDef):
         return function.__code__
     if "__class__" in function.__code__.co_freevars:  # only within a class it is what it is
-        if ast.Try in found:
+        if ast.Try in kinds:
             raise Untraceable("try in a method that calls super()")
         return function.__code__
     body = _Rewriter().visit(copy.deepcopy(tree))
@@ -99,8 +99,8 @@ class _Rewriter(ast.NodeTransformer):
         strict = isinstance(test.ops[0], ast.Gt | ast.Lt)
         given = [ast.Name(name, ast.Load()), test.comparators[0], step,
                  ast.Constant(sign), ast.Constant(strict)]  # fmt: skip
-        moved = ast.Assign([ast.Name(name, ast.Store())], _called("moved", given))
-        return [ast.copy_location(moved, node), *node.orelse]
+        assigned = ast.Assign([ast.Name(name, ast.Store())], _called("moved", given))
+        return [ast.copy_location(assigned, node), *node.orelse]
 
 
 def _called(name: str, given: list[ast.expr]) -> ast.Call:
@@ -138,13 +138,13 @@ def _is(name: str, node: ast.expr) -> bool:
 def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that a rewritten function has."""
     return names_of_choices(graph) | {
-        _NAME.format("numbered"): Choices,
-        _NAME.format("attempt"): functools.partial(Attempt, graph),
-        _NAME.format("moved"): functools.partial(moved, graph),
+        _NAME.format("numbered"): NumberKeys,
+        _NAME.format("attempt"): functools.partial(_Attempt, graph),
+        _NAME.format("moved"): functools.partial(_moved, graph),
     }
 
 
-class Attempt:
+class _Attempt:
     """The body of a ``try``: what a handler would catch never happens, or it is not traced."""
 
     def __init__(self, graph: Graph) -> None:
@@ -166,7 +166,7 @@ class Attempt:
         return self.graph.python_numbers or not any(map(is_of_arrays, node.args))
 
 
-class Choices(dict[Any, Any]):
+class NumberKeys(dict[Any, Any]):
     """A dict of numbers: what it has for a key that is only known when it runs."""
 
     def __getitem__(self, key: Any) -> Any:
@@ -193,7 +193,7 @@ def _is_key(key: Tracer, k: Any) -> Tracer:
     return elementwise(key.graph, "eq", key, k)
 
 
-def moved(graph: Graph, value: Any, limit: Any, step: Any, sign: float, strict: bool) -> Any:
+def _moved(graph: Graph, value: Any, limit: Any, step: Any, sign: float, strict: bool) -> Any:
     """Return what is left of a value from which steps are taken as long as it is beyond a limit."""
     given = [value, limit, step]
     if not any(isinstance(v, Tracer) for v in given):

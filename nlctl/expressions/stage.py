@@ -29,7 +29,7 @@ from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
-from .rewritten import Choices, names_for, rewritten
+from .rewritten import NumberKeys, followable_code, names_for
 from .staged import (
     LIBRARIES,
     StagedModule,
@@ -72,8 +72,8 @@ class Stage:
             names["__name__"] = function.__module__  # of classes that are defined inside
             cells = tuple(CellType() for _ in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
-            own = not is_of_a_library(function)
-            code = rewritten(function, self.merging) if own else function.__code__
+            is_users = not is_of_a_library(function)
+            code = followable_code(function, self.merging) if is_users else function.__code__
             names.update(names_for(self.graph))
             copy = FunctionType(code, names, function.__name__, defaults, cells)
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
@@ -131,7 +131,7 @@ class Stage:
             return type(value)(map(self.instead, value))
         if type(value) is dict:
             parts = {k: self.instead(v) for k, v in value.items()}
-            return Choices(parts) if all(isinstance(k, int | float) for k in parts) else parts
+            return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts
         if isinstance(value, BuiltinFunctionType):
             return self._instead_of_builtin(value)
         if isinstance(value, np.ufunc) or (callable(value) and self._is_known(value)):

@@ -23,7 +23,7 @@ from ...intervals.box import Box
 from .motion import motion_of
 
 _THREADS = 2
-_AT_ONCE = 16  # pieces that are begun before the time is looked at
+_AT_ONCE = 16  # pieces that are begun before the clock is read
 _CELLS = 200  # parts of the time for which there are bounds
 _Status = Literal["proved", "refuted", "undecided"]
 

@@ -30,7 +30,7 @@ from .values import (
     OneOf,
     Parent,
     Pure,
-    Row,
+    RowOf,
     Unknown,
     captured,
     element,
@@ -278,7 +278,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, ListOf):
             slices = any(isinstance(key, slice) for key in keys)
             return base if slices else element(base)
-        if isinstance(base.known, Row):
+        if isinstance(base.known, RowOf):
             return least_upper_bound(base.known.parts)
         if isinstance(base.known, OneOf):
             return element(base) if _are_containers(base.known) else base
@@ -410,7 +410,7 @@ class Expressions(ast.NodeVisitor):
 def _part(value: KnownValue, i: int, count: int) -> KnownValue:
     """Return what is known of one part of what is taken apart."""
     known = value.known
-    if isinstance(known, Row):
+    if isinstance(known, RowOf):
         return known.parts[i] if len(known.parts) == count else OUTSIDE
     choices = known.choices if isinstance(known, OneOf) else (value,)
     rows = [c.known for c in choices]

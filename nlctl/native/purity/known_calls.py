@@ -30,7 +30,7 @@ from .values import (
     OneOf,
     Parent,
     Pure,
-    Row,
+    RowOf,
     Unknown,
     captured,
     element,
@@ -262,7 +262,7 @@ def _walkable(function: FunctionType) -> bool:
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, Unknown | Local | Bound | Pure | Row | enum.Enum | BuiltinFunctionType):
+    if isinstance(thing, Unknown | Local | Bound | Pure | RowOf | enum.Enum | BuiltinFunctionType):
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
@@ -346,7 +346,7 @@ def _rows(thing: object, given: list[KnownValue]) -> Any:
     parts = tuple(map(element, given))
     parts = parts if thing is zip else (FRESH, parts[0])
     every = all(v.own and v.inside for v in parts)
-    return ListOf((KnownValue(True, every, True, known=Row(parts)),))
+    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
 
 
 def _library(

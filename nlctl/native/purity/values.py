@@ -58,7 +58,7 @@ class ListOf:
 
 
 @dataclass(frozen=True)
-class Row:
+class RowOf:
     """What `zip` or `enumerate` makes of one of several objects or functions and others."""
 
     parts: tuple[KnownValue, ...]
@@ -137,7 +137,7 @@ def _marks(known: Any) -> Any:
     """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)
-    if isinstance(known, Row):
+    if isinstance(known, RowOf):
         return "row", tuple(part.marks for part in known.parts)
     if isinstance(known, Local):
         return "local", id(known.node), id(known.frame)
