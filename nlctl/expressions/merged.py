@@ -8,6 +8,7 @@ elements that are assigned, it is followed one way after the other as before.
 from __future__ import annotations
 
 import ast
+import copy
 import functools
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -44,7 +45,7 @@ class Merger(ast.NodeTransformer):
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
-        values = _of_branches(node)
+        values = _of_branches(copy.deepcopy(node))
         self.generic_visit(node)
         if values is None or any(isinstance(n, _BINDING) for n in ast.walk(node)):
             return node
@@ -59,7 +60,7 @@ class Merger(ast.NodeTransformer):
         is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
         stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
         whole = [asked, ast.Assign([ast.Name(result, ast.Store())], chosen),
-                 ast.If(found, [node], [stored])]  # fmt: skip
+                 ast.If(is_missing, [node], [stored])]  # fmt: skip
         return [ast.copy_location(ast.fix_missing_locations(_placed(s, node)), node) for s in whole]
 
 
