@@ -338,9 +338,15 @@ def traced(graph: Graph, value: object) -> Tracer:
     if not (type(value) is np.ndarray or isinstance(value, bool | int | float | np.generic)):
         raise Untraceable(f"values of type {type(value).__name__}")
     array = np.asarray(value)
+    if array.dtype == object and all(_is_number(v) for v in array.flat):
+        return traced(graph, array.tolist())  # what NumPy has made of tracers, one by one
     if array.dtype not in (np.dtype(float), np.dtype(int), np.dtype(bool)):
         raise Untraceable(f"values of type {array.dtype}")  # they would be rounded otherwise
     return _constants(graph, array)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, bool | int | float) or (isinstance(value, Tracer) and not value.shape)
 
 
 def _constants(graph: Graph, array: np.ndarray) -> Tracer:

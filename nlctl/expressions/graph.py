@@ -98,6 +98,8 @@ class Graph:
         self.lengths = dict(lengths or {})
         # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
+        # whether there are numbers of Python's own, which raise errors where NumPy's are infinite
+        self.python_numbers = False
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
         self.implied: dict[Expr, bool] = {}  # what follows from that

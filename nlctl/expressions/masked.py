@@ -72,6 +72,12 @@ class MaskedPlaces(Special):
     def __init__(self, mask: Tracer) -> None:
         self.mask = mask
 
+    def count(self) -> Tracer:
+        """Return how many places there are."""
+        return total(elementwise(self.mask.graph, "select", self.mask, 1, 0))
+
+    size = property(count)
+
 
 def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: Masked, *other: Any) -> Any:

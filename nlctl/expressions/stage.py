@@ -29,6 +29,7 @@ from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
+from .rewritten import NumberKeys, followable_code, names_for
 from .staged import (
     LIBRARIES,
     StagedModule,
@@ -50,8 +51,8 @@ _LARGE = 65536  # elements of an array that stays as it is
 class Stage:
     """Everything that a traced function sees instead of the real thing."""
 
-    def __init__(self, graph: Graph) -> None:
-        self.graph = graph
+    def __init__(self, graph: Graph, *, merging: bool = False) -> None:
+        self.graph, self.merging = graph, merging
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
@@ -71,7 +72,10 @@ class Stage:
             names["__name__"] = function.__module__  # of classes that are defined inside
             cells = tuple(CellType() for _ in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
-            copy = FunctionType(function.__code__, names, function.__name__, defaults, cells)
+            is_users = not is_of_a_library(function)
+            code = followable_code(function, self.merging) if is_users else function.__code__
+            names.update(names_for(self.graph))
+            copy = FunctionType(code, names, function.__name__, defaults, cells)
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
             copy.__kwdefaults__ = {k: self.instead(v) for k, v in keywords}
@@ -126,11 +130,14 @@ class Stage:
         if type(value) in (list, tuple):
             return type(value)(map(self.instead, value))
         if type(value) is dict:
-            return {k: self.instead(v) for k, v in value.items()}
+            parts = {k: self.instead(v) for k, v in value.items()}
+            return NumberKeys(parts) if all(isinstance(k, int | float) for k in parts) else parts
         if isinstance(value, BuiltinFunctionType):
             return self._instead_of_builtin(value)
         if isinstance(value, np.ufunc) or (callable(value) and self._is_known(value)):
             return self._library("", value)
+        if _is_column(value):
+            return self.fresh(np.array(value, dtype=float))
         return self._instead_of_object(value)
 
     def _is_known(self, value: object) -> bool:
@@ -253,6 +260,7 @@ class Stage:
         return value if is_plain else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
+        self.graph.python_numbers = True
         if name not in MATH:
             return self._library(name, real)
         operation, of_numbers = MATH[name], self.for_numbers(real)
@@ -316,6 +324,12 @@ class Stage:
             copied.__set_name__(copied, value.attrname or value.func.__name__)
             return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
+
+
+def _is_column(value: object) -> bool:
+    """Whether a value is a column of numbers of pandas."""
+    of_pandas = type(value).__module__.startswith("pandas") and getattr(value, "ndim", 0) == 1
+    return of_pandas and getattr(value, "dtype", None) in (np.dtype(float), np.dtype(int))
 
 
 def _has_code(value: object) -> bool:

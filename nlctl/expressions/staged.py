@@ -24,7 +24,7 @@ from .library.table import (
 )
 from .operators import elementwise
 
-LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 
 
 class OnStage(Protocol):
@@ -131,6 +131,8 @@ class StagedObject:
             return stage.copied(getter)(self)
         if isinstance(attribute, FunctionType) and not is_of_a_library(real):
             return functools.partial(stage.copied(attribute), self)
+        if name == "ev" and is_of_a_library(real):  # a spline of two variables, point by point
+            return functools.partial(self, grid=False)
         if is_of_a_library(real) and callable(getattr(real, name)):
             return stage.for_numbers(getattr(real, name))
         return stage.instead(getattr(real, name))

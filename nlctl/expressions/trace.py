@@ -12,6 +12,7 @@ from __future__ import annotations
 import dis
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from .stage import Stage
 from .staged import LIBRARIES
 
 PATHS = 128  # paths through one function that are followed
+_FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes a choice
 
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
@@ -32,13 +34,29 @@ def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]])
     # A condition that depends on tracers is followed both ways: the function runs again for every
     # way through it, and the results are combined by ``select``, which takes the branch that Python
     # takes, also for NaN.
+    left = [_FEW, _DEEP]
+    try:
+        return _traced(graph, function, arguments, left)
+    except Untraceable:
+        if left[0] >= 0:
+            raise
+    with suppress(Untraceable):
+        return _traced(graph, function, arguments, [PATHS, PATHS], merging=True)
+    return _traced(graph, function, arguments, [PATHS, PATHS])
+
+
+def _traced(
+    graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]], left: list[int],
+    *, merging: bool = False,
+) -> Tracer:  # fmt: skip
+    """Follow every way; with `merging`, branches that only compute numbers are one."""
     graph.limit = len(graph.nodes) + BUDGET
     assumptions = dict(graph.assumptions)
     try:
-        stage = Stage(graph)
+        stage = Stage(graph, merging=merging)
         copy = stage.copied(function)
         run = lambda: copy(*map(stage.instead, arguments()))  # noqa: E731
-        result = _followed(graph, lambda: _flat(graph, run()), {}, [PATHS])
+        result = _followed(graph, lambda: _flat(graph, run()), {}, left)
         if result is None:
             raise Untraceable("it raises an error on every path")
         return result
@@ -67,7 +85,8 @@ def _followed(
         return _counted(left, None)
     else:
         return _counted(left, result)
-    if len(decisions) >= PATHS:
+    if len(decisions) >= left[1]:
+        left[0] = -1
         raise Untraceable("a loop whose end depends on what is computed")
     implied = implied_by(condition, decisions)
     if implied is not None:
@@ -94,7 +113,7 @@ def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
 
 
 def _is_raised(error: Exception) -> bool:
-    """Whether an error is one that a traced function raises itself, by ``raise`` or ``assert``."""
+    """Whether an error is one that a traced function raises itself, or that Python raises in it."""
     if isinstance(error, Untraceable | Ambiguous):
         return False
     place = error.__traceback__
@@ -104,7 +123,9 @@ def _is_raised(error: Exception) -> bool:
         return False
     code = place.tb_frame.f_code
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
-    return is_staged and code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+    is_pythons = isinstance(error, IndexError | KeyError | ZeroDivisionError | UnboundLocalError)
+    raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+    return is_staged and (raises or is_pythons)
 
 
 def _place(error: BaseException) -> str:

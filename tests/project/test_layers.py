@@ -77,7 +77,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["stepping", "operating_points", "frequency"],
     ],
     "nlctl.expressions": [
-        ["graph"],
+        ["graph", "source"],
         ["functions", "elimination"],
         ["arrays", "operators", "masked", "indexing"],
         [
@@ -89,6 +89,8 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
             "quotients",
         ],
         ["library"],
+        ["merged"],
+        ["rewritten"],
         ["staged", "stage"],
         ["derivatives", "trace"],
         ["jacobian_source"],

@@ -14,6 +14,7 @@ from . import (
     rotations,
     shapes,
     special,
+    spectra,
     tables,
 )
 
@@ -27,5 +28,6 @@ __all__ = [
     "rotations",
     "shapes",
     "special",
+    "spectra",
     "tables",
 ]

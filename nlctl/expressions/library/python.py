@@ -14,10 +14,11 @@ import numpy as np
 
 from ..arrays import Tracer, scalar, traced
 from ..graph import Expr, Graph, Untraceable
+from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
-_SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter", "len",
+_SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
 # these ask their arguments, as they do of arrays
@@ -55,7 +56,7 @@ class Builtins:
         """Return all of them by name."""
         names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
         names.update(__import__=import_, super=self._super)
-        for name in ("round", "isinstance", "getattr", "hasattr", "type"):
+        for name in ("len", "round", "isinstance", "getattr", "hasattr", "type"):
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
         names.update({kind.__name__: NumberType(kind, make) for kind, make in makers.items()})
@@ -73,6 +74,7 @@ class Builtins:
             return float(value)
         if value.shape:
             raise Untraceable("the float of an array")
+        self.graph.python_numbers = True
         return scalar(self.graph, self.graph.number(value.only))
 
     def _complex(self, *parts: Any) -> Any:
@@ -85,7 +87,7 @@ class Builtins:
             return int(value, *rest)
         if value.shape:
             raise Untraceable("the integer of an array")
-        only = value.only
+        only, self.graph.python_numbers = value.only, True
         if only.op == "const":
             return int(only.data)
         if only.kind == "i":
@@ -110,6 +112,10 @@ class Builtins:
         if not is_of_arrays(value.only):
             raise Untraceable("Python's round to decimals, of one of its own floats")
         return written_out(self.graph, np.round, value, digits)
+
+    def _len(self, value: Any) -> Any:
+        chosen = isinstance(value, Masked | MaskedPlaces)
+        return value.count() if chosen else len(value)
 
     def _isinstance(self, thing: object, kind: Any) -> bool:
         originals = {copy: real for real, copy in self.stage.classes.items()}

@@ -275,11 +275,13 @@ def _filled(graph: Graph, values: Tracer, value: object) -> None:
 
 def _listed(graph: Graph, values: Tracer) -> Any:
     """Return an array as lists of numbers."""
+    graph.python_numbers = True
     return [_listed(graph, v) for v in values] if values.shape else values
 
 
 def item(graph: Graph, values: Tracer, *_place: Any) -> Any:
     """Return one element as a number."""
+    graph.python_numbers = True
     if not _place and values.size != 1:
         raise Untraceable("the only element of an array that has more")
     flat = values.reshape(-1) if values.shape else values.reshape(1)

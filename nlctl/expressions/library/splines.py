@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
+from .surfaces import surface
 from .table import enter
 from .tables import MOST_PIECES, interval_choice, polynomial
 
@@ -22,6 +23,9 @@ def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) 
     raise Untraceable(f"{type(thing).__name__} is not known here")
 
 
+_POLYNOMIALS = ("Polynomial", "Chebyshev", "Legendre", "Hermite", "HermiteE", "Laguerre")
+
+
 @functools.cache
 def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
     from scipy import interpolate
@@ -31,9 +35,13 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.BSpline, b_spline),
         (interpolate.interp1d, table_of_one),
         (interpolate.UnivariateSpline, fitted_spline),
+        (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
-        (np.polynomial.Polynomial, _mapped_polynomial),
+        (
+            tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS),
+            _mapped_polynomial,
+        ),
     )
 
 
@@ -43,6 +51,7 @@ def enter_splines() -> None:
     from scipy import interpolate
 
     enter([interpolate.splev], splev)
+    enter([interpolate.interpn], at_grid)
 
 
 def _floats(values: Any) -> np.ndarray:
@@ -51,6 +60,7 @@ def _floats(values: Any) -> np.ndarray:
 
 def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
     off, scale = p.mapparms()
+    p = p.convert(domain=p.domain, kind=np.polynomial.Polynomial, window=p.window)
     return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
 
 
@@ -231,6 +241,14 @@ def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
     cells[:] = results
     whole = Tracer(graph, cells)
     return whole[0] if flat else whole
+
+
+def at_grid(graph: Graph, points: Any, values: Any, xi: Any, *rest: Any, **options: Any) -> Any:
+    """Return SciPy's `interpn`."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    places = tuple(np.asarray(_numbers(v)) for v in points)
+    return _grid(graph, RegularGridInterpolator(places, _numbers(values), *rest, **options), xi)
 
 
 def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:

@@ -25,9 +25,9 @@ import numba
 import numpy as np
 
 from ...annotations import unreported
+from ...expressions.source import codes_in
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
-from ..purity.source import codes_in
 
 _LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"} | {  # their versions stand for them
     *("pandas", "pyarrow", "matplotlib", "jinja2", "rich"),  # in no equation, and

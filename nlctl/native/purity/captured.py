@@ -89,7 +89,11 @@ def recorded(value: object) -> Any:
         return _Kept(type(value), tuple(map(recorded, value)))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
-    return value
+    return value.copy() if _is_table(value) else value
+
+
+def _is_table(value: Any) -> bool:
+    return type(value).__module__.startswith("pandas") and hasattr(value, "equals")
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,8 @@ def same(now: Any, then: Any) -> bool:
         return now.__func__ is then.__func__ and now.__self__ is then.__self__
     if now is then:
         return True
+    if _is_table(now):
+        return bool(now.equals(then))
     if isinstance(now, CodeType):
         return now == then
     return isinstance(now, PLAIN) and bool(now == then or (now != now and then != then))

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
+from ...expressions.source import Definition, Unreadable, definition, source_file
 from . import known_calls, made
 from .captured import Captured, noted_function, noted_partial
 from .expressions import Frame
-from .source import Definition, Unreadable, definition, source_file
 from .statements import CallWalker
 from .values import (
     FRESH,

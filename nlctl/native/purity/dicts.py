@@ -31,7 +31,7 @@ from numba.extending import (
 )
 
 from ...errors import UsageError
-from .source import Unreadable, definition
+from ...expressions.source import Unreadable, definition
 from .values import python_function
 
 FILLER = "no_parameters"  # numba cannot call methods of a record without fields

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.source import cells_of, source_file
 from . import known_calls, made
 from .known_calls import MEMORY
-from .source import cells_of, source_file
 from .values import (
     FRESH,
     OUTSIDE,
@@ -30,6 +30,7 @@ from .values import (
     OneOf,
     Parent,
     Pure,
+    RowOf,
     Unknown,
     captured,
     element,
@@ -277,6 +278,8 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, ListOf):
             slices = any(isinstance(key, slice) for key in keys)
             return base if slices else element(base)
+        if isinstance(base.known, RowOf):
+            return least_upper_bound(base.known.parts)
         if isinstance(base.known, OneOf):
             return element(base) if _are_containers(base.known) else base
         getter = made.operator_of(self.walk, base, "__getitem__")
@@ -407,6 +410,8 @@ class Expressions(ast.NodeVisitor):
 def _part(value: KnownValue, i: int, count: int) -> KnownValue:
     """Return what is known of one part of what is taken apart."""
     known = value.known
+    if isinstance(known, RowOf):
+        return known.parts[i] if len(known.parts) == count else OUTSIDE
     choices = known.choices if isinstance(known, OneOf) else (value,)
     rows = [c.known for c in choices]
     if all(isinstance(row, list | tuple) and len(row) == count for row in rows):

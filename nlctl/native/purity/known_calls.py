@@ -6,6 +6,8 @@ import builtins
 import dataclasses
 import enum
 import functools
+import logging
+import warnings
 from collections import Counter, OrderedDict, defaultdict, deque
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
@@ -28,6 +30,7 @@ from .values import (
     OneOf,
     Parent,
     Pure,
+    RowOf,
     Unknown,
     captured,
     element,
@@ -61,6 +64,8 @@ _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load"
                           "loads", "genfromtxt", "fromregex", "fromfile", "memmap", "breakpoint"),
                          "read files before the run, and write them after it")  # fmt: skip
 _TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
+_OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
+_OF_TABLES = ("to_numpy", "tolist")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
@@ -155,7 +160,15 @@ def _called(
     """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
+        if thing.__name__ in _OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
+            raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(owner, logging.Logger) or thing is warnings.warn:
+        raise Impure(f"writes messages with {thing.__name__}()", OUTPUT)
+    if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
+        if thing.__name__ not in _OF_TABLES:
+            raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
+        return OUTSIDE
     if isinstance(thing, MethodType) and _is_table(type(owner)):
         if thing.__name__.startswith(("set_", "add_")):
             raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
@@ -249,7 +262,7 @@ def _walkable(function: FunctionType) -> bool:
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, Unknown | Local | Bound | Pure | enum.Enum | BuiltinFunctionType):
+    if isinstance(thing, Unknown | Local | Bound | Pure | RowOf | enum.Enum | BuiltinFunctionType):
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
@@ -288,7 +301,8 @@ def _builtin(
         )
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
-        return KnownValue(True, all(v.inside for v in given), True, known=_functions_in(given))
+        inside = all(v.inside for v in given)
+        return KnownValue(True, inside, True, known=_rows(thing, given))
     if name == "next":
         _written(given[0], "next()")
         return element(given[0])
@@ -324,12 +338,25 @@ def _functions_in(given: list[KnownValue]) -> Any:
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 
 
+def _rows(thing: object, given: list[KnownValue]) -> Any:
+    """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
+    kept = _functions_in(given)
+    if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
+        return kept
+    parts = tuple(map(element, given))
+    parts = parts if thing is zip else (FRESH, parts[0])
+    every = all(v.own and v.inside for v in parts)
+    return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
+
+
 def _library(
     walk: Walk, thing: object, module: str, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     name = getattr(thing, "__name__", "")
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
+    if module.startswith("pandas") and name.startswith(("read_", "to_")):
+        raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
     if name in _OTHERS:
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
     _call_functions(walk, [*given, *named.values()])

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.source import Definition, Unreadable, cells_of, definition
 from ...upstream.numba_internals import CPUDispatcher
-from .source import Definition, Unreadable, cells_of, definition
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (

@@ -12,7 +12,7 @@ import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from .source import cells_of, codes_in
+from ...expressions.source import cells_of, codes_in
 
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named

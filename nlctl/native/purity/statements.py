@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
-from .source import Definition
 from .values import (
     FRESH,
     OUTSIDE,
@@ -188,19 +188,21 @@ class CallWalker(Expressions):
             self.visit(node.exc)
 
     def visit_Try(self, node: ast.Try) -> None:
-        """Walk a look-up that may fail; other errors may be those of what reads the function."""
+        """Walk the ways through it; of errors in machine code nothing is caught."""
         caught = [handler.type for handler in node.handlers]
-        if node.finalbody or not all(
-            isinstance(c, ast.Name) and c.id == "KeyError" for c in caught
-        ):
-            self.visit_TryStar(node)
+        if not all(isinstance(c, ast.Name) and c.id == "KeyError" for c in caught):
+            self.walk.unbound += ["try"]  # numba knows other errors than Python
         before = dict(self.frame.names)
         self.statements(node.body)
         self.frame.names = merged([before, self.frame.names])
+        for handler in node.handlers:
+            if handler.name:
+                self.assign(handler.name, FRESH)
         self.either([node.orelse, *(handler.body for handler in node.handlers)])
+        self.statements(node.finalbody)
 
     def visit_TryStar(self, node: ast.AST) -> None:
-        raise Impure("has try ... except or finally", "write an if for the case that fails")
+        raise Impure("has try ... except*", "write an if for the case that fails")
 
     def visit_With(self, node: ast.With) -> None:
         for item in node.items:
@@ -212,20 +214,28 @@ class CallWalker(Expressions):
 
     def visit_Import(self, node: ast.Import) -> None:
         for alias in node.names:
-            module = importlib.import_module(alias.name)
-            top = importlib.import_module(alias.name.partition(".")[0])
+            module = _imported(alias.name)
+            top = _imported(alias.name.partition(".")[0])
             self.assign(alias.asname or top.__name__, captured(module if alias.asname else top))
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
         package = self.frame.function.__globals__.get("__package__")
-        module = importlib.import_module("." * node.level + (node.module or ""), package)
+        module = _imported("." * node.level + (node.module or ""), package)
         for alias in node.names:
             self.assign(alias.asname or alias.name, captured(getattr(module, alias.name)))
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        if node.decorator_list:
-            raise Impure("decorates a function inside", "define it outside")
-        self.assign(node.name, KnownValue(True, True, known=Local(node, self.frame)))
+        value = KnownValue(True, True, known=Local(node, self.frame))
+        for decorator in reversed(node.decorator_list):
+            value = self.walk.call(self.visit(decorator), [value], {})
+        self.assign(node.name, value)
+
+
+def _imported(name: str, package: str | None = None) -> Any:
+    try:
+        return importlib.import_module(name, package)
+    except ImportError:
+        raise Impure(f"imports {name}, which is not installed", "import what there is") from None
 
 
 def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]:

@@ -22,7 +22,7 @@ _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-              "statistics")  # fmt: skip
+              "statistics", "pandas")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
@@ -55,6 +55,13 @@ class ListOf:
     """A list, tuple or dict that the call has made of functions or objects."""
 
     choices: tuple[KnownValue, ...]
+
+
+@dataclass(frozen=True)
+class RowOf:
+    """What `zip` or `enumerate` makes of one of several objects or functions and others."""
+
+    parts: tuple[KnownValue, ...]
 
 
 @dataclass(frozen=True)
@@ -130,6 +137,8 @@ def _marks(known: Any) -> Any:
     """Return what distinguishes one object that is known from another."""
     if isinstance(known, OneOf | ListOf):
         return type(known).__name__, frozenset(choice.marks for choice in known.choices)
+    if isinstance(known, RowOf):
+        return "row", tuple(part.marks for part in known.parts)
     if isinstance(known, Local):
         return "local", id(known.node), id(known.frame)
     if isinstance(known, Bound):

@@ -161,7 +161,7 @@ class TooLateError(Exception):
 def failing(t, x, u, params):
     if t > 0.5 and x[0] > params["k"]:
         raise TooLateError("at", t, float(erfcx(x[0])))
-    return [-0.1 * x[0] * erfcx(0.0)]
+    return [-0.1 * x[0] * erfcx(0.0 * x[0])]
 
 
 ENDS = {
@@ -306,7 +306,7 @@ def reads(t, x, u, params):
     """Every way to read a parameter; the loop keeps it from being traced."""
     total = params["k"] * x[0]
     while total > 1e3:
-        total -= 1.0
+        total *= 0.5
     total += params.get("absent", 0.5) + params.get("k") + params["rows"][1]
     if "get" in params and "other" not in params:
         total += params["get"]

@@ -15,8 +15,8 @@ import source_text
 
 import nlctl
 from nlctl.errors import CompileError, EngineWarning, UsageError
+from nlctl.expressions.source import Unreadable, definition
 from nlctl.native.purity.check import check_pure
-from nlctl.native.purity.source import Unreadable, definition
 from nlctl.native.purity.values import FRESH, VECTOR, Impure, captured
 
 GAIN, HISTORY, TABLE = 2.0, [], {"k": 1.0}
@@ -182,12 +182,6 @@ def writes_a_parameter(t, x, u, params):
 def prints(t, x, u, params):
     print(x)
     return x
-
-def catches(t, x, u, params):
-    try:
-        return 1 / x
-    except ZeroDivisionError:
-        return x
 
 def tests_identity(t, x, u, params):
     return x if params["flag"] is True else -x

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nlctl
-from nlctl.native.purity.source import Unreadable, definition
+from nlctl.expressions.source import Unreadable, definition
 
 TEXT = """from __future__ import annotations
 import numpy as np

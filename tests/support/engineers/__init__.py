@@ -7,5 +7,6 @@ from engineers.entry import ENTRIES, Entry, system
 __all__ = ["ENTRIES", "Entry", "system"]
 
 for _theme in ("shapes", "reductions", "matrices", "choices", "tables", "elementary", "language",
-               "objects", "models", "everyday", "toolbox", "habits", "plants"):  # fmt: skip
+               "objects", "models", "everyday", "toolbox", "habits", "plants",
+               "guarded"):  # fmt: skip
     importlib.import_module(f"engineers.{_theme}")

@@ -1,0 +1,242 @@
+"""Branches that only compute numbers, followed both at once instead of one way after the other.
+
+Eight saturations in a row are 256 ways through a function, and eight choices: a function that has
+too many ways is traced once more in these words.  Where more happens in a branch than numbers and
+elements that are assigned, it is followed one way after the other as before.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from .arrays import Tracer, scalar, traced
+from .graph import Expr, Graph, Untraceable
+from .operators import elementwise
+
+_BINDING = (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await)
+_Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, and what
+
+
+class Merger(ast.NodeTransformer):
+    """Writes choices instead of branches."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
+        """Return a choice at the end of a function that returns early."""
+        while len(node.body) > 1 and (value := _returned(node.body[-2:])) is not None:
+            node.body[-2:] = [ast.copy_location(ast.Return(value), node.body[-2])]
+        if (value := _returned(node.body[-1:])) is not None:
+            node.body[-1] = ast.copy_location(ast.Return(value), node.body[-1])
+        self.generic_visit(node)
+        return ast.fix_missing_locations(node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        """Write ``choice(c, lambda: a, lambda: b)`` for ``a if c else b``."""
+        self.generic_visit(node)
+        if any(isinstance(n, _BINDING) for n in ast.walk(node)):
+            return node
+        return _called("choice", _truth(node.test), _later(node.body), _later(node.orelse))
+
+    def visit_If(self, node: ast.If) -> Any:
+        """Assign what a choice returns; None says that the branches are followed as they are."""
+        values = _of_branches(copy.deepcopy(node))
+        self.generic_visit(node)
+        if values is None or any(isinstance(n, _BINDING) for n in ast.walk(node)):
+            return node
+        self.count += 1
+        test, result = (f"{name}@{self.count}" for name in ("test", "result"))
+        asked = ast.Assign([ast.Name(test, ast.Store())], _truth(node.test))
+        node.test = ast.Name(test, ast.Load())
+        targets = [target for target, _, _ in values]
+        branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
+        branches = [self.visit(ast.parse(ast.unparse(b), mode="eval").body) for b in branches]
+        chosen = _called("choices", node.test, *map(_later, branches))
+        is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
+        stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
+        whole = [asked, ast.Assign([ast.Name(result, ast.Store())], chosen),
+                 ast.If(is_missing, [node], [stored])]  # fmt: skip
+        return [ast.copy_location(ast.fix_missing_locations(_placed(s, node)), node) for s in whole]
+
+
+def _returned(body: Sequence[ast.stmt]) -> ast.expr | None:
+    """Return what statements return, a choice where they do so early; None if they do more."""
+    first = body[0] if body else None
+    if isinstance(first, ast.Return):
+        return first.value
+    if not isinstance(first, ast.If):
+        return None
+    yes, no = _returned(first.body), _returned([*first.orelse, *body[1:]])
+    if yes is None or no is None or len(first.body) > 1:
+        return None
+    return ast.copy_location(ast.IfExp(first.test, yes, no), first)
+
+
+def _placed(statement: ast.stmt, like: ast.AST) -> ast.stmt:
+    for part in ast.walk(statement):
+        if "lineno" in part._attributes and not hasattr(part, "lineno"):
+            ast.copy_location(part, like)
+    return statement
+
+
+def _of_branches(node: ast.If) -> list[tuple[ast.expr, ast.expr, ast.expr]] | None:
+    """Return what is assigned, and what in either branch; None if there is more than that."""
+    yes, no = _assigned(node.body), _assigned(node.orelse)
+    if yes is None or no is None or not (yes or no):
+        return None
+    result = []
+    for name in dict.fromkeys([*yes, *no]):
+        target = (yes.get(name) or no[name])[0]
+        same = ast.parse(name, mode="eval").body
+        result.append((target, yes.get(name, (None, same))[1], no.get(name, (None, same))[1]))
+    return result
+
+
+def _assigned(body: Sequence[ast.stmt]) -> _Values | None:
+    values: _Values = {}
+    for statement in body:
+        if isinstance(statement, ast.Pass):
+            continue
+        more = _one(statement)
+        read = {n.id for _, v in (more or {}).values() for n in ast.walk(v)
+                if isinstance(n, ast.Name)}  # fmt: skip
+        written = {n.id for t, _ in values.values() for n in ast.walk(t) if isinstance(n, ast.Name)}
+        elements = any(isinstance(t, ast.Subscript) for t, _ in values.values())
+        if more is None or read & written or elements:
+            return None
+        values |= more
+    return values
+
+
+def _one(statement: ast.stmt) -> _Values | None:
+    if isinstance(statement, ast.If):
+        parts = _of_branches(statement)
+        if parts is None:
+            return None
+        return {ast.unparse(t): (t, ast.IfExp(statement.test, a, b)) for t, a, b in parts}
+    if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
+        target, value = statement.targets[0], statement.value
+    elif isinstance(statement, ast.AugAssign):
+        target, name = statement.target, ast.unparse(statement.target)
+        value = ast.BinOp(ast.parse(name, mode="eval").body, statement.op, statement.value)
+    else:
+        return None
+    plain = isinstance(target, ast.Name | ast.Subscript)
+    return {ast.unparse(target): (target, value)} if plain else None
+
+
+def _truth(test: ast.expr) -> ast.expr:
+    """Return a test whose parts are asked without a decision, where that is possible."""
+    if isinstance(test, ast.BoolOp):
+        kind = ast.Constant("and" if isinstance(test.op, ast.And) else "or")
+        return _called("logic", kind, *(_later(_truth(v)) for v in test.values))
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        return _called("opposite", _truth(test.operand))
+    if isinstance(test, ast.Compare) and len(test.ops) > 1:
+        sides = [test.left, *test.comparators]
+        pairs = [ast.Compare(a, [op], [b]) for a, op, b in zip(sides, test.ops, sides[1:],
+                                                                strict=False)]  # fmt: skip
+        return _truth(ast.BoolOp(ast.And(), pairs))
+    return test
+
+
+def _later(value: ast.expr) -> ast.Lambda:
+    nothing = ast.arguments([], [], None, [], [], None, [])
+    return ast.Lambda(nothing, value)
+
+
+def _called(name: str, *given: ast.expr) -> ast.Call:
+    return ast.Call(ast.Name(f"{name}@traced", ast.Load()), list(given), [])
+
+
+# -- what is written instead of branches -----------------------------------------------------------
+
+
+def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
+    """Return what the names stand for that `Merger` writes."""
+    functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite}
+    return {f"{k}@traced": functools.partial(f, graph) for k, f in functions.items()}
+
+
+def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    """Return what either branch assigns, by a condition that is not known; None if it is."""
+    condition = _open(graph, test)
+    if condition is None:
+        return None
+    guards = len(graph.guards)
+    try:
+        one = _under(graph, condition, True, yes)
+        other = _under(graph, condition, False, no)
+        return tuple(_selected(graph, condition, a, b) for a, b in zip(one, other, strict=True))
+    except Exception:  # of the branch that is not taken, or no numbers
+        del graph.guards[guards:]
+        return None
+
+
+def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    """Return ``yes() if test else no()``."""
+    chosen = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
+    if chosen is None:
+        return yes() if test else no()
+    return chosen[0]
+
+
+def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
+    """Return whether all or any of several hold, asked one after the other."""
+    value = parts[0]()
+    for part in parts[1:]:
+        value = _with(graph, kind, value, part)
+    return value
+
+
+def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
+    ask = lambda: (_asked(graph, part()),)  # noqa: E731
+    if kind == "and":
+        both = _choices(graph, value, ask, lambda: (False,))
+        return both[0] if both else value and part()
+    either = _choices(graph, value, lambda: (True,), ask)
+    return either[0] if either else value or part()
+
+
+def _opposite(graph: Graph, value: Any) -> Any:
+    """Return ``not value``."""
+    condition = _open(graph, value)
+    return not value if condition is None else elementwise(graph, "not", _asked(graph, value))
+
+
+def _asked(graph: Graph, value: Any) -> Any:
+    """Return the truth of a number."""
+    number = traced(graph, value)
+    return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
+
+
+def _open(graph: Graph, test: Any) -> Expr | None:
+    """Return a condition that is not known, and not decided on this path."""
+    if not isinstance(test, Tracer) or test.shape:
+        return None
+    condition = _asked(graph, test).only
+    known = condition.op == "const" or condition in graph.implied or condition in graph.decisions
+    return None if known or condition.value is not None else condition
+
+
+def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]) -> Any:
+    """Return what a branch computes; errors that it may raise matter only where it is taken."""
+    before = len(graph.guards)
+    values = branch()
+    for k in range(before, len(graph.guards)):
+        elsewhere = graph.op("not", condition) if holds else condition
+        graph.guards[k] = graph.op("or", elsewhere, graph.guards[k])
+    return values
+
+
+def _selected(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
+    a, b = traced(graph, one), traced(graph, other)
+    kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
+    if not kinds or ("b" in kinds and len(kinds) > 1):
+        raise Untraceable("branches with something else than numbers")
+    return elementwise(graph, "select", scalar(graph, condition), a, b)

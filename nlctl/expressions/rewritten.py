@@ -1,0 +1,215 @@
+"""What a traced function does that no run of it on expressions can follow, in other words.
+
+* ``try``: its body runs to the end, or the function is called instead of traced.
+* ``raise`` and ``assert``: what an error would say is not made.
+* ``while angle > pi: angle -= 2 * pi``: how often follows from the values.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import functools
+from collections.abc import Callable
+from types import CodeType, FunctionType
+from typing import Any
+
+from .arrays import Tracer, traced
+from .graph import Expr, Graph, Untraceable
+from .library.python import is_of_arrays
+from .merged import Merger, names_of_choices
+from .operators import elementwise
+from .source import Definition, Unreadable, definition
+
+_STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
+_DIVIDING = ("div", "remainder", "fmod", "power")
+_KEYS = (int, float, bool)
+_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
+_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
+
+
+def followable_code(function: FunctionType, merging: bool) -> CodeType:
+    """Return the code of a function as it is traced: its own, if there is nothing to rewrite."""
+    # With `merging` both branches of a condition are followed at once where they only compute.
+    words = (*_WORDS, ast.If, ast.IfExp) if merging else _WORDS
+    try:
+        tree = definition(function)
+    except Unreadable:
+        return function.__code__
+    kinds = {type(node) for node in ast.walk(tree)}.intersection(words)
+    if not kinds or not isinstance(tree, ast.FunctionDef):
+        return function.__code__
+    if "__class__" in function.__code__.co_freevars:  # only within a class it is what it is
+        if ast.Try in kinds:
+            raise Untraceable("try in a method that calls super()")
+        return function.__code__
+    body = _Rewriter().visit(copy.deepcopy(tree))
+    body = Merger().visit(body) if merging else body
+    body.decorator_list = []
+    return _compiled(body, function.__code__)
+
+
+def _compiled(node: Definition, code: CodeType) -> CodeType:
+    """Return the code of a definition whose free variables are those of another code."""
+    outer = ast.parse(f"def outer({', '.join(code.co_freevars)}): pass").body[0]
+    assert isinstance(outer, ast.FunctionDef)
+    outer.body = [node]  # type: ignore[list-item]
+    module = ast.fix_missing_locations(ast.Module([outer], []))
+    whole = compile(module, code.co_filename, "exec", dont_inherit=True)
+    inside = _inside(_inside(whole, "outer"), code.co_name)
+    if inside.co_freevars != code.co_freevars:
+        raise Untraceable("variables of the function around it that are not read")
+    return inside
+
+
+def _inside(code: CodeType, name: str) -> CodeType:
+    return next(c for c in code.co_consts if isinstance(c, CodeType) and c.co_name == name)
+
+
+class _Rewriter(ast.NodeTransformer):
+    def visit_Try(self, node: ast.Try) -> Any:
+        self.generic_visit(node)
+        if all(isinstance(h.type, ast.Name) and h.type.id == "KeyError" for h in node.handlers):
+            return node
+        if any(isinstance(n, ast.Return) for part in node.finalbody for n in ast.walk(part)):
+            raise Untraceable("a return within finally")
+        attempt = ast.With([ast.withitem(_called("attempt", []))], node.body)
+        return [ast.copy_location(attempt, node), *node.orelse, *node.finalbody]
+
+    def visit_Dict(self, node: ast.Dict) -> Any:
+        self.generic_visit(node)
+        numbers = [k for k in node.keys if isinstance(k, ast.Constant) and type(k.value) in _KEYS]
+        return _called("numbered", [node]) if node.keys and len(numbers) == len(node.keys) else node
+
+    def visit_Raise(self, node: ast.Raise) -> Any:
+        if isinstance(node.exc, ast.Call):
+            node.exc = node.exc.func
+        return node
+
+    def visit_Assert(self, node: ast.Assert) -> Any:
+        node.msg = None
+        return node
+
+    def visit_While(self, node: ast.While) -> Any:
+        self.generic_visit(node)
+        steps = _steps(node)
+        if steps is None:
+            return node
+        name, sign, test, step = steps
+        strict = isinstance(test.ops[0], ast.Gt | ast.Lt)
+        given = [ast.Name(name, ast.Load()), test.comparators[0], step,
+                 ast.Constant(sign), ast.Constant(strict)]  # fmt: skip
+        assigned = ast.Assign([ast.Name(name, ast.Store())], _called("moved", given))
+        return [ast.copy_location(assigned, node), *node.orelse]
+
+
+def _called(name: str, given: list[ast.expr]) -> ast.Call:
+    return ast.Call(ast.Name(_NAME.format(name), ast.Load()), given, [])
+
+
+def _steps(node: ast.While) -> tuple[str, float, ast.Compare, ast.expr] | None:
+    """Return what a loop moves by equal steps, in which direction, until when, and the step."""
+    test, body = node.test, node.body
+    if not isinstance(test, ast.Compare) or len(test.ops) != 1 or len(body) != 1:
+        return None
+    if not isinstance(test.left, ast.Name):
+        return None
+    name, statement = test.left.id, body[0]
+    if isinstance(statement, ast.AugAssign):
+        target, operation, step = statement.target, statement.op, statement.value
+    elif isinstance(statement, ast.Assign) and isinstance(statement.value, ast.BinOp):
+        target, operation, step = statement.targets[0], statement.value.op, statement.value.right
+        if len(statement.targets) != 1 or not _is(name, statement.value.left):
+            return None
+    else:
+        return None
+    moving = [n.id for part in (test.comparators[0], step) for n in ast.walk(part)
+              if isinstance(n, ast.Name)]  # fmt: skip
+    fits = isinstance(test.ops[0], _STEPS.get(type(operation), ()))
+    if not fits or not _is(name, target) or name in moving:
+        return None
+    return name, 1.0 if isinstance(operation, ast.Sub) else -1.0, test, step
+
+
+def _is(name: str, node: ast.expr) -> bool:
+    return isinstance(node, ast.Name) and node.id == name
+
+
+def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
+    """Return what the names stand for that a rewritten function has."""
+    return names_of_choices(graph) | {
+        _NAME.format("numbered"): NumberKeys,
+        _NAME.format("attempt"): functools.partial(_Attempt, graph),
+        _NAME.format("moved"): functools.partial(_moved, graph),
+    }
+
+
+class _Attempt:
+    """The body of a ``try``: what a handler would catch never happens, or it is not traced."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.graph, self.guards, self.nodes = graph, len(graph.guards), len(graph.nodes)
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        failed = kind is not None and issubclass(kind, Exception)
+        divides = any(map(self._may_divide_by_zero, self.graph.nodes[self.nodes :]))
+        if failed or divides or len(self.graph.guards) > self.guards:
+            raise Untraceable("try around what may raise an error")
+
+    def _may_divide_by_zero(self, node: Expr) -> bool:
+        """Whether Python's own numbers are divided, instead of NumPy's."""
+        if node.op not in _DIVIDING or node.args[-1].op == "const":
+            return False
+        return self.graph.python_numbers or not any(map(is_of_arrays, node.args))
+
+
+class NumberKeys(dict[Any, Any]):
+    """A dict of numbers: what it has for a key that is only known when it runs."""
+
+    def __getitem__(self, key: Any) -> Any:
+        if not isinstance(key, Tracer):
+            return super().__getitem__(key)
+        known = functools.reduce(lambda a, b: a | b, (_is_key(key, k) for k in self))
+        key.graph.guards.append(known.only)  # beyond there is an error
+        return self._chosen(key, next(reversed(self.values())))
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        """Return what it has for a key, or a default."""
+        return self._chosen(key, default) if isinstance(key, Tracer) else super().get(key, default)
+
+    def _chosen(self, key: Tracer, choice: Any) -> Any:
+        numbers = all(isinstance(v, int | float | Tracer) for v in (*self.values(), choice))
+        if key.shape or not numbers or not all(isinstance(k, _KEYS) for k in self):
+            raise Untraceable("a key that is only known when it runs")
+        for k, value in reversed(self.items()):
+            choice = elementwise(key.graph, "select", _is_key(key, k), value, choice)
+        return choice
+
+
+def _is_key(key: Tracer, k: Any) -> Tracer:
+    return elementwise(key.graph, "eq", key, k)
+
+
+def _moved(graph: Graph, value: Any, limit: Any, step: Any, sign: float, strict: bool) -> Any:
+    """Return what is left of a value from which steps are taken as long as it is beyond a limit."""
+    given = [value, limit, step]
+    if not any(isinstance(v, Tracer) for v in given):
+        while sign * value > sign * limit or (not strict and value == limit):
+            value = value - sign * step
+        return value
+    if any(traced(graph, v).shape for v in given) or traced(graph, value).only.kind != "f":
+        raise Untraceable("a loop whose end depends on what is computed")
+    op = functools.partial(elementwise, graph)
+    beyond = "gt" if sign > 0 else "lt"
+    beyond = beyond if strict else {"gt": "ge", "lt": "le"}[beyond]
+    distance = op("mul", sign, op("sub", value, limit))
+    count = op("ceil", op("div", distance, step))
+    rest = op("sub", value, op("mul", sign, op("mul", count, step)))
+    more, less = op("sub", rest, op("mul", sign, step)), op("add", rest, op("mul", sign, step))
+    rest = op("select", op(beyond, rest, limit), more, op("select", op(beyond, less, limit), rest,
+                                                          less))  # fmt: skip
+    endless = op("select", op("gt", step, 0.0), rest, float("nan"))
+    return op("select", op(beyond, value, limit), endless, value)
