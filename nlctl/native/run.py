@@ -1,4 +1,4 @@
-"""A run in machine code while it goes: members that are integrated in a batch."""
+"""A run in machine code while it lasts: members that are integrated in a batch."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from .along import Along
 from .chattering.detection import Jump
 from .machine.evaluations import Machine
+from .spare import Spare
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,8 @@ class Run:
         Of members that chatter, by their lanes: where.
     series : Task or None
         With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
+    spare : Spare or None
+        Memory that the next run may take when this one is over.
     """
 
     machine: Machine
@@ -36,6 +39,7 @@ class Run:
     along: Along | None = None
     jumps: Mapping[int, Jump] = field(default_factory=dict)
     series: Any = None
+    spare: Spare | None = None
 
     @property
     def lanes(self) -> np.ndarray:
