@@ -29,7 +29,7 @@ from ..settings import Settings
 from .method import order_for, with_taylor
 from .routine import series
 
-_ORDER = 8  # from which on steps are worth more than what they cost, in most loops
+_ORDER = 10  # from which on steps are worth more than what they cost, in most loops
 _STEPS = 250  # of the explicit pair, before Taylor's method is tried
 _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many each time
 
