@@ -31,7 +31,7 @@ from .diagram.program import Program
 from .diagram.schedule import Schedule
 from .equations.blocks import Equations, equations
 from .lower import Lowered, lower
-from .purity.captured import Constants
+from .purity.captured import CapturedValues
 
 _RESOLVING = threading.Lock()
 
@@ -63,8 +63,8 @@ class Reading:
         return lower(self.schedule, self.program, 1, self.equations)
 
     @cached_property
-    def _constants(self) -> Constants:
-        return Constants(self.schedule.captured)
+    def _captured(self) -> CapturedValues:
+        return CapturedValues(self.schedule.captured)
 
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the vector `p` of shape (k,) that the program takes."""
@@ -101,7 +101,7 @@ class Reading:
 
     def _check_captured(self) -> None:
         """Refuse another value of what functions read from around them."""
-        other = self._constants.changed()
+        other = self._captured.changed()
         if other is not None:
             raise UsageError(
                 f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "

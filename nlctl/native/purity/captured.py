@@ -72,7 +72,7 @@ def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
         yield noted(given, name, getattr(given, name))
 
 
-class Constants:
+class CapturedValues:
     """Values that a program has as constants; most are seen at once to be the same objects."""
 
     def __init__(self, notes: Iterable[Captured]) -> None:
