@@ -6,54 +6,31 @@ controller itself by ``tests/blocks/test_controller_guide.py``; importing this t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 __all__ = ["GUIDES", "ControllerGuide", "rows_of"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class ControllerGuide:
-    """What one controller is for.
+    """What one controller is for."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called here.
-    plant : str
-        Class of plants that it is made for.
-    measured : tuple of str
-        Its inputs, for a plant of order 2 where the order is free.
-    known : str
-        What has to be known of the plant, actuator and reference.
-    proved : str
-        What is proved of the loop, and by whom.
-    proof : str
-        Name of the kind of certificate that `nlctl.analysis.lyapunov.certify` finds for its loops;
-        empty if there is none.
-    states, parameters : int
-        How many the controller has with these defaults: every state is an integrator.
-    time : float or None
-        Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``);
-        None where it does not fit that loop.
-    code : str
-        One line that makes it.
-    instead : tuple of str
-        Names of `nlctl` that may replace a piece of it.
-    """
-
-    name: str
-    plant: str
-    measured: tuple[str, ...]
-    known: str
-    proved: str
+    name: str  # What it is called here.
+    plant: str  # Class of plants that it is made for.
+    measured: tuple[str, ...]  # Its inputs, for a plant of order 2 where the order is free.
+    known: str  # What has to be known of the plant, actuator and reference.
+    proved: str  # What is proved of the loop, and by whom.
+    # Name of the kind of certificate that `nlctl.analysis.lyapunov.certify` finds for its loops;
+    # empty if there is none.
     proof: str = ""
-    states: int
+    states: int  # How many the controller has with these defaults: every state is an integrator.
     parameters: int
+    # Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``); None
+    # where it does not fit that loop.
     time: float | None
-    code: str
-    instead: tuple[str, ...] = ()
+    code: str  # One line that makes it.
+    instead: tuple[str, ...] = ()  # Names of `nlctl` that may replace a piece of it.
 
 
 _CLASS_1 = "pure-feedback (1), any order"

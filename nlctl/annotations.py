@@ -52,7 +52,11 @@ def as_annotated(function: _F) -> _F:
         reported: Any = function
         reported.__init__ = reporting(reported.__init__, reported.__name__)
         return reported
-    return reporting(function, function.__name__)
+    from .attributes import with_returned
+
+    called = reporting(function, function.__name__)
+    called.__doc__ = with_returned(function)
+    return called
 
 
 def reporting(

@@ -293,10 +293,8 @@ register_tuning(app)
 
 
 def main() -> None:
-    """Run the command line; what the user can put right ends in one sentence and exit code 2.
-
-    An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
-    """
+    """Run the command line; what the user can put right ends in one sentence and exit code 2."""
+    # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     from nlctl.errors import DivergedError, UsageError
 
     try:

@@ -391,11 +391,9 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
-    """Print what differs, one thing a line; return whether nothing does.
-
-    Two runs are compared by their results where one of them has no report.  The folder of a run
-    has to be whole.
-    """
+    """Print what differs, one thing a line; return whether nothing does."""
+    # Two runs are compared by their results where one of them has no report. The folder of a run
+    # has to be whole.
     from ..report.compare import compare_contents
     from ..studies import origin_differences, run_differences
     from ..studies.differences import long_table_differences

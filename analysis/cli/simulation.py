@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from nlctl.attributes import described_record
 
-@dataclass(frozen=True, kw_only=True)
+
+@described_record
 class Simulated:
-    """A loop, what was set of it, and its run.
-
-    Attributes
-    ----------
-    loop : control.InputOutputSystem
-    response : Response
-    params, start : dict
-        Parameters and initial states that were set.
-    """
+    """A loop, what was set of it, and its run."""
 
     loop: Any
     response: Any
-    params: Mapping[str, Any]
-    start: Mapping[str, float]
+    params: Mapping[str, Any]  # Parameters and initial states that were set.
+    start: Mapping[str, float]  # Parameters and initial states that were set.
 
 
 def simulated(

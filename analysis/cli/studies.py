@@ -267,10 +267,8 @@ def run_folder(study: Path) -> Path:
 def _saying_how_to_resume(
     study: Path, options: list[str], folder: Path, resume: bool, json: bool
 ) -> Iterator[None]:
-    """Print the command that resumes, where a run ends early and may be continued.
-
-    It resumes from the moment on at which the folder holds the study; before, it begins.
-    """
+    """Print the command that resumes, where a run ends early and may be continued."""
+    # It resumes from the moment on at which the folder holds the study; before, it begins.
     kept = folder / "study.toml"
     is_taken = kept.exists() and not resume  # by a run that is there already: it is refused
     try:

@@ -98,11 +98,9 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
 
 
 def trace_of(error: BaseException) -> str:
-    """Return what is printed of an error that is not a mistake of usage.
-
-    Where it comes from a function of the user's, that is its kind, its message and the lines of
-    the user's files; otherwise the whole trace.
-    """
+    """Return what is printed of an error that is not a mistake of usage."""
+    # Where it comes from a function of the user's, that is its kind, its message and the lines of
+    # the user's files; otherwise the whole trace.
     frames = traceback.extract_tb(error.__traceback__)
     users = [frame for frame in frames if _is_users(Path(frame.filename))]
     if not users:

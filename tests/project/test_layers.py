@@ -9,7 +9,7 @@ import pytest
 from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    ["nlctl._version", "nlctl.host", "nlctl.upstream"],
+    ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
     + ["nlctl.equations", "nlctl.annotations"],
     [
