@@ -89,6 +89,35 @@ class PaperFigure:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class MovedLoop:
+    """What the reader of a page that runs may move of an example.
+
+    Attributes
+    ----------
+    make : callable
+        Returns the diagram, with faults that may be switched on.
+    call : str
+        The Python that makes it.
+    until, step : float
+        Of the run (s).
+    names : tuple of str
+        Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
+    signals : tuple of str or of lists of str
+        What is drawn, a row each; all outputs where it is empty.
+    requirements : tuple of (str, str)
+        What the page watches, as study files have it, and what it means.
+    """
+
+    make: Callable[[], Any]
+    call: str
+    until: float
+    step: float = 0.01
+    names: tuple[str, ...] = ()
+    signals: tuple[str | list[str], ...] = ()
+    requirements: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Part:
     """One example of a paper on its page.
 
@@ -111,6 +140,8 @@ class Part:
         Name, as printed, as used, remark; the third is filled in from the blocks by name.
     items : callable, optional
         ``items(runs)``, what else stands behind its figures.
+    moved : MovedLoop, optional
+        What a page that runs moves.
     """
 
     key: str
@@ -123,6 +154,7 @@ class Part:
     more: str = "More figures"
     parameters: tuple[tuple[str, str, str, str], ...] = ()
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
+    moved: MovedLoop | None = None
 
 
 @described_record(eq=False)
