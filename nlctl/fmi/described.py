@@ -23,31 +23,17 @@ _REALS = {"Real", "Float64"}
 
 @dataclass(frozen=True, kw_only=True)
 class Described:
-    """An FMU as its description has it.
-
-    Attributes
-    ----------
-    path : Path
-    kind : str
-        ``"ModelExchange"`` or ``"CoSimulation"``.
-    version : int
-        Of FMI: 2 or 3.
-    whole : fmpy.model_description.ModelDescription
-    inputs, outputs, parameters, states : tuple
-        FMPy's variables; no states in Co-Simulation.
-    keeps_states : bool
-        Whether its state can be read and written as a whole.
-    """
+    """An FMU as its description has it."""
 
     path: Path
-    kind: str
-    version: int
+    kind: str  # ``"ModelExchange"`` or ``"CoSimulation"``
+    version: int  # of FMI: 2 or 3
     whole: Any
-    inputs: tuple[Any, ...]
+    inputs: tuple[Any, ...]  # FMPy's variables; no states in Co-Simulation
     outputs: tuple[Any, ...]
     parameters: tuple[Any, ...]
     states: tuple[Any, ...]
-    keeps_states: bool
+    keeps_states: bool  # whether its state can be read and written as a whole
 
     @property
     def own(self) -> Any:

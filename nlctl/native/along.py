@@ -26,23 +26,14 @@ _ONCE = threading.Lock()  # of several threads that need it one compiles
 
 @dataclass(frozen=True, kw_only=True)
 class Along:
-    """Machine code of derivatives, and what it takes as parameters.
+    """Machine code of derivatives, and what it takes as parameters."""
 
-    Attributes
-    ----------
-    point : callable
-        ``point(t, x, u, c)``, once for each point.
-    function : callable
-        ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
-        `v` has the rows of the states, the inputs, and time.
-    c : ndarray of shape (rows, DIRECTIONS)
-    elimination : Elimination
-        How linear equations with the Jacobian matrix of the states are solved.
-    """
-
-    point: Any
+    point: Any  # ``point(t, x, u, c)``, once for each point
+    # ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
+    # `v` has the rows of the states, the inputs, and time
     function: Any
-    c: np.ndarray
+    c: np.ndarray  # shape (rows, DIRECTIONS)
+    # how linear equations with the Jacobian matrix of the states are solved
     elimination: Elimination
 
     @property

@@ -42,7 +42,7 @@ def simulate_discrete(
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
         n = _loop()(*code.entries, each, columns, c, states, outputs, g, m)
     code.check(c)
-    return outputs[:n, :, 0].T, states[:n, :, 0].T
+    return outputs[:n, :, 0].T.copy(), states[:n, :, 0].T.copy()
 
 
 def compile_discrete() -> None:

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..delays.variation import Variation
 from ..errors import ParameterError
-from ..sampling.clock import Instants
 from .along import derivatives
 from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from .compiled import Compiled
@@ -26,15 +25,16 @@ from .integrate.methods.lu import WHOLE
 from .integrate.methods.stiff import DIFFERENCES, EXACT, stiff_method
 from .integrate.methods.tableau import Tableau, pair_of
 from .integrate.methods.taylor import OTHER_METHOD, SLOPES
-from .integrate.samples import Ticks, Timed
+from .integrate.samples import Timed
 from .integrate.state import DERIVATIVES, EXPLICIT, RUNNING, Status
-from .integrate.workspace import Task, new_work
+from .integrate.workspace import Task
 from .integrators import integrators
-from .laid import laid_out
-from .machine.evaluations import Machine, machine
+from .laid import laid_out, ticks_of
+from .machine.evaluations import machine
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run
 from .settings import METHODS, Settings
+from .spare import give_back, workspace
 from .taylor.method import with_taylor
 from .taylor.turns import turned, with_turns
 from .timed.ahead import ahead
@@ -72,8 +72,10 @@ def trajectory(
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
         outputs = finish(run)
-    found = replace(made(run, outputs, 0), happened=happened(compiled, run))
-    return at_its_end(run, found)
+    reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
+    reached = at_its_end(run, reached)
+    give_back(compiled.cache, run.spare)
+    return reached
 
 
 def _sampled(
@@ -124,6 +126,8 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     """
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
+    if np.all(run.lanes["status"] >= 0):  # all are over
+        return run
     lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
     if not len(lanes):
         return go_on(run, probe)
@@ -173,7 +177,7 @@ def prepared(
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method, terms = _method(compiled, settings), ()
-    due = instants_of(compiled.schedule, program, times, p)
+    due = instants_of(read, program, times, p) if program.clocks else []
     code = machine(compiled, p, count, [what for one in due for what in one.patterns])
     of_program, c = laid_out(compiled, code), np.zeros((code.rows, count))
     code.prepare(np.ascontiguousarray(p), c)
@@ -195,21 +199,20 @@ def prepared(
             **ahead(code.lowered.timed, p, times, settings.max_step),
             opaque=float(np.ptp(times)) / _PLACES if code.lowered.calls else 0.0,
         ),
-        clocks=_clocks(compiled, code, due),
+        clocks=of_program.clocks or ticks_of(compiled.program, code, due),
         resets=of_program.resets,
-        lines=lines_of(compiled, p, varied, code.signal_entry),
+        lines=of_program.lines or lines_of(compiled, p, varied, code.signal_entry),
     )
     if method == "taylor":
         task, terms = with_taylor(task, compiled, p, settings)
-    work = new_work(
-        x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"], len(read.outputs),
-        code.lowered.rows["s"], len(program.guards), len(read.lines),
+    spare = workspace(
+        compiled.cache, x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"],
+        len(read.outputs), code.lowered.rows["s"], len(program.guards), len(read.lines),
         SLOPES if terms else settings.pair.stages, terms or (1, 0),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
-    work.lanes["stiff"] = method == "rodas5p"
-    work = with_past(compiled, task, work, p)
-    return Run(machine=code, task=task, work=work)
+    spare.work.lanes["stiff"] = method == "rodas5p"
+    return Run(machine=code, task=task, work=with_past(compiled, task, spare.work, p), spare=spare)
 
 
 def _bounds(settings: Settings) -> dict[str, Any]:
@@ -230,23 +233,3 @@ def _method(compiled: Compiled, settings: Settings) -> str | Tableau:
             f"method={settings.method!r}"
         )
     return "tsit5"
-
-
-def _clocks(compiled: Compiled, code: Machine, due: list[Instants]) -> Ticks:
-    """Return when something happens to sampled blocks of each lane, and what."""
-    sampled, places = compiled.program.sampled, {what: k for k, what in enumerate(code.meetings)}
-    ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
-    which = np.zeros(ticks.shape, dtype=np.int64)
-    for lane, one in enumerate(due):
-        functions = np.array([places[what] for what in one.patterns], dtype=np.int64)
-        ticks[lane, : one.times.size] = one.times
-        which[lane, : one.times.size] = functions[one.which] if one.times.size else 0
-    written = np.zeros((max(len(code.samples), 1), len(sampled)), dtype=np.int64)
-    for k in range(len(code.samples)):
-        for store in code.lowered.functions[f"sample{k}"].plan.stores:
-            if store.array == "s":
-                written[k, store.row : store.row + store.size] = 1
-    return with_table(
-        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
-        states=np.array(sampled, dtype=np.int64),
-    )  # fmt: skip

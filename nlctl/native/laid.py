@@ -7,12 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..responses.watched import Watched
+from ..sampling.clock import Instants, instants
 from .diagram.program import Program
+from .histories import lines_of
+from .integrate.delayed import DelayLines
 from .integrate.events.functions import EventRows
 from .integrate.memory import with_table
 from .integrate.methods.lu import WHOLE
 from .integrate.methods.stiff import UNKNOWN, StiffMethod, stiff_method
 from .integrate.resets import Resets
+from .integrate.samples import Ticks
 from .machine.evaluations import Machine
 from .reading import Reading
 
@@ -24,19 +28,25 @@ class Laid(NamedTuple):
     rows: EventRows
     resets: Resets
     stiff: StiffMethod  # before it is known what derivatives there are
+    clocks: Ticks | None  # of a program without sampled blocks
+    lines: DelayLines | None  # of one without delays
 
 
 def laid_out(reading: Reading, code: Machine) -> Laid:
     """Return what tasks with this machine code have."""
-    return reading.cache.found(
-        Laid,
-        lambda each: each.code is code,
-        lambda: Laid(
-            code=code,
-            rows=_rows(reading.program, code, reading.schedule.watched),
-            resets=_resets(reading.program, code),
-            stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
-        ),
+    return reading.cache.found(Laid, lambda each: each.code is code, lambda: _laid(reading, code))
+
+
+def _laid(reading: Reading, code: Machine) -> Laid:
+    program, width, lines = reading.program, code.width, reading.schedule.lines
+    nothing = [instants({}, 0.0, 0.0)] * width
+    return Laid(
+        code=code,
+        rows=_rows(program, code, reading.schedule.watched),
+        resets=_resets(program, code),
+        stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
+        clocks=None if program.clocks else ticks_of(program, code, nothing),
+        lines=None if lines else lines_of(reading, np.zeros((0, width)), [], code.signal_entry),
     )
 
 
@@ -68,3 +78,23 @@ def _resets(program: Program, code: Machine) -> Resets:
         states=np.array(rows, dtype=np.int64),
         owned=np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
     )
+
+
+def ticks_of(program: Program, code: Machine, due: list[Instants]) -> Ticks:
+    """Return when something happens to sampled blocks of each lane, and what."""
+    sampled, places = program.sampled, {what: k for k, what in enumerate(code.meetings)}
+    ticks = np.full((len(due), max(one.times.size for one in due)), np.inf)
+    which = np.zeros(ticks.shape, dtype=np.int64)
+    for lane, one in enumerate(due):
+        functions = np.array([places[what] for what in one.patterns], dtype=np.int64)
+        ticks[lane, : one.times.size] = one.times
+        which[lane, : one.times.size] = functions[one.which] if one.times.size else 0
+    written = np.zeros((max(len(code.samples), 1), len(sampled)), dtype=np.int64)
+    for k in range(len(code.samples)):
+        for store in code.lowered.functions[f"sample{k}"].plan.stores:
+            if store.array == "s":
+                written[k, store.row : store.row + store.size] = 1
+    return with_table(
+        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        states=np.array(sampled, dtype=np.int64),
+    )  # fmt: skip

@@ -10,18 +10,20 @@ from __future__ import annotations
 
 import operator
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from types import BuiltinFunctionType, FunctionType, MethodType, NoneType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..diagrams import Apart, override
+from ..diagrams import Apart, initial_state, override
 from ..diagrams.third_party import own_attributes
 from ..errors import UsageError
 from ..names import Parameters
+from ..responses.time_response import Labels, labels_of
 from ..upstream.control_internals import RESOLVED
 from .cache import Cache
 from .diagram.parameters import packed
@@ -29,7 +31,7 @@ from .diagram.program import Program
 from .diagram.schedule import Schedule
 from .equations.blocks import Equations, equations
 from .lower import Lowered, lower
-from .purity.captured import changed
+from .purity.captured import CapturedValues
 
 _RESOLVING = threading.Lock()
 
@@ -60,15 +62,24 @@ class Reading:
         """The plan of a program for one member."""
         return lower(self.schedule, self.program, 1, self.equations)
 
+    @cached_property
+    def _captured(self) -> CapturedValues:
+        return CapturedValues(self.schedule.captured)
+
     def parameter_vector(self, params: Mapping[str, Any] | None = None) -> np.ndarray:
         """Return the vector `p` of shape (k,) that the program takes."""
+        return self.resolved(params).p.copy()
+
+    def resolved(self, params: Mapping[str, Any] | None = None) -> Resolved:
+        """Return what a run takes of the diagram as it is now."""
+        given = [*(params or {}), *(params or {}).values()]
         with _RESOLVING:  # python-control keeps what it has resolved in the blocks
-            now = None if self.apart is None else standing(self.apart, params)
-            known = self.cache.of(_Resolved)
-            if now is not None and known and known[0].stands(self.apart, now):
+            last = self.cache.of(Resolved)
+            if last and self.apart is not None and last[0].stands(self.apart, given):
                 self._check_captured()
-                return known[0].p.copy()
-            known.clear()
+                return last[0]
+            last.clear()
+            views = None if self.apart is None else standing(self.apart, params)
             if self.apart is not None and not self.apart.refreshed():
                 raise UsageError(
                     f"'{self.system.name}' has other blocks than when it was compiled: compile "
@@ -77,13 +88,20 @@ class Reading:
             self._check_captured()
             override(self.schedule.system, params)
             p = packed(self.schedule.holders, self.program.layout, self.program.fixed)
-            if self.apart is not None and now is not None:
-                known.append(_Resolved(now, handed(self.apart), p.copy()))
-            return p
+            now = Resolved(
+                p=p,
+                system=self.system,
+                given=given,
+                handed=[] if self.apart is None else handed(self.apart),
+                views=views or [],
+            )
+            if views is not None:
+                last.append(now)
+            return now
 
     def _check_captured(self) -> None:
         """Refuse another value of what functions read from around them."""
-        other = changed(self.schedule.captured)
+        other = self._captured.changed()
         if other is not None:
             raise UsageError(
                 f"'{other.title}' was {_short(other.then)} when '{self.system.name}' was "
@@ -92,16 +110,40 @@ class Reading:
             )
 
 
-class _Resolved(NamedTuple):
-    """What parameters hung on when they were last resolved, and what came of it."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Resolved:
+    """What runs take of a diagram, until something that it hangs on is another object."""
 
-    now: list[Any]
-    handed: list[Any]  # to the equations
     p: np.ndarray
+    system: Any
+    given: list[Any]  # names and values of overrides
+    handed: list[Any]  # to the equations
+    views: Sequence[Collection[Any]]  # of all that is looked at: what they have now
+    sizes: list[int] = field(init=False)
+    things: list[Any] = field(init=False)  # and what they had when it was resolved
 
-    def stands(self, own: Any, now: list[Any]) -> bool:
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sizes", list(map(len, self.views)))
+        object.__setattr__(self, "things", list(chain.from_iterable(self.views)))
+
+    def stands(self, copies: Apart, given: list[Any]) -> bool:
         """Whether the same would come of it again, and is what the equations have."""
-        return _are_same(self.now, now) and _are_same(self.handed, handed(own))
+        return (
+            self.sizes == list(map(len, self.views))
+            and all(map(operator.is_, self.things, chain.from_iterable(self.views)))
+            and _are_same(self.given, given)
+            and _are_same(self.handed, handed(copies))
+        )
+
+    @cached_property
+    def initial_state(self) -> np.ndarray:
+        """The blocks' own initial states, shape (nstates,)."""
+        return initial_state(self.system)
+
+    @cached_property
+    def labels(self) -> Labels:
+        """Names of the states, and where the outputs come from."""
+        return labels_of(self.system)
 
 
 def _are_same(then: list[Any], now: list[Any]) -> bool:
@@ -129,16 +171,14 @@ class _CanChange(Exception):  # noqa: N818
     """Something can change and stay the same object."""
 
 
-def standing(copies: Apart, params: Mapping[str, Any] | None) -> list[Any] | None:
-    """Return all that parameters hang on, in an order; None where some can change in place."""
-    # They are what they were if each of it is the same object.
+def standing(copies: Apart, params: Mapping[str, Any] | None) -> Sequence[Collection[Any]] | None:
+    """Return views of all that parameters hang on; None where some can change in place."""
+    # They are what they were if each thing in these is the same object.
     try:
-        things = list(_of_mapping(params or {}))
-        for old, _ in copies.pairs.values():
-            things += _of_system(old)
+        _check_fixed((params or {}).values())
+        return [view for old, _ in copies.pairs.values() for view in _of_system(old)]
     except _CanChange:
         return None
-    return things
 
 
 def handed(copies: Apart) -> list[Any]:
@@ -146,36 +186,31 @@ def handed(copies: Apart) -> list[Any]:
     return [vars(new).get(name) for _, new in copies.pairs.values() for name in RESOLVED]
 
 
-def _of_system(system: Any) -> Iterator[Any]:
+def _of_system(system: Any) -> Iterator[Collection[Any]]:
     kind = getattr(type(system), "nlctl_base", type(system))
     if kind.__module__.partition(".")[0] not in _KNOWN:
         raise _CanChange  # as a class of others may say
-    kept = own_attributes(system) - {"syslist"}
+    yield vars(system).values()
+    passing = own_attributes(system) - {"syslist"} | _READ_ONCE
     for name, value in vars(system).items():
-        if name in kept:
-            continue
-        yield value
-        if type(value) in _FIXED or name in _READ_ONCE:
-            continue
         if name == "syslist":
-            yield from value
-        elif isinstance(value, dict):
+            yield value
+        elif isinstance(value, dict) and name not in passing:
             yield from _of_mapping(value)
-        else:
-            raise _CanChange
+        elif name not in passing:
+            _check_fixed([value])
 
 
-def _of_mapping(values: Mapping[str, Any]) -> Iterator[Any]:
-    yield len(values)
-    for value in values.values():
-        if not is_fixed(value):
-            raise _CanChange
-    yield from values
-    yield from values.values()
+def _of_mapping(values: Mapping[str, Any]) -> Iterator[Collection[Any]]:
+    _check_fixed(values.values())
+    yield from (values.keys(), values.values())
     if isinstance(values, Parameters):
-        yield from values.strays
-        yield from values.owners.values()
-        yield from (values.scope, values.table, len(values.clashes))
+        yield from (values.strays, values.owners.values(), values.clashes, vars(values).values())
+
+
+def _check_fixed(values: Iterable[Any]) -> None:
+    if not all(map(is_fixed, values)):
+        raise _CanChange
 
 
 def is_fixed(value: Any) -> bool:

@@ -22,6 +22,7 @@ from .compiled import Compiled, with_watched
 from .driver import trajectory
 from .integrate.state import Status
 from .own_errors import own_error
+from .reading import Resolved
 from .results import Trajectory
 from .settings import Settings
 
@@ -46,71 +47,76 @@ def respond(
     """Integrate a compiled diagram; see `nlctl.input_output_response` for the arguments."""
     system = compiled.system
     compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
-    wanted = evaluation_array(evaluation_times, times)
-    u, x0 = input_array(system, inputs, times), state_array(system, initial_state)
-    grid = times if wanted is times else _grid(system, times, wanted)
+    evaluated = evaluation_array(evaluation_times, times)
+    u, resolved = input_array(system, inputs, times), compiled.resolved(params)
+    x0 = (
+        resolved.initial_state.copy()
+        if initial_state is None
+        else state_array(system, initial_state)
+    )
+    grid = times if evaluated is times else _grid(system, times, evaluated)
     if grid is not times:
         u = interpolated(u, times, grid)
-    p = compiled.parameter_vector(params)
+    p = resolved.p
     check_numbers(watched, (float(grid[0]), x0, u[:, 0]), params)
-    made = trajectory(compiled, grid, u, x0, p, settings, progress)
+    reached = trajectory(compiled, grid, u, x0, p, settings, progress)
     trial = Trial(
-        time=made.time, states=made.states, inputs=made.inputs, p=p, params=params, width=1
+        time=reached.time, states=reached.states, inputs=reached.inputs, p=p, params=params, width=1
     )
     compare(compiled, trial, audit)
-    run = made.statistics
+    run = reached.statistics
     if run.status is Status.STOPPED and not ignore_errors:
         # whoever takes it for an error continues
-        raise KeyboardInterrupt(_message(compiled, made, p, params))
+        raise KeyboardInterrupt(_message(compiled, reached, p, params))
     ended = run.status is Status.ENDED
-    failed = failure(compiled, made, p, params)
+    failed = failure(compiled, reached, p, params)
     if failed is not None and not ignore_errors:
-        raised = own_error(compiled, made, params) if run.status is Status.DIVERGED else None
+        raised = own_error(compiled, reached, params) if run.status is Status.DIVERGED else None
         raise raised or failed
     shown: Any = slice(None)
-    if grid is not wanted:
-        shown = np.isin(made.time, wanted)
+    if grid is not evaluated:
+        shown = np.isin(reached.time, evaluated)
         shown[-1:] |= ended
     message = None if failed is None else str(failed)
-    return _response(compiled, made, shown, (params, form, message))
+    return _response(resolved, reached, shown, (params, form, message))
 
 
 def failure(
-    compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
+    compiled: Compiled, reached: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
 ) -> DivergedError | None:
     """Return why a run has not reached its last time, if it has not."""
-    run, guards = made.statistics, compiled.program.guards
+    run, guards = reached.statistics, compiled.program.guards
     if run.status is Status.ENDED:
-        return not_a_number(made.happened)
+        return not_a_number(reached.happened)
     if run.status is Status.OK:
         return None
-    if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
-        block = compiled.schedule.nodes[guards[made.culprit]].path
+    if reached.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
+        block = compiled.schedule.nodes[guards[reached.culprit]].path
         if run.status is Status.ZENO:
-            return ZenoError.of(block, limit_of(_falls(compiled, made), made.since))
-        if not np.isfinite(made.guard):
+            return ZenoError.of(block, limit_of(_falls(compiled, reached), reached.since))
+        if not np.isfinite(reached.guard):
             why = f"block '{block}' has a guard that is NaN at t = {run.time:.6g} s"
             return DivergedError(why, run.time)
     kind = ChatteringError if run.status is Status.CHATTERING else DivergedError
-    return kind(_message(compiled, made, p, params), run.time)
+    return kind(_message(compiled, reached, p, params), run.time)
 
 
-def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
+def _falls(compiled: Compiled, reached: Trajectory) -> list[float]:
     """Return when the guard has fallen that has ended a run."""
     guards = compiled.program.guards
-    own = [k for k, block in enumerate(guards) if block == guards[made.culprit]]
-    path = compiled.schedule.nodes[guards[made.culprit]].path
-    name = "guard" if len(own) == 1 else f"guard {own.index(made.culprit) + 1}"
-    return made.happened.times(path, name).tolist()
+    alike = [k for k, block in enumerate(guards) if block == guards[reached.culprit]]
+    path = compiled.schedule.nodes[guards[reached.culprit]].path
+    name = "guard" if len(alike) == 1 else f"guard {alike.index(reached.culprit) + 1}"
+    return reached.happened.times(path, name).tolist()
 
 
-def _grid(system: ct.InputOutputSystem, times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the times of a run with inputs at `times` that is `wanted` at other times."""
+def _grid(system: ct.InputOutputSystem, times: np.ndarray, evaluated: np.ndarray) -> np.ndarray:
+    """Return the times of a run with inputs at `times` that is evaluated at other times."""
     # A sampled system starts with the first of these; in between inputs are linear, and have their
     # break points where they were given.
     if system.isdtime(strict=True):
-        return wanted
-    return np.union1d(times if system.ninputs else times[[0, -1]], wanted)
+        return evaluated
+    return np.union1d(times if system.ninputs else times[[0, -1]], evaluated)
 
 
 @as_annotated
@@ -145,9 +151,9 @@ def uninterrupted(response: Any) -> Any:
 
 
 def _message(
-    compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
+    compiled: Compiled, reached: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
 ) -> str:
-    run = made.statistics
+    run = reached.statistics
     what = {
         Status.DIVERGED: "diverged: no finite state after",
         Status.STEP_LIMIT: "stopped at the limit of steps at",
@@ -156,40 +162,39 @@ def _message(
         Status.ZENO: "jumps without end before",
         Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
     }
-    told = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
+    sentence = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
     if run.status in (Status.DIVERGED, Status.STEP_TOO_SMALL):
-        return told + _grown(compiled, made)
+        return sentence + _grown(compiled, reached)
     if run.jump is None:
-        return told
-    return f"{told}: {chattering_words(compiled, p, params, run.jump)}"
+        return sentence
+    return f"{sentence}: {chattering_words(compiled, p, params, run.jump)}"
 
 
-def _grown(compiled: Compiled, made: Trajectory) -> str:
+def _grown(compiled: Compiled, reached: Trajectory) -> str:
     """Say which state was large at the last time at which all of them were finite."""
-    finite = np.flatnonzero(np.isfinite(made.states).all(axis=0))
-    if not finite.size or not made.states.size:
+    finite = np.flatnonzero(np.isfinite(reached.states).all(axis=0))
+    if not finite.size or not reached.states.size:
         return ""
     k = int(finite[-1])
-    i = int(np.argmax(np.abs(made.states[:, k])))
-    if not abs(made.states[i, k]) > _LARGE:
+    i = int(np.argmax(np.abs(reached.states[:, k])))
+    if not abs(reached.states[i, k]) > _LARGE:
         return ""
     name = state_names(compiled.system)[i]
-    return f"; state '{name}' is {made.states[i, k]:.3g} at t = {made.time[k]:.6g} s"
+    return f"; state '{name}' is {reached.states[i, k]:.3g} at t = {reached.time[k]:.6g} s"
 
 
 def _response(
-    compiled: Compiled,
-    made: Trajectory,
+    resolved: Resolved,
+    reached: Trajectory,
     shown: np.ndarray | slice,
-    told: tuple[Mapping[str, Any] | None, Mapping[str, Any], str | None],
+    more: tuple[Mapping[str, Any] | None, Mapping[str, Any], str | None],
 ) -> Response:
-    system, run, (params, form, message) = compiled.system, made.statistics, told
-    inputs = made.inputs[: system.ninputs or 0]
-    signals = (made.time, made.outputs, made.states, inputs)
+    system, (params, form, message) = resolved.system, more
+    inputs = reached.inputs[: system.ninputs or 0]
+    signals = (reached.time, reached.outputs, reached.states, inputs)
     response = response_of(
-        system, [x[..., shown].copy() for x in signals], params, form,
+        system, [x[..., shown] for x in signals], params, form, resolved.labels,
         success=message is None, message=message,
     )  # fmt: skip
-    response.statistics = run
-    response.happened = made.happened
+    response.statistics, response.happened = reached.statistics, reached.happened
     return response

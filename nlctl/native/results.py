@@ -69,15 +69,7 @@ class Trajectory:
 
 def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
     """Return what became of one member."""
-    lane, times, states, outputs = (
-        run.lanes[j],
-        run.task.times,
-        run.work.samples[:, :, j],
-        outputs[:, :, j],
-    )
-    if lane["resumes"]:  # a run that resumes there takes the sample
-        states = states.copy()
-        states[-1] = run.work.resume[:, j]
+    lane, times, outputs = run.lanes[j], run.task.times, outputs[:, :, j]
     status, reached = Status(int(lane["status"])), float(lane["t"])
     done = times.size if status is Status.OK else int(np.searchsorted(times, reached, "right"))
     if status is Status.OK and not np.all(np.isfinite(outputs)):
@@ -94,10 +86,13 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         opaque=bool(run.task.timed.opaque),
         turns=int(lane["turns"]),
     )
+    states = run.work.samples[:done, :, j].T.copy()  # the next run may have the memory of this one
+    if lane["resumes"]:  # a run that resumes there takes the sample
+        states[:, times.size - 1 :] = run.work.resume[:, j : j + 1]
     return Trajectory(
-        time=times[:done],
-        outputs=outputs[:done].T,
-        states=states[:done].T,
+        time=times[:done].copy(),
+        outputs=outputs[:done].T.copy(),
+        states=states,
         statistics=statistics,
         inputs=_every_input(run, j, done),
         culprit=int(lane["culprit"]),
@@ -118,17 +113,17 @@ def _every_input(run: Any, j: int, done: int) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def at_its_end(run: Any, found: Trajectory) -> Trajectory:
+def at_its_end(run: Any, reached: Trajectory) -> Trajectory:
     """Return a single run with the instant at which a function has ended it as its last time."""
+    if reached.statistics.status is not Status.ENDED or run.lanes["t"][0] <= reached.time[-1]:
+        return reached
     t, x, u = (np.ascontiguousarray(v) for v in (run.lanes["t"][:1], run.work.x, run.work.u))
-    if found.statistics.status is not Status.ENDED or t[0] <= found.time[-1]:
-        return found
     y = np.empty((run.work.y.shape[1], x.shape[1]))
     run.machine.out(t, x, u, run.task.p, y)
     return replace(
-        found,
-        time=np.append(found.time, t),
-        outputs=np.column_stack([found.outputs, y[: run.task.outputs]]),
-        states=np.column_stack([found.states, x]),
-        inputs=np.column_stack([found.inputs, u]),
+        reached,
+        time=np.append(reached.time, t),
+        outputs=np.column_stack([reached.outputs, y[: run.task.outputs]]),
+        states=np.column_stack([reached.states, x]),
+        inputs=np.column_stack([reached.inputs, u]),
     )

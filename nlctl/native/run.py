@@ -1,4 +1,4 @@
-"""A run in machine code while it goes: members that are integrated in a batch."""
+"""A run in machine code while it lasts: members that are integrated in a batch."""
 
 from __future__ import annotations
 
@@ -11,31 +11,23 @@ import numpy as np
 from .along import Along
 from .chattering.detection import Jump
 from .machine.evaluations import Machine
+from .spare import Spare
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """Members that are integrated in a batch, and all arrays that this needs.
-
-    Attributes
-    ----------
-    machine : Machine
-    task, work : Task, Work
-        See `integrate.workspace`.
-    along : Along or None
-        Exact derivatives, if the stiff method has asked for them and there are any.
-    jumps : mapping
-        Of members that chatter, by their lanes: where.
-    series : Task or None
-        With Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`.
-    """
+    """Members that are integrated in a batch, and all arrays that this needs."""
 
     machine: Machine
-    task: Any
+    task: Any  # see `integrate.workspace`
     work: Any
+    # exact derivatives, if the stiff method has asked for them and there are any
     along: Along | None = None
+    # of members that chatter, by their lanes: where
     jumps: Mapping[int, Jump] = field(default_factory=dict)
+    # with Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`
     series: Any = None
+    spare: Spare | None = None  # memory that the next run may take when this one is over
 
     @property
     def lanes(self) -> np.ndarray:

@@ -45,30 +45,17 @@ _REFUSED = {  # of the keywords of `solve_ivp` -> what there is instead
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a run is integrated.
+    """How a run is integrated."""
 
-    Attributes
-    ----------
-    rtol, atol : float
-        Tolerances; the error of a step is weighed with atol + rtol |x|.
-    max_steps : int
-        Attempted steps after which a run ends as STEP_LIMIT.
-    method : {"auto", "tsit5", "rodas5p", "taylor"} or Tableau
-        Explicit pair of orders 5(4); stiff method of orders 5(4); Taylor's method, of an order
-        that follows from rtol, for equations that can be written as expressions and have no
-        memories; whichever is faster; an explicit pair of your own as its tableau.
-    step : float
-        Fixed step (s) instead of error control; 0 for error control.
-    max_step : float
-        Longest step (s), under error control too.
-    """
-
-    rtol: float = RTOL
+    rtol: float = RTOL  # tolerances; the error of a step is weighed with atol + rtol |x|
     atol: float = ATOL
-    max_steps: int = 10_000_000_000
+    max_steps: int = 10_000_000_000  # attempted steps after which a run ends as STEP_LIMIT
+    # explicit pair of orders 5(4); stiff method of orders 5(4); Taylor's method, of an order that
+    # follows from rtol, for equations that can be written as expressions and have no memories;
+    # whichever is faster; an explicit pair of your own as its tableau
     method: str | Tableau = "auto"
-    step: float = 0.0
-    max_step: float = np.inf
+    step: float = 0.0  # fixed step (s) instead of error control; 0 for error control
+    max_step: float = np.inf  # longest step (s), under error control too
 
     @property
     def pair(self) -> Tableau:

@@ -22,7 +22,7 @@ from ..responses.arguments import (
     state_array,
 )
 from ..responses.event_log import event_log
-from ..responses.time_response import Response, as_response, response_of
+from ..responses.time_response import Response, as_response, labels_of, response_of
 from ..sampling.system import happening
 from ..sliding.relay import SLIDING
 from ..upstream.control_internals import rates_now
@@ -139,8 +139,9 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     )
     form = {"success": message is None, "message": message}
     response = response_of(
-        system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form, **form
-    )
+        system, (reached, y, x, interpolated(inputs, times, reached)), run.params, run.form,
+        labels_of(system), **form,
+    )  # fmt: skip
     response.happened = event_log(driver.happened)
     return response
 

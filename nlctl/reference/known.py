@@ -17,23 +17,14 @@ def _unbounded(t: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Known:
-    """Conditions of a diagram's equations, as far as these can be read.
+    """Conditions of a diagram's equations, as far as these can be read."""
 
-    Attributes
-    ----------
-    stops : ndarray
-        Times (s) at which conditions of t alone change.
-    longest : callable
-        ``longest(t)``: how long a step from there may be (s), so that nothing that is a function
-        of t alone is stepped over.
-    crossings : callable or None
-        ``crossings(t, x, u)``: numbers that change their sign where other conditions change; u
-        has the inputs of the diagram, and behind them what leaves its delays.
-    labels : list of tuple
-        Block and name of each of these.
-    """
-
+    # times (s) at which conditions of t alone change
     stops: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    # ``longest(t)``: how long a step from there may be (s), so that nothing that is a function of
+    # t alone is stepped over
     longest: Callable[[float], float] = _unbounded
+    # ``crossings(t, x, u)``: numbers that change their sign where other conditions change; u has
+    # the inputs of the diagram, and behind them what leaves its delays
     crossings: Callable[[float, Any, Any], Any] | None = None
-    labels: tuple[tuple[str, str], ...] = ()
+    labels: tuple[tuple[str, str], ...] = ()  # block and name of each of these

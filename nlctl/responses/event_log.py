@@ -17,21 +17,11 @@ _NONE = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True, kw_only=True)
 class EventLog:
-    """Events of a run, in the order of time.
+    """Events of a run, in the order of time."""
 
-    Attributes
-    ----------
-    time : ndarray of shape (n,)
-        When (s).
-    label : ndarray of int, shape (n,)
-        Which of the labels.
-    labels : tuple of tuple
-        Block, which and direction.
-    """
-
-    time: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    label: np.ndarray = field(default_factory=lambda: _NONE)
-    labels: tuple[_Label, ...] = ()
+    time: np.ndarray = field(default_factory=lambda: np.zeros(0))  # shape (n,): when (s)
+    label: np.ndarray = field(default_factory=lambda: _NONE)  # which of the labels
+    labels: tuple[_Label, ...] = ()  # block, which and direction
 
     def table(self) -> pd.DataFrame:
         """Return the events as rows: time, block, which, direction."""

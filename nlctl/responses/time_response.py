@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import control as ct
 import numpy as np
@@ -24,6 +24,13 @@ _SHOWN = 6  # names that are listed before the rest is only counted
 _ROWS = 4  # signals that have room in a row each
 _BY_KIND = "signals by kind"  # a figure that python-control does not know
 _ROW = 1.2  # in, the least height of a row
+
+
+class Labels(NamedTuple):
+    """Qualified names of a diagram's states, and where its outputs come from."""
+
+    state_names: Sequence[str]
+    wires: Wires
 
 
 class StateLabels(list[str]):
@@ -178,16 +185,20 @@ def _in_text(values: np.ndarray) -> list[str]:
 
 def as_response(response: ct.TimeResponseData, system: Any = None) -> Response:
     """Return python-control's response of a system with what `Response` adds."""
-    made = Response.__new__(Response)
-    made.__dict__.update(response.__dict__)
-    return _with_names(made, system)
+    extended = Response.__new__(Response)
+    extended.__dict__.update(response.__dict__)
+    return _labelled(extended, labels_of(system)) if is_system(system) else extended
 
 
-def _with_names(made: Response, system: Any) -> Response:
+def labels_of(system: Any) -> Labels:
+    """Return where the signals and states of a response of a system come from."""
+    return Labels(state_names=state_names(system), wires=wires_of(system))
+
+
+def _labelled(response: Response, labels: Labels) -> Response:
     """Let a response know where its signals and states come from."""
-    if is_system(system):
-        made.state_names, made.wires = state_names(system), wires_of(system)
-    return made
+    response.state_names, response.wires = labels
+    return response
 
 
 def response_of(
@@ -195,10 +206,11 @@ def response_of(
     signals: Sequence[Any],
     params: Any,
     form: Mapping[str, Any],
+    labels: Labels,
     **more: Any,
 ) -> Response:
     """Return a response of a system."""
-    made = Response(
+    response = Response(
         *signals,
         issiso=system.issiso(),
         params=dict(system.params) | dict(params or {}),
@@ -212,7 +224,7 @@ def response_of(
         return_x=bool(form.get("return_states")),
         **more,
     )
-    return _with_names(made, system)
+    return _labelled(response, labels)
 
 
 def _names(labels: Any) -> str:

@@ -31,25 +31,15 @@ _IS_NAN = " is NaN"
 
 @dataclass(frozen=True, kw_only=True)
 class Watched:
-    """A function that is watched in a run.
+    """A function that is watched in a run."""
 
-    Attributes
-    ----------
-    name : str
-        What a row of `Response.events` calls it.
-    function : callable
-        ``function(t, x, u, params)``, a number: of the time, the states, the inputs and the
-        overrides of the run.
-    direction : int
-        Which changes of its sign count: 1 rising, -1 falling, 0 both, as in SciPy.
-    ends : bool
-        Whether the run ends there.
-    """
-
-    name: str
+    name: str  # what a row of `Response.events` calls it
+    # ``function(t, x, u, params)``, a number: of the time, the states, the inputs and the
+    # overrides of the run
     function: Callable[..., Any]
+    # which changes of its sign count: 1 rising, -1 falling, 0 both, as in SciPy
     direction: int = 0
-    ends: bool = False
+    ends: bool = False  # whether the run ends there
 
     def counts(self, rises: bool) -> bool:
         """Whether a change of sign counts that rises, or falls."""

@@ -1,5 +1,7 @@
 """FMUs: FMPy runs them, and they move as the diagram that they were."""
 
+import ctypes
+import subprocess
 import sys
 import zipfile
 
@@ -313,6 +315,32 @@ def test_a_state_is_kept_and_taken_up_again(written):
     model.setFMUState(model.deserializeFMUState(content))
     assert steps(0.6) == once
     assert len(set(once)) == 20
+
+
+@pytest.mark.weekly  # it compiles a model once more
+def test_wide_registers_compute_the_same_bits(written, tmp_path):
+    """A processor without FMA has the numbers of one that has it."""
+    zipfile.ZipFile(written("example 1")[0]).extractall(tmp_path)
+    folder = tmp_path / "sources"
+    code = [str(folder / name) for name in ("model.c", "wide.c", "tables.c")]
+    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-std=c99"]
+    zig = [*command, "-target", "x86_64-linux-gnu.2.17", *code, "-lm", "-o", tmp_path / "both.so"]
+    subprocess.run(zig, check=True, timeout=120)
+    library = ctypes.CDLL(str(tmp_path / "both.so"))
+    rng, numbers = np.random.default_rng(1), []
+    p = (ctypes.c_double * 88).in_dll(library, "model_parameters")
+    states = rng.normal(size=(200, 31))
+    for name in ("plain", "wide"):
+        c, dx, rest, computed = (np.zeros(n) for n in (1000, 32, 100, (200, 31)))
+        pointers = [ctypes.c_void_p(v.ctypes.data) for v in (rest, c, dx, rest, rest)]
+        getattr(library, f"model_prepare_{name}")(p, pointers[1])
+        for k, x in enumerate(states):
+            at = ctypes.c_double(0.1 * k), ctypes.c_void_p(x.ctypes.data)
+            getattr(library, f"model_rates_{name}")(*at, *pointers)
+            computed[k] = dx[:31]
+        numbers.append(computed)
+    assert np.isfinite(numbers[0]).mean() > 0.9
+    np.testing.assert_array_equal(*numbers)
 
 
 def test_what_the_compiler_refuses_leaves_no_file(tmp_path, monkeypatch):

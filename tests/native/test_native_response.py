@@ -288,3 +288,17 @@ class TestCache:
         """NLCTL_CACHE_DIR goes before the user's cache folder."""
         monkeypatch.setenv("NLCTL_CACHE_DIR", str(tmp_path))
         assert cache_folder() == tmp_path
+
+
+def test_a_run_that_takes_the_memory_of_another_leaves_its_response_alone():
+    """The next run of a loop lays out nothing; what was returned before is not its memory."""
+    compiled, times = nlctl.compile(OSCILLATOR), np.linspace(0.0, 2.0, 21)
+    first = nlctl.input_output_response(compiled, times, 0.0, [1.0, 0.0], return_states=True)
+    for start in ([0.0, 1.0], [3.0, 0.0]):
+        nlctl.input_output_response(compiled, times, 1.0, start)
+        nlctl.input_output_response(compiled, times[:5], 1.0, start)  # memory of another size
+    np.testing.assert_allclose(first.x, [np.cos(times), -np.sin(times)], atol=1e-7)
+    np.testing.assert_array_equal(first.t, times)
+    again = nlctl.input_output_response(compiled, times, 0.0, [1.0, 0.0])
+    np.testing.assert_array_equal(again.x, first.x)
+    assert not np.shares_memory(again.x, first.x)

@@ -14,21 +14,11 @@ from ..zig import zig
 
 @dataclass(frozen=True, kw_only=True)
 class Platform:
-    """A platform that libraries are compiled for.
+    """A platform that libraries are compiled for."""
 
-    Attributes
-    ----------
-    targets : tuple of tuple of str
-        Zig's name and FMI 3.0's name of each processor.
-    folder : str
-        As FMI 2.0 calls it.
-    suffix : str
-        Of libraries.
-    """
-
-    targets: tuple[tuple[str, str], ...]
-    folder: str
-    suffix: str
+    targets: tuple[tuple[str, str], ...]  # Zig's name and FMI 3.0's name of each processor
+    folder: str  # as FMI 2.0 calls it
+    suffix: str  # of libraries
 
 
 PLATFORMS: Mapping[str, Platform] = MappingProxyType({

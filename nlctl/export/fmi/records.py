@@ -11,128 +11,66 @@ from ...native.lower import Lowered
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """What a parameter may be.
+    """What a parameter may be."""
 
-    Attributes
-    ----------
-    low, high : float
-        The bounds, infinite where there are none.
-    open_below, open_above : bool
-        Whether they cannot be attained.
-    may_change : bool
-        Whether an importer may set it: not where the program holds for this value alone.
-    """
-
-    low: float = -np.inf
+    low: float = -np.inf  # the bounds, infinite where there are none
     high: float = np.inf
-    open_below: bool = False
+    open_below: bool = False  # whether they cannot be attained
     open_above: bool = False
+    # whether an importer may set it: not where the program holds for this value alone
     may_change: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable of a model description.
-
-    Attributes
-    ----------
-    name, unit, meaning : str
-    reference : int
-        Value reference.
-    causality, variability, initial : str
-        As FMI has them; `initial` is empty where it has none.
-    start : float or None
-    bounds : Bounds
-    derivative_of : int or None
-        Value reference of the state whose rate it is.
-    reinit : bool
-        Whether an event may make the state jump.
-    """
+    """One variable of a model description."""
 
     name: str
-    reference: int
-    causality: str
+    reference: int  # value reference
+    causality: str  # as FMI has them; `initial` is empty where it has none
     variability: str
     initial: str = ""
     start: float | None = None
     unit: str = ""
     meaning: str = ""
     bounds: Bounds = Bounds()
-    derivative_of: int | None = None
-    reinit: bool = False
+    derivative_of: int | None = None  # value reference of the state whose rate it is
+    reinit: bool = False  # whether an event may make the state jump
 
 
 @dataclass(frozen=True, kw_only=True)
 class Happenings:
-    """When something happens in a model, and which states jump then.
+    """When something happens in a model, and which states jump then."""
 
-    Attributes
-    ----------
-    series : tuple of tuple of int
-        Instants of samples: begin, step and scale of (begin + k step) / scale.
-    meetings : tuple of int
-        Of each function of samples which series it is for, as bits.
-    breaks : tuple of float
-        When conditions of t alone switch (s).
-    known_until : float
-        How long these are known (s).
-    longest : float
-        Longest step that meets all that functions of t alone do (s).
-    """
-
+    # instants of samples: begin, step and scale of (begin + k step) / scale
     series: tuple[tuple[int, int, int], ...]
-    meetings: tuple[int, ...]
-    breaks: tuple[float, ...]
-    known_until: float
-    longest: float
+    meetings: tuple[int, ...]  # of each function of samples which series it is for, as bits
+    breaks: tuple[float, ...]  # when conditions of t alone switch (s)
+    known_until: float  # how long these are known (s)
+    longest: float  # longest step that meets all that functions of t alone do (s)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
-    """A diagram as a model of FMI.
+    """A diagram as a model of FMI."""
 
-    Attributes
-    ----------
-    name : str
-        Its model identifier.
-    meaning : str
-        What the diagram is called.
-    variables : tuple of Variable
-        Time, states, rates, inputs, outputs, event indicators and parameters.
-    places : dict
-        First value reference of each of these kinds.
-    continuous, memory, sampled : tuple of int
-        Places of states.
-    declared : int
-        Number of switching functions that blocks declare, the first of what switches.
-    guards : tuple of int
-        Of each guard the block that it belongs to.
-    jumping : tuple of tuple
-        Of each block with guards its number, and where its states begin and end.
-    parameters, start : ndarray
-        Values of parameters and states.
-    happenings : Happenings
-    lowered : Lowered
-        The plan that the code is written from.
-    tolerance, stop_time : float
-        Of its default experiment.
-    """
-
-    name: str
-    meaning: str
+    name: str  # its model identifier
+    meaning: str  # what the diagram is called
+    # time, states, rates, inputs, outputs, event indicators and parameters
     variables: tuple[Variable, ...]
-    places: dict[str, int]
-    continuous: tuple[int, ...]
+    places: dict[str, int]  # first value reference of each of these kinds
+    continuous: tuple[int, ...]  # places of states
     memory: tuple[int, ...]
     sampled: tuple[int, ...]
-    declared: int
-    guards: tuple[int, ...]
+    declared: int  # number of switching functions that blocks declare, the first of what switches
+    guards: tuple[int, ...]  # of each guard the block that it belongs to
+    # of each block with guards its number, and where its states begin and end
     jumping: tuple[tuple[int, int, int], ...]
-    parameters: np.ndarray
+    parameters: np.ndarray  # values of parameters and states
     start: np.ndarray
     happenings: Happenings
-    lowered: Lowered
-    tolerance: float
+    lowered: Lowered  # the plan that the code is written from
+    tolerance: float  # of its default experiment
     stop_time: float
 
     @property

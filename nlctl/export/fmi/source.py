@@ -15,7 +15,7 @@ from ..words import comment
 from .records import Model
 
 _SHORT = 1e-7  # of the stop time: over which is seen whether a memory reverses
-_SHARED = ("instance.h", "machine.h", "machine.c")
+_SHARED = ("instance.h", "machine.h", "machine.c", "model.c", "wide.c")
 
 
 def sources(model: Model, version: int) -> dict[str, str]:
@@ -25,9 +25,10 @@ def sources(model: Model, version: int) -> dict[str, str]:
         name: (folder / name).read_text(encoding="utf-8")
         for name in (*_SHARED, f"fmi{version}.c")
     }  # fmt: skip
-    source = _source(model)
-    token = hashlib.sha256("".join([source, *shared.values(), __version__]).encode()).hexdigest()
-    return {"model.h": _header(model, _uuid(token)), "model.c": source, **shared}
+    equations, tables = _equations(model), f'#include "model.h"\n\n{_tables(model)}\n'
+    text = "".join([equations, tables, *shared.values(), __version__])
+    header = _header(model, _uuid(hashlib.sha256(text.encode()).hexdigest()))
+    return {"model.h": header, "equations.h": equations, "tables.c": tables, **shared}
 
 
 def token_of(text: dict[str, str]) -> str:
@@ -74,12 +75,22 @@ extern const int model_sampled[N_SAMPLED + 1], model_reset_states[N_RESETS + 1];
 extern const int model_owned[N_GUARDS + 1][N_RESETS + 1];
 extern const double model_a[STAGES - 1][STAGES], model_nodes[STAGES], model_error[STAGES];
 
-void model_prepare(const double p[], double c[]);
-void model_rates(double t, const double x[], const double u[], double c[], double dx[], double g[],
-                 double m[]);
-void model_outputs(double t, const double x[], const double u[], double c[], double y[]);
-void model_sample(int k, double t, const double x[], const double u[], double c[], double s[]);
-void model_reset(double t, const double x[], const double u[], double c[], double s[]);
+#if defined(__x86_64__) && defined(__GNUC__)
+#define HAS_WIDE /* the equations are there for AVX2 and FMA as well: to the bit the same numbers */
+#endif
+
+#define FUNCTIONS(with) \\
+  void model_prepare##with(const double p[], double c[]); \\
+  void model_rates##with(double t, const double x[], const double u[], double c[], double dx[], \\
+                         double g[], double m[]); \\
+  void model_outputs##with(double t, const double x[], const double u[], double c[], double y[]); \\
+  void model_sample##with(int k, double t, const double x[], const double u[], double c[], \\
+                          double s[]); \\
+  void model_reset##with(double t, const double x[], const double u[], double c[], double s[]);
+
+FUNCTIONS()
+FUNCTIONS(_plain)
+FUNCTIONS(_wide)
 
 #endif
 """
@@ -108,8 +119,8 @@ def _sizes(model: Model) -> list[str]:
     return lines
 
 
-def _source(model: Model) -> str:
-    """Return tables and equations."""
+def _equations(model: Model) -> str:
+    """Return what is compiled for any processor, and where it can be for a wide one."""
     module, functions = CModule(), model.lowered.functions
     labels = {
         f"{array}[{i}]": comment(v.name)
@@ -117,10 +128,10 @@ def _source(model: Model) -> str:
         for i, v in enumerate(model.of(kind))
     }
     texts = [function_text(module, name, plan, labels) for name, plan in functions.items()]
-    samples = [name for name in functions if name.startswith("sample")]
     cases = "".join(
         f"    case {name.removeprefix('sample')}: {name}(&t, x, u, c, s); break;\n"
-        for name in samples
+        for name in functions
+        if name.startswith("sample")
     )
     resets = "  reset(&t, x, u, c, s);\n" if "reset" in functions else _UNUSED
     return f"""\
@@ -128,30 +139,30 @@ def _source(model: Model) -> str:
 #include "model.h"
 
 {INCLUDED}
-{_tables(model)}
 {module.text()}
 {chr(10).join(texts)}
-void model_prepare(const double p[], double c[]) {{ prepare(p, c); }}
+void VERSION(model_prepare)(const double p[], double c[]) {{ prepare(p, c); }}
 
-void model_rates(double t, const double x[], const double u[], double c[], double dx[], double g[],
-                 double m[])
+void VERSION(model_rates)(double t, const double x[], const double u[], double c[], double dx[],
+                          double g[], double m[])
 {{
   rhs(&t, x, u, c, dx, g, m);
 }}
 
-void model_outputs(double t, const double x[], const double u[], double c[], double y[])
+void VERSION(model_outputs)(double t, const double x[], const double u[], double c[], double y[])
 {{
   out(&t, x, u, c, y);
 }}
 
-void model_sample(int k, double t, const double x[], const double u[], double c[], double s[])
+void VERSION(model_sample)(int k, double t, const double x[], const double u[], double c[],
+                           double s[])
 {{
 {_UNUSED}  switch (k) {{
 {cases}    default: break;
   }}
 }}
 
-void model_reset(double t, const double x[], const double u[], double c[], double s[])
+void VERSION(model_reset)(double t, const double x[], const double u[], double c[], double s[])
 {{
 {resets}}}
 """

@@ -18,30 +18,17 @@ _STEADY = ("floor", "ceil", "trunc", "rint", "sign", "heaviside")  # they are th
 
 @dataclass(frozen=True, kw_only=True)
 class TimedProgram:
-    """Functions of time alone as ``timed(t, x, u, c, s)`` and ``timed.prepare(p, c)``.
+    """Functions of time alone as ``timed(t, x, u, c, s)`` and ``timed.prepare(p, c)``."""
 
-    Attributes
-    ----------
-    text : str
-        LLVM's IR.
-    rows : int
-        Of `c`.
-    levels : int
-        So many first entries of `s` are constant between the times at which conditions switch.
-    waves : tuple of tuple of (int, int)
-        Of products of sines where the angular frequencies of the factors are, begin and end.
-    pulses : tuple of (int, int)
-        Where functions are that drive the equations, begin and end.
-    size : int
-        Of `s`.
-    """
-
-    text: str
-    rows: int
+    text: str  # LLVM's IR
+    rows: int  # of `c`
+    # so many first entries of `s` are constant between the times at which conditions switch
     levels: int
+    # of products of sines where the angular frequencies of the factors are, begin and end
     waves: tuple[tuple[tuple[int, int], ...], ...]
+    # where functions are that drive the equations, begin and end
     pulses: tuple[tuple[int, int], ...]
-    size: int
+    size: int  # of `s`
 
 
 def timed_program(equations: Equations, layout: Any) -> TimedProgram:

@@ -11,6 +11,8 @@ from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import compress
+from operator import is_, not_
 from types import CellType, CodeType, FunctionType, MethodType
 from typing import Any
 
@@ -70,13 +72,30 @@ def noted_partial(given: functools.partial[Any]) -> Iterator[Captured]:
         yield noted(given, name, getattr(given, name))
 
 
-def changed(values: Iterable[Captured]) -> Captured | None:
-    """Return the first value that is not what it was."""
-    for note in values:
-        now = note.now
-        if now is not note.then and not same(now, note.then):
-            return note
-    return None
+class CapturedValues:
+    """Values that a program has as constants; most are seen at once to be the same objects."""
+
+    def __init__(self, notes: Iterable[Captured]) -> None:
+        every = tuple({(id(n.holder), n.name, id(n.then)): n for n in notes}.values())
+        is_alike = [type(n.holder) is not dict and n.now is n.then for n in every]
+        alike = list(compress(every, is_alike))
+        self.notes, self.others = every, list(compress(every, map(not_, is_alike)))
+        in_cell = "cell_contents"
+        self.names = [in_cell if isinstance(n.holder, CellType) else n.name for n in alike]
+        self.holders = [n.holder for n in alike]
+        self.objects = [n.then for n in alike]
+
+    def changed(self) -> Captured | None:
+        """Return the first value that is not what it was."""
+        try:
+            alike = all(map(is_, map(getattr, self.holders, self.names), self.objects))
+        except (AttributeError, ValueError):  # gone, or a cell that was emptied
+            alike = False
+        notes = self.others if alike else self.notes
+        for note in notes:
+            if (now := note.now) is not note.then and not same(now, note.then):
+                return note
+        return None
 
 
 def recorded(value: object) -> Any:

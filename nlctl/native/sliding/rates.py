@@ -30,46 +30,23 @@ _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Rela
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingInput:
-    """The input of an ideal relay of a diagram.
+    """The input of an ideal relay of a diagram."""
 
-    Attributes
-    ----------
-    name : str
-        Of the relay's block.
-    leaf : Expr
-        What stands for the relay's output.
-    given : Expr
-        The input, an expression.
-    limits : Limits
-        Its parameters.
-    """
-
-    name: str
-    leaf: Expr
-    given: Expr
-    limits: Limits
+    name: str  # of the relay's block
+    leaf: Expr  # what stands for the relay's output
+    given: Expr  # the input, an expression
+    limits: Limits  # its parameters
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """How a diagram moves within a step.
+    """How a diagram moves within a step."""
 
-    Attributes
-    ----------
-    rates : sequence of Expr
-        The derivative of each state; of memories 0.
-    solutions : mapping
-        As `fixed_points` of `nlctl.expressions.derivatives.tangents`.
-    inputs : int
-        Number of the diagram's inputs.
-    behind : int
-        Place, among the program's inputs, from which on their rates follow.
-    """
-
-    rates: Sequence[Expr]
+    rates: Sequence[Expr]  # the derivative of each state; of memories 0
+    # as `fixed_points` of `nlctl.expressions.derivatives.tangents`
     solutions: Mapping[str, Sequence[Expr]]
-    inputs: int = 0
-    behind: int = 0
+    inputs: int = 0  # number of the diagram's inputs
+    behind: int = 0  # place, among the program's inputs, from which on their rates follow
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,36 +18,19 @@ _KEPT = 256  # parameter vectors
 
 @dataclass(frozen=True, kw_only=True)
 class Ahead:
-    """When functions of time alone switch (s), and the longest steps.
+    """When functions of time alone switch (s), and the longest steps."""
 
-    Attributes
-    ----------
-    breaks : ndarray
-        Increasing times.
-    longest : float
-        Half a wave of the fastest sine.
-    reach : ndarray of shape (cells,)
-        See `reach`.
-    """
-
-    breaks: np.ndarray
-    longest: float
-    reach: np.ndarray
+    breaks: np.ndarray  # increasing times
+    longest: float  # half a wave of the fastest sine
+    reach: np.ndarray  # shape (cells,): see `reach`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OfTime:
-    """Functions of time alone in a program.
+    """Functions of time alone in a program."""
 
-    Attributes
-    ----------
-    conditions : Conditions
-        What the program switches at.
-    known : dict
-        What has been found of them, by the times of a run and the parameters that they depend on.
-    """
-
-    conditions: Conditions
+    conditions: Conditions  # what the program switches at
+    # what has been found of them, by the times of a run and the parameters that they depend on
     known: dict[tuple[tuple[float, float], bytes], Ahead] = field(default_factory=dict)
 
     @cached_property

@@ -19,19 +19,12 @@ class NotLines(Exception):  # noqa: N818 (it ends a reading; nobody else sees it
 
 @dataclass(frozen=True, kw_only=True)
 class Lines:
-    """Pieces of straight lines, values[k] + slopes[k] (t - starts[k]) from starts[k] on.
+    """Pieces of straight lines, values[k] + slopes[k] (t - starts[k]) from starts[k] on."""
 
-    Attributes
-    ----------
-    starts, values, slopes : ndarray of shape (k,)
-    end : float
-        Where the last piece ends (s).
-    """
-
-    starts: np.ndarray
+    starts: np.ndarray  # shape (k,)
     values: np.ndarray
     slopes: np.ndarray
-    end: float
+    end: float  # where the last piece ends (s)
 
     @property
     def ends(self) -> np.ndarray:
