@@ -11,7 +11,9 @@ import math
 import re
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
+from types import FunctionType
 from typing import Any, TypeVar, dataclass_transform
+from weakref import WeakSet
 
 import numpy as np
 
@@ -23,6 +25,7 @@ _T = TypeVar("_T")
 _KEY = "nlctl"
 _MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
 HIGHEST_ORDER = 100  # of plants and references: a block has a signal for each derivative
+EQUATIONS: WeakSet[Callable[..., Any]] = WeakSet()  # what `nlctl.equation` has marked
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -144,7 +147,9 @@ def record(cls: type[_T]) -> type[_T]:
     """Make a class a frozen, keyword-only dataclass whose parameters are checked at birth.
 
     Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules
-    that concern several fields and raises `ParameterError`.
+    that concern several fields and raises `ParameterError`.  Its equations become static methods.
+    Of a block, see `nlctl.Spec`, ``feedthrough`` is True unless the class says otherwise, and
+    without an ``update`` there are no states.
 
     Parameters
     ----------
@@ -183,6 +188,7 @@ def record(cls: type[_T]) -> type[_T]:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    _complete(described)
     described.__doc__ = _documented(described, doc or "")
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
@@ -195,6 +201,18 @@ def record(cls: type[_T]) -> type[_T]:
 
     described.__init__ = reporting(by_name, described.__name__)
     return described
+
+
+def _complete(cls: Any) -> None:
+    """Make the equations of a class static methods, and set what goes without saying."""
+    fields = {field.name for field in dataclasses.fields(cls)}
+    for name, value in list(vars(cls).items()):
+        if name not in fields and isinstance(value, FunctionType) and value in EQUATIONS:
+            setattr(cls, name, staticmethod(value))
+    if hasattr(cls, "output"):
+        cls.feedthrough = getattr(cls, "feedthrough", True)
+        if not hasattr(cls, "update"):
+            cls.states = getattr(cls, "states", ())
 
 
 def _documented(cls: Any, doc: str) -> str:

@@ -334,7 +334,6 @@ class WingRock:
     outputs = ("y", "x1", "x2", "x2_dot")
     states = ("x1", "x2")
     initial = {"x1": 1.2, "x2": 1.0}
-    feedthrough = True
 
     f = staticmethod(wing_rock_f)
     d = staticmethod(wing_rock_d)
@@ -346,7 +345,6 @@ class WingRock:
         if len(self.w) != 6:
             raise ParameterError(f"WingRock needs 6 weights w, got {len(self.w)}")
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""

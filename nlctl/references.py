@@ -63,7 +63,6 @@ class SumOfSines:
     phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
 
     inputs = ()
-    states = ()
     feedthrough = False
 
     def derived(self) -> dict[str, Any]:
@@ -85,7 +84,6 @@ class SumOfSines:
         """Names yd, yd1, ..., ydn."""
         return derivative_names(self.order)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The k-th derivative of sin is a shift of the phase by k pi / 2."""
@@ -145,14 +143,12 @@ class FilteredStep:
             "coefficients": np.array([math.comb(m, k) * self.omega ** (m - k) for k in range(m)])
         }
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Filter in controller form; its states are yd and its derivatives."""
         step = p.height * p.coefficients[0] if t >= p.t_step else 0.0
         return np.append(x[1:], step - np.sum(p.coefficients * x))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The filter's states."""
@@ -182,7 +178,6 @@ class FunctionReference:
     function: Callable[[float], Sequence[float]]
 
     inputs = ()
-    states = ()
     feedthrough = False
 
     def check(self) -> None:
@@ -246,8 +241,6 @@ class BandLimitedNoise:
     seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
     components: int = param(32, unit="1", meaning="number of sines", at_least=1)
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -269,7 +262,6 @@ class BandLimitedNoise:
             "angles": np.array([s[1] for s in spectra]),
         }
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Each signal with its own noise."""

@@ -63,7 +63,6 @@ class Step:
     feedthrough = False
     check = _check_output
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The value on either side of the step."""
@@ -99,7 +98,6 @@ class Ramp:
     feedthrough = False
     check = _check_output
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """A kink at t_start."""
@@ -134,7 +132,6 @@ class Sine:
     feedthrough = False
     check = _check_output
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The sine."""
@@ -178,7 +175,6 @@ class Square:
     feedthrough = False
     check = _check_output
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High at first in each period, then low."""
@@ -222,7 +218,6 @@ class Pulse:
     feedthrough = False
     check = _check_output
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High within the pulse."""
@@ -269,7 +264,6 @@ class PulseTrain:
                 "pulses that touch are a Step"
             )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High at the beginning of each period."""
@@ -332,7 +326,6 @@ class Chirp:
             return {"rate": 0.0}
         return {"rate": float(np.log(self.omega_1 / self.omega_0)) / self.t_1}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The integral of the frequency, in three parts: before, within and behind the sweep."""
@@ -416,7 +409,6 @@ class TimeTable:
         slopes = np.diff(self.values) / np.diff(self.times)
         return {"slopes": np.zeros_like(slopes) if self.hold else slopes, "periods": self.periodic}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The piece that holds now; the first and the last value outside of all."""

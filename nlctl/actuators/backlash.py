@@ -81,7 +81,6 @@ class Backlash:
     outputs = ("v",)
     states = ("memory",)
     memory = ("memory",)
-    feedthrough = True
 
     @property
     def initial(self) -> dict[str, float]:
@@ -100,7 +99,6 @@ class Backlash:
         """Bounds (k_1, k_2) of k in (2): the slopes."""
         return min(self.m_r, self.m_l), max(self.m_r, self.m_l)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The memory clipped into the gap."""
@@ -112,7 +110,6 @@ class Backlash:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact with either side of the gap."""
@@ -121,7 +118,6 @@ class Backlash:
         low, high = play_band(u1, p)
         return memory - low, memory - high
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u."""

@@ -67,14 +67,12 @@ class RateLimiter(_Follower):
     fall: float = param(-1.0, unit="1/s", meaning="least v'", below=0)
     K: float = param(100.0, unit="1/s", meaning="gain that follows u within the limits", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The limited rate."""
         (v,) = x
         return (clip(p.K * (u[0] - v), p.fall, p.rise),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the limits begin and end to count."""
@@ -109,7 +107,6 @@ class Lag(_Follower):
     k: float = param(1.0, unit="1", meaning="gain")
     T: float = param(0.05, unit="s", meaning="time constant", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The lag."""
@@ -149,7 +146,6 @@ class SecondOrderLag(_Follower):
 
     states = ("v", "v1")
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The output's rate, and the oscillator."""

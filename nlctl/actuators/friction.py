@@ -67,10 +67,7 @@ class Coulomb(_ForceLaw):
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force law."""
@@ -102,14 +99,11 @@ class Stribeck(_ForceLaw):
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    states = ()
-    feedthrough = True
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
         check_levels(self)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force law."""
@@ -167,7 +161,6 @@ class StickSlip:
     outputs = ("force",)
     states = ("mode",)
     memory = ("mode",)
-    feedthrough = True
     no_split = FORCE_LAW
 
     @property
@@ -181,7 +174,6 @@ class StickSlip:
         if number("StickSlip", "v0", self.v0) not in (-1, 0, 1):
             raise ParameterError(f"StickSlip needs v0 to be 0, 1 or -1, got {self.v0:g}")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force that holds, or slips."""
@@ -191,7 +183,6 @@ class StickSlip:
         slipping = p.F_c * now + p.sigma_2 * velocity
         return (np.where(now == 0, applied, slipping),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The mode."""
@@ -200,7 +191,6 @@ class StickSlip:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the mass comes to rest, and where it may break away."""
@@ -237,7 +227,6 @@ class Dahl(_ForceLaw):
     feedthrough = False
     output = staticmethod(output_of_state)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The force along the path."""
@@ -280,13 +269,11 @@ class LuGre(_ForceLaw):
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
 
     states = ("z",)
-    feedthrough = True
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
         check_levels(self)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The mean deflection of the bristles."""
@@ -294,7 +281,6 @@ class LuGre(_ForceLaw):
         (velocity,) = u
         return (bristle_rate(z, velocity, p),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force of bent bristles and of viscosity."""
@@ -349,7 +335,6 @@ class BoucWen(_ForceLaw):
             return float("inf")
         return float((self.alpha / (self.beta * sum_)) ** (1 / self.nu))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The hysteretic force along the path."""
@@ -359,7 +344,6 @@ class BoucWen(_ForceLaw):
         opposing = p.gamma * np.abs(velocity) * np.sign(z) * size + p.delta * velocity * size
         return (p.alpha * velocity - p.beta * opposing,)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the velocity or z changes its sign."""

@@ -87,7 +87,6 @@ class GeneralisedPrandtlIshlinskii:
 
     inputs = ("u",)
     outputs = ("v",)
-    feedthrough = True
     vector = True
     no_split = BOUNDED_OUTPUT
 
@@ -116,13 +115,11 @@ class GeneralisedPrandtlIshlinskii:
         check_thresholds(self)
         checked_start(self, len(self.r))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (np.sum(p.w * generalised_plays(u[0], x, p)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The plays."""
@@ -130,14 +127,12 @@ class GeneralisedPrandtlIshlinskii:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its band."""
         low, high = envelope_bands(u[0], p)
         return np.concatenate((x - low, x - high))
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u, whatever the memories."""

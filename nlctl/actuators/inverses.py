@@ -53,8 +53,6 @@ class DeadZoneInverse:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -62,7 +60,6 @@ class DeadZoneInverse:
         slopes = 1 / self.slope_r, 1 / self.slope_l
         return min(slopes), max(slopes)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the dead zone needs."""
@@ -73,13 +70,11 @@ class DeadZoneInverse:
             return (desired / p.slope_l + p.b_l,)
         return (desired,)  # 0, or NaN
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The jump."""
         return (u[0],)
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output near input u: at the jump, from one side to the other."""
@@ -134,7 +129,6 @@ class BacklashInverse:
     outputs = ("v",)
     states = ("side",)
     memory = ("side",)
-    feedthrough = True
     no_split = "it takes the rate u' besides u"
 
     @property
@@ -147,7 +141,6 @@ class BacklashInverse:
         check_gap(self)
         check_sides(self, 1)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the backlash needs."""
@@ -158,7 +151,6 @@ class BacklashInverse:
         upper, lower = np.maximum(one, other), np.minimum(one, other)
         return (np.where(now > 0, upper, np.where(now < 0, lower, now)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The side."""
@@ -167,7 +159,6 @@ class BacklashInverse:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where u reverses, and where the lines cross."""
@@ -215,7 +206,6 @@ class PrandtlIshlinskiiInverse:
 
     inputs = ("u",)
     outputs = ("v",)
-    feedthrough = True
     vector = True
 
     @property
@@ -253,13 +243,11 @@ class PrandtlIshlinskiiInverse:
         r = np.array([0.0, *self.r])
         return {"W_0": 1 / m[0], "W": np.diff(1 / m), "R": np.cumsum(m[:-1] * np.diff(r))}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The plays."""
@@ -267,13 +255,11 @@ class PrandtlIshlinskiiInverse:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.R))
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u."""

@@ -76,7 +76,6 @@ class Stop:
     outputs = ("v",)
     states = ("memory",)
     memory = ("memory",)
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
     @property
@@ -88,14 +87,12 @@ class Stop:
         """The memory has a finite start."""
         number("Stop", "v0", self.v0)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the play leaves of u."""
         (memory,) = x
         return (u[0] - unit_play(u[0], memory, p.r),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The play."""
@@ -104,7 +101,6 @@ class Stop:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where it begins or ends to yield: contact with either side of the gap."""
@@ -177,7 +173,6 @@ class PrandtlIshlinskii:
 
     inputs = ("u",)
     outputs = ("v",)
-    feedthrough = True
     vector = True
 
     @property
@@ -204,13 +199,11 @@ class PrandtlIshlinskii:
         check_thresholds(self)
         checked_start(self, len(self.r))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The weighted sum."""
         return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The plays."""
@@ -218,13 +211,11 @@ class PrandtlIshlinskii:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.r))
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u."""
@@ -261,8 +252,6 @@ class OneSidedDeadZones:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
     vector = True
 
     @property
@@ -291,14 +280,12 @@ class OneSidedDeadZones:
                 "the thresholds"
             )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The characteristic v(u)."""
         beyond = np.where(p.r > 0, np.maximum(u[0] - p.r, 0.0), np.minimum(u[0] - p.r, 0.0))
         return (p.w_0 * u[0] + np.sum(p.w * beyond),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The thresholds."""

@@ -104,14 +104,12 @@ class Relay:
         number("Relay", "v0", self.v0)
         check_sides(self, 1)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The side, with its height."""
         (side,) = x
         return (p.height * held_side(side),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The side."""
@@ -120,7 +118,6 @@ class Relay:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The thresholds."""
@@ -231,13 +228,11 @@ class Preisach:
                 )
         check_sides(self, len(self.w))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The weighted sum of the sides."""
         return (np.sum(p.w * held_side(x)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """The sides."""
@@ -245,7 +240,6 @@ class Preisach:
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """All thresholds."""

@@ -38,8 +38,6 @@ class DeadZone:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
 
     def check(self) -> None:
         """Assumption 1 wants a positive slope everywhere."""
@@ -51,7 +49,6 @@ class DeadZone:
                     f"positive, got {ripple:g} and {slope:g}"
                 )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The characteristic v(u)."""
@@ -62,7 +59,6 @@ class DeadZone:
             return ((p.slope_r + p.ripple_r * np.sin(u1)) * (u1 - p.b_r),)
         return ((p.slope_l + p.ripple_l * np.cos(u1)) * (u1 - p.b_l),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points."""
@@ -90,15 +86,12 @@ class Gain:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
 
     @property
     def gains(self) -> tuple[float, float]:
         """Bounds (k_1, k_2) of k in (2): the gain."""
         return self.k, self.k
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The gain."""
@@ -122,17 +115,13 @@ class Saturation:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The characteristic v(u)."""
         return (clip(u[0], -p.limit, p.limit),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where it begins to saturate."""
@@ -163,18 +152,14 @@ class AsymmetricSaturation:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The characteristic v(u)."""
         slope = np.where(u[0] < 0, p.slope_l, p.slope_r)
         return (clip(slope * u[0], p.limit_l, p.limit_r),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the slope changes, and where it begins to saturate."""
@@ -208,24 +193,19 @@ class Quantiser:
 
     inputs = ("u",)
     outputs = ("v",)
-    states = ()
-    feedthrough = True
     gains = (1.0, 1.0)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The nearest level."""
         half = np.where(p.riser, 0.5, 0.0)
         return (p.q * (np.floor(u[0] / p.q + 0.5 - half) + half),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The jumps."""
         return (np.sin(np.pi * (u[0] / p.q + np.where(p.riser, 0.0, 0.5))),)
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u."""

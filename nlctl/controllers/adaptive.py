@@ -39,7 +39,6 @@ class Zero:
     outputs: tuple[str, ...]
 
     inputs = ()
-    states = ()
     feedthrough = False
 
     @property

@@ -85,8 +85,6 @@ class FilteredError:
         may_be_empty=True,
     )
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -116,7 +114,6 @@ class FilteredError:
 
     outputs = ("e", "r", "Y_d")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Equations (14) and (18); e is the tracking error e_1."""

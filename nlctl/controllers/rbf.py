@@ -171,8 +171,6 @@ class GaussianBasis:
         (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -193,7 +191,6 @@ class GaussianBasis:
         """Names psi[0], ..., psi[l-1]."""
         return regressor_names(len(self.centres))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The basis at the state u = x."""
@@ -225,7 +222,6 @@ class NetworkWeights:
     Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
 
     outputs = ("W_psi", "W_norm")
-    feedthrough = True
     vector = True
     output = staticmethod(network_output)
 
@@ -264,7 +260,6 @@ class AdaptiveWeights(NetworkWeights):
 
     sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, first line of (25)."""

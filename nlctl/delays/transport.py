@@ -70,7 +70,6 @@ class TransportDelay:
     varying: Callable[[float], float] | None = None
     history: Callable[[float], Any] | None = None
 
-    states = ()
     feedthrough = False
     supplied = PAST
 

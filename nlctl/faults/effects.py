@@ -55,8 +55,6 @@ class _Effect:
     has_condition: bool = False
 
     outputs = ("faulty",)
-    states = ()
-    feedthrough = True
     vector = True
 
     @property
@@ -64,7 +62,6 @@ class _Effect:
         """The signal, and what the latch says."""
         return ("signal", "on", "since") if self.has_condition else ("signal",)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Beginning and end of the fault."""
@@ -78,7 +75,6 @@ class Bias(_Effect):
 
     value: float = param(0.0, unit="1", meaning="offset, in the unit of the signal")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, with the offset while the fault lasts."""
@@ -93,7 +89,6 @@ class DriftFault(_Effect):
 
     value: float = param(0.0, unit="1/s", meaning="rate of the offset")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, with the growing offset while the fault lasts."""
@@ -108,7 +103,6 @@ class LossOfEffectiveness(_Effect):
 
     value: float = param(1.0, unit="1", meaning="factor")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, times the factor while the fault lasts."""
@@ -137,7 +131,6 @@ class Noise(_Effect):
         omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
         return {"omega": omega, "phase": phase}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, with noise while the fault lasts."""
@@ -150,7 +143,6 @@ class Noise(_Effect):
 class Outage(_Effect):
     """Nothing arrives: 0 while it lasts (dropout), or for ever (disconnection)."""
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, 0 while the fault lasts."""
@@ -165,7 +157,6 @@ class StuckAt(_Effect):
 
     value: float = param(0.0, unit="1", meaning="what it is stuck at, in the unit of the signal")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, the value while the fault lasts."""
@@ -183,7 +174,6 @@ class Late(_Effect):
         """The signal, what the latch says, and the signal as it was earlier."""
         return (*super().inputs, "late")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, the earlier one while the fault lasts."""
@@ -205,7 +195,6 @@ class LockInPlace(_Effect):
     states = ("held", "caught")
     memory = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Relaxation: the held value follows until it is caught."""
@@ -214,7 +203,6 @@ class LockInPlace(_Effect):
             return 0.0, RELAXATION * (begun - x[1])
         return SHARPER * RELAXATION * (u[0] - x[0]), RELAXATION * (begun - x[1])
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """Catch the signal once, at the onset."""
@@ -222,7 +210,6 @@ class LockInPlace(_Effect):
             return u[0], 1.0
         return x[0], x[1]
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, what was caught while the fault lasts."""
@@ -269,13 +256,11 @@ class Latch:
         """Signs of the condition, for the equations."""
         return {"magnitude": int(self.is_magnitude), "sign": -1.0 if self.is_below else 1.0}
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """By how much the condition is met."""
         return (excess(u, p),)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Relaxation: `on` rises while the condition is met, until then `since` follows t."""
@@ -285,7 +270,6 @@ class Latch:
         met = 1.0 if excess(u, p) > 0 else 0.0
         return RELAXATION * (met - on), SHARPER * RELAXATION * (t - since)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """Remember the first time at which the condition is met."""
@@ -294,7 +278,6 @@ class Latch:
             return 1.0, t
         return on, since
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What is remembered."""

@@ -110,7 +110,6 @@ class HighGainObserver:
 
         return update
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The estimates."""

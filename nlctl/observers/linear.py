@@ -88,7 +88,6 @@ class LuenbergerObserver:
 
     outputs = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The plant's equation, corrected by what its output is off."""
@@ -96,7 +95,6 @@ class LuenbergerObserver:
         known, y = u[:m], u[m:]
         return p.A @ x + p.B @ known + p.L @ (y - p.C @ x - p.D @ known)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The estimates."""

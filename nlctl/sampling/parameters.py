@@ -96,7 +96,6 @@ class Sampling:
         """How many samples are on their way, as a number."""
         return {"pending": float(self.clock.pending)}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """It has no signals."""

@@ -63,7 +63,6 @@ class DynamicSurface:
     )
 
     outputs = ("e", "r", "nu", "nu_e")
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -89,13 +88,11 @@ class DynamicSurface:
         """Names a2, ..., an."""
         return tuple(f"a{i}" for i in range(2, len(self.c) + 1))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The filters."""
         return surfaces(x, u, p)[1]
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The tracking error, the last surface, and the wanted x_n' in its two parts."""

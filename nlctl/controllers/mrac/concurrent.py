@@ -93,7 +93,6 @@ class HistoryStack:
         """The outputs, and the point that was recorded last."""
         return (*self.outputs, *(f"last[{i}]" for i in range(self.nodes)))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Record the point, or leave all as it is."""
@@ -104,7 +103,6 @@ class HistoryStack:
         change = np.append(np.append(np.ones(1), sums_of_point(psi, Delta)), psi - last)
         return x + ((1.0 if taken else 0.0) + 0.0 * (distance + size + count)) * change  # NaN stays
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """How many points, and the sums over them."""
@@ -140,7 +138,6 @@ class ConcurrentWeights(NetworkWeights):
         """Names r, psi[0], ..., psi[l-1], z[0], ..., Omega[0,0], ..."""
         return (*weight_inputs(self.nodes), *sum_names(self.nodes))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, row by row of Omega."""
@@ -150,7 +147,6 @@ class ConcurrentWeights(NetworkWeights):
             learned = learned - u[(2 + j) * n + 1 : (3 + j) * n + 1] * W_hat[j]
         return p.Gamma * learned
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """As `AdaptiveWeights`."""

@@ -60,13 +60,11 @@ class StatePredictor:
 
     outputs = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The plant with the estimates."""
         return np.append(x[1:], p.gain * u[0] + u[1] - np.sum(p.a * x))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Its state."""
@@ -101,14 +99,12 @@ class FilteredLaw:
         """An input that has an effect."""
         check_input_gain("FilteredLaw", self.gain)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The filter."""
         yd, W_psi = u
         return (-p.omega * (x[0] - (p.b * yd - W_psi) / p.gain),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Its state."""

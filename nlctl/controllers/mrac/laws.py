@@ -34,14 +34,11 @@ class ModelReferenceLaw:
 
     inputs = ("nu", "nu_e", "W_psi")
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
     def check(self) -> None:
         """An input that has an effect."""
         check_input_gain("ModelReferenceLaw", self.gain)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law."""
@@ -67,10 +64,7 @@ class DirectLaw:
 
     inputs = ("W_psi",)
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law."""

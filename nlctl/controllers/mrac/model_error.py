@@ -37,7 +37,6 @@ class WeightedError:
     )
     Q: tuple[float, ...] = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
 
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -81,7 +80,6 @@ class ModelError(WeightedError):
     [ 2.   0.5 -4.   2. ]
     """
 
-    states = ()
     outputs = ("e", "r", "nu_e", "E_norm")
 
     @property
@@ -89,7 +87,6 @@ class ModelError(WeightedError):
         """Names x1, ..., xn, xm1, ..., xmn."""
         return (*coordinate_names(len(self.K)), *model_state_names(len(self.K)))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, b^T P E, the feedback of the error, and its norm."""

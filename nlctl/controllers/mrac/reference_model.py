@@ -44,7 +44,6 @@ class ReferenceModel:
     b: float = param(4.0, unit="s^-n", meaning="gain of the command")
 
     inputs = ("yd",)
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -61,13 +60,11 @@ class ReferenceModel:
         """Names xm1, ..., xmn, nu."""
         return (*self.states, "nu")
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The model in controller form."""
         return np.append(x[1:], model_rate(x, u[0], p))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Its state, and the derivative of the last one."""

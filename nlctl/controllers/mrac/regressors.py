@@ -23,8 +23,6 @@ class _StateRegressor:
 
     order: int = 1
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -61,7 +59,6 @@ class AffineRegressor(_StateRegressor):
     [0.1 0.2 1. ]
     """
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The states, and 1."""
@@ -91,7 +88,6 @@ class LinearRegressor(_StateRegressor):
         """Names x1, ..., xn, yd."""
         return (*coordinate_names(self.order), "yd")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signals themselves."""
@@ -113,16 +109,12 @@ class WingRockRegressor:
 
     inputs = ("x1", "x2")
     outputs = regressor_names(6)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The functions of `WingRock`."""
         return wing_rock_regressor(u)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""

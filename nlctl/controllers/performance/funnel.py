@@ -55,8 +55,6 @@ class FunnelControl:
     decay: float = param(2.0, unit="1/s", meaning="rate of decay of the funnel", at_least=0)
 
     outputs = ("e", "u", "rho")
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -74,7 +72,6 @@ class FunnelControl:
         """Names x1, ..., xn, yd, ..., yd^(n-1)."""
         return (*coordinate_names(self.order), *derivative_names(self.order - 1))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, the control input, and the half width of the funnel."""

@@ -64,8 +64,6 @@ class PrescribedPerformance:
     )
 
     outputs = ("e", "u", "rho")
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -88,7 +86,6 @@ class PrescribedPerformance:
         """Names x1, ..., xn, yd."""
         return (*coordinate_names(len(self.k)), "yd")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, the control input, and the bound of the error."""

@@ -38,17 +38,13 @@ class SlidingModeLaw:
 
     inputs = ("r",)
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law."""
         (r,) = u
         return (-p.K * clip(r / p.phi, -1.0, 1.0),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The edges of the layer."""
@@ -126,16 +122,13 @@ class SuperTwistingLaw:
     inputs = ("r",)
     outputs = ("u",)
     states = ("w",)
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The integral of the sign."""
         (r,) = u
         return (-p.k_2 * r / np.maximum(np.absolute(r), p.phi),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law."""
@@ -143,7 +136,6 @@ class SuperTwistingLaw:
         (r,) = u
         return (w - p.k_1 * r / np.sqrt(np.maximum(np.absolute(r), p.phi)),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The edges of the layer."""
