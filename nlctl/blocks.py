@@ -42,10 +42,12 @@ class Spec(Protocol):
 
     Attributes
     ----------
-    inputs, outputs, states : sequence of str
-        Names of the signals and states.
+    inputs, outputs : sequence of str
+        Names of the signals.
+    states : sequence of str
+        Names of the states; `nlctl.record` makes it () where there is no `update`.
     feedthrough : bool
-        Whether an output depends on `u` at the same instant.
+        Whether an output depends on `u` at the same instant; `nlctl.record` makes it True.
     output : callable
         ``output(t, x, u, p)`` returns the outputs, as a tuple or a 1-D array: `t` is the time in
         s, `x` the states, `u` the inputs, and `p` holds the record's parameters (``p.b_r``).
@@ -94,9 +96,8 @@ class Spec(Protocol):
 
     >>> @nlctl.record
     ... class Square:
-    ...     inputs, outputs, states, feedthrough = ("u",), ("v",), (), True
+    ...     inputs, outputs = ("u",), ("v",)
     ...
-    ...     @staticmethod
     ...     @nlctl.equation
     ...     def output(t, x, u, p):
     ...         return (u[0] ** 2,)
@@ -108,10 +109,6 @@ class Spec(Protocol):
     def inputs(self) -> Sequence[str]: ...
     @property
     def outputs(self) -> Sequence[str]: ...
-    @property
-    def states(self) -> Sequence[str]: ...
-    @property
-    def feedthrough(self) -> bool: ...
 
     @property
     def output(self) -> Any:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import math
 import re
 from collections import namedtuple
@@ -21,6 +22,8 @@ from .annotations import as_numbers, reporting
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 
+Vector = tuple[float, ...]
+Matrix = tuple[Vector, ...]
 _T = TypeVar("_T")
 _KEY = "nlctl"
 _MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
@@ -224,7 +227,8 @@ def _documented(cls: Any, doc: str) -> str:
     lines = []
     for field in dataclasses.fields(cls):
         if field.name not in told_of:
-            lines += _entry(field, declared_params(cls).get(field.name))
+            inherited = _inherited_entry(cls, field.name)
+            lines += inherited or _entry(field, declared_params(cls).get(field.name))
     if not lines:
         return doc
     entries = "".join(f"{margin}{line}\n" for line in lines)
@@ -238,9 +242,19 @@ def _documented(cls: Any, doc: str) -> str:
     return f"{doc.rstrip()}\n\n{section}"
 
 
+def _inherited_entry(cls: type, name: str) -> list[str]:
+    """Return the lines in which a base class describes a field; none if it has another default."""
+    for base in cls.__mro__[1:]:
+        entry = re.search(rf"^([ \t]*){name} : .+(?:\n\1[ \t]+\S.*)+", base.__doc__ or "", re.M)
+        if entry and getattr(cls, name, None) == getattr(base, name, None):
+            return inspect.cleandoc(f"\n{entry[0]}").splitlines()
+    return []
+
+
 def _entry(field: Any, rule: Param | None) -> list[str]:
     """Return the lines of one field: name, type and default; meaning, unit and bounds."""
     kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
+    kind = {"Vector": "tuple of float", "Matrix": "tuple of tuple of float"}.get(kind, kind)
     default = "" if field.default is dataclasses.MISSING else _default_text(field.default)
     head = f"{field.name} : {kind}{default}"
     if rule is None:
@@ -324,6 +338,13 @@ def integer(who: str, name: str, value: Any, at_least: int, at_most: float = mat
     if value > at_most:
         raise ParameterError(f"{who} needs {name} <= {at_most}, got {value!r}")
     return int(value)
+
+
+def set_integer(spec: Any, name: str, at_least: int, at_most: float = math.inf) -> None:
+    """Make a field of a record that is no parameter an int."""
+    label = "an order" if name == "order" else name
+    value = integer(type(spec).__name__, label, getattr(spec, name), at_least, at_most)
+    object.__setattr__(spec, name, value)
 
 
 def checked_times(timepts: Any) -> np.ndarray:

@@ -18,7 +18,7 @@ from .arguments import a_function
 from .equations import equation
 from .errors import ParameterError
 from .names import unknown
-from .params import HIGHEST_ORDER, integer, param, record
+from .params import HIGHEST_ORDER, Vector, param, record, set_integer
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock"]
 
@@ -87,12 +87,11 @@ class PureFeedback:
 
     inputs = ("v",)
     feedthrough = False
-    output = staticmethod(measured_state)
+    output = measured_state
 
     def check(self) -> None:
         """Refuse an order below 1 and an initial value for a state that does not exist."""
-        order = integer("PureFeedback", "an order", self.order, at_least=1, at_most=HIGHEST_ORDER)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1, at_most=HIGHEST_ORDER)
         a_function("PureFeedback", "f", self.f)
         a_function("PureFeedback", "d", self.d)
         for name, value in self.initial.items():
@@ -211,10 +210,10 @@ class ForcedDuffing:
     initial = {"x1": 0.5}
     feedthrough = False
 
-    f = staticmethod(duffing_f)
-    d = staticmethod(duffing_d)
-    update = staticmethod(integrator_chain(duffing_f, duffing_d))
-    output = staticmethod(measured_state)
+    f = duffing_f
+    d = duffing_d
+    update = integrator_chain(duffing_f, duffing_d)
+    output = measured_state
 
 
 @equation
@@ -269,10 +268,10 @@ class Genesio:
     initial = {"x1": 1.0}
     feedthrough = False
 
-    f = staticmethod(genesio_f)
-    d = staticmethod(genesio_d)
-    update = staticmethod(integrator_chain(genesio_f, genesio_d))
-    output = staticmethod(measured_state)
+    f = genesio_f
+    d = genesio_d
+    update = integrator_chain(genesio_f, genesio_d)
+    output = measured_state
 
 
 @equation
@@ -325,7 +324,7 @@ class WingRock:
     [0.8, 0.4]
     """
 
-    w: tuple[float, ...] = param(
+    w: Vector = param(
         (0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214), unit="s^-2", meaning="weights w_0, ..., w_5"
     )
     L: float = param(3.0, unit="1/s^2", meaning="effect of the ailerons")
@@ -335,10 +334,10 @@ class WingRock:
     states = ("x1", "x2")
     initial = {"x1": 1.2, "x2": 1.0}
 
-    f = staticmethod(wing_rock_f)
-    d = staticmethod(wing_rock_d)
-    update = staticmethod(integrator_chain(wing_rock_f, wing_rock_d))
-    output = staticmethod(wing_rock_output)
+    f = wing_rock_f
+    d = wing_rock_d
+    update = integrator_chain(wing_rock_f, wing_rock_d)
+    output = wing_rock_output
 
     def check(self) -> None:
         """Six weights."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +17,7 @@ from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
-from .params import HIGHEST_ORDER, integer, param, record
+from .params import HIGHEST_ORDER, Vector, param, record, set_integer
 from .wording import counted
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
@@ -27,22 +28,36 @@ def derivative_names(order: int) -> tuple[str, ...]:
     return ("yd", *(f"yd{k}" for k in range(1, order + 1)))
 
 
-def _check_order(spec: Any) -> None:
-    """A reference has an integer number of derivatives."""
-    order = integer(type(spec).__name__, "an order", spec.order, at_least=0, at_most=HIGHEST_ORDER)
-    object.__setattr__(spec, "order", order)
-
-
 @record
-class SumOfSines:
-    """Sum of sines with all derivatives up to order n; by default the paper's.
-
-        yd = sum_i a_i sin(w_i t + phi_i) = 0.5 (sin t + sin 0.5 t)
+class _Reference:
+    """What references share: yd and its derivatives.
 
     Parameters
     ----------
     order : int, optional
         Number n >= 0 of derivatives that are outputs.
+    """
+
+    order: int = 2
+
+    inputs = ()
+    feedthrough = False
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names yd, yd1, ..., ydn."""
+        return derivative_names(self.order)
+
+    def check(self) -> None:
+        """An integer number of derivatives."""
+        set_integer(self, "order", at_least=0, at_most=HIGHEST_ORDER)
+
+
+@record
+class SumOfSines(_Reference):
+    """Sum of sines with all derivatives up to order n; by default the paper's.
+
+        yd = sum_i a_i sin(w_i t + phi_i) = 0.5 (sin t + sin 0.5 t)
 
     Examples
     --------
@@ -53,17 +68,11 @@ class SumOfSines:
     [0.   0.75 0.  ]
     """
 
-    order: int = 2
-    amplitudes: tuple[float, ...] = param(
-        (0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a"
-    )
-    frequencies: tuple[float, ...] = param(
+    amplitudes: Vector = param((0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a")
+    frequencies: Vector = param(
         (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0, symbol="w"
     )
-    phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
-
-    inputs = ()
-    feedthrough = False
+    phases: Vector = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
 
     def derived(self) -> dict[str, Any]:
         """The number of derivatives, for the equation."""
@@ -71,18 +80,13 @@ class SumOfSines:
 
     def check(self) -> None:
         """One amplitude, frequency and phase per sine."""
-        _check_order(self)
+        super().check()
         sizes = len(self.amplitudes), len(self.frequencies), len(self.phases)
         if len(set(sizes)) > 1:
             raise ParameterError(
                 "SumOfSines needs as many amplitudes as frequencies and phases, got "
                 "{}, {} and {}".format(*sizes)
             )
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
 
     @equation
     def output(t, x, u, p):
@@ -95,15 +99,10 @@ class SumOfSines:
 
 
 @record
-class FilteredStep:
+class FilteredStep(_Reference):
     """A step through a reference filter of order n + 1, so that yd^(n) is continuous.
 
         yd = [omega / (s + omega)]^(n+1) step,    step = height for t >= t_step, otherwise 0
-
-    Parameters
-    ----------
-    order : int, optional
-        Number n >= 0 of derivatives that are outputs.
 
     Examples
     --------
@@ -116,25 +115,16 @@ class FilteredStep:
     0.632121 0.632121
     """
 
-    order: int = 2
     height: float = param(1.0, unit="1", meaning="height of the step")
     t_step: float = param(0.0, unit="s", meaning="time of the step")
     omega: float = param(2.0, unit="rad/s", meaning="corner frequency of the filter", above=0)
 
-    inputs = ()
-    feedthrough = False
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
-
-    states = outputs
     vector = True
 
-    def check(self) -> None:
-        """An integer number of derivatives."""
-        _check_order(self)
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Those of its outputs."""
+        return self.outputs
 
     def derived(self) -> dict[str, Any]:
         """Coefficients of (s/omega + 1)^(n+1) at s^0, ..., s^n, times omega^(n+1)."""
@@ -156,7 +146,7 @@ class FilteredStep:
 
 
 @record
-class FunctionReference:
+class FunctionReference(_Reference):
     """A reference given by a function of time that returns yd and its derivatives.
 
     Parameters
@@ -174,26 +164,18 @@ class FunctionReference:
     >>> reference = nlctl.FunctionReference(order=2, function=ramp)
     """
 
-    order: int
+    order: int = field()
     function: Callable[[float], Sequence[float]]
-
-    inputs = ()
-    feedthrough = False
 
     def check(self) -> None:
         """The function must return as many derivatives as promised."""
-        _check_order(self)
+        super().check()
         got = np.size(self.function(0.0))
         if got != self.order + 1:
             raise ParameterError(
                 f"FunctionReference of order {self.order} needs a function that returns "
                 f"{counted(self.order + 1, 'value')} ({', '.join(self.outputs)}), got {got}"
             )
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
 
     @cached_property
     def output(self) -> Callable:

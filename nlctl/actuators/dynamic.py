@@ -6,23 +6,27 @@ from ..arguments import number
 from ..equations import equation
 from ..functions import clip
 from ..params import param, record
-from .memories import output_of_state
+from .memories import FromUToV, output_of_state
 
 LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, t) u + eps_u of u"
 
 
 @record
-class _Follower:
-    """What actuators share whose output is their first state."""
+class _Follower(FromUToV):
+    """What actuators share whose output is their first state.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Output at the start.
+    """
 
     v0: float = 0.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("v",)
     feedthrough = False
     no_split = LAGS_BEHIND
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
     @property
     def initial(self) -> dict[str, float]:
@@ -46,11 +50,6 @@ class RateLimiter(_Follower):
     a large K is a stiff state.
 
     It does not obey (2): v depends on the past of u.
-
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start.
 
     Examples
     --------
@@ -88,11 +87,6 @@ class Lag(_Follower):
 
     It does not obey (2): v depends on the past of u.
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start.
-
     Examples
     --------
     After one time constant 1 - 1/e of a step is there:
@@ -122,11 +116,6 @@ class SecondOrderLag(_Follower):
 
     zeta < 1 overshoots, by exp(-pi zeta / sqrt(1 - zeta^2)) of a step.  It does not obey (2): v
     depends on the past of u.
-
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start; it starts at rest.
 
     Examples
     --------

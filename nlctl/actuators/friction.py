@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import output_of_state, relaxation
+from .memories import Remembering, output_of_state, relaxation
 
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
@@ -33,6 +32,7 @@ def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
         )
 
 
+@record
 class _ForceLaw:
     """What force laws of a velocity share."""
 
@@ -40,7 +40,6 @@ class _ForceLaw:
     outputs = ("force",)
     no_split = FORCE_LAW
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the velocity changes its sign."""
@@ -66,7 +65,6 @@ class Coulomb(_ForceLaw):
 
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
-
 
     @equation
     def output(t, x, u, p):
@@ -99,7 +97,6 @@ class Stribeck(_ForceLaw):
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
         check_levels(self)
@@ -122,7 +119,7 @@ def stick_mode(velocity, applied, mode, p):
 
 
 @record
-class StickSlip:
+class StickSlip(Remembering):
     """Coulomb friction that sticks: the force that holds a mass at rest, up to a limit.
 
         force = applied                              it sticks
@@ -155,23 +152,17 @@ class StickSlip:
     F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
     v_rest: float = param(1e-6, unit="m/s", meaning="velocity up to which it is at rest", above=0)
-    v0: float = 0.0
 
     inputs = ("velocity", "applied")
     outputs = ("force",)
     states = ("mode",)
-    memory = ("mode",)
     no_split = FORCE_LAW
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The mode at the start."""
-        return {"mode": float(self.v0)}
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction; one of three modes at the start."""
+        super().check()
         check_levels(self)
-        if number("StickSlip", "v0", self.v0) not in (-1, 0, 1):
+        if self.v0 not in (-1, 0, 1):
             raise ParameterError(f"StickSlip needs v0 to be 0, 1 or -1, got {self.v0:g}")
 
     @equation
@@ -225,7 +216,7 @@ class Dahl(_ForceLaw):
 
     states = ("force",)
     feedthrough = False
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
     @equation
     def update(t, x, u, p):
@@ -325,7 +316,7 @@ class BoucWen(_ForceLaw):
 
     states = ("z",)
     feedthrough = False
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
     @property
     def z_max(self) -> float:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..equations import equation
-from ..params import param, record
+from ..params import Vector, param, record
 from .backlash import check_gap
-from .memories import checked_start, memory_names, relaxation, started
+from .memories import FromUToV, Remembering, relaxation
 from .prandtl_ishlinskii import (
-    check_thresholds,
+    Plays,
     check_weights,
     unit_contact,
     unit_play,
@@ -26,7 +26,7 @@ from .relay import check_sides, moving_side
 
 
 @record
-class DeadZoneInverse:
+class DeadZoneInverse(FromUToV):
     """Right inverse of a dead zone with constant slopes.
 
         v = u / slope_r + b_r    u > 0
@@ -50,9 +50,6 @@ class DeadZoneInverse:
     slope_l: float = param(0.8, unit="1", meaning="slope on the left of the dead zone", above=0)
     b_r: float = param(0.5, unit="1", meaning="right break point of the dead zone", above=0)
     b_l: float = param(-0.3, unit="1", meaning="left break point of the dead zone", below=0)
-
-    inputs = ("u",)
-    outputs = ("v",)
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -89,7 +86,7 @@ def needed_lines(desired, p):
 
 
 @record
-class BacklashInverse:
+class BacklashInverse(Remembering):
     """Right inverse of a backlash, for an input whose rate is known.
 
         v = max(u / m_r + c_r, u / m_l + c_l)    s = +1,   s = +1       u' > 0
@@ -126,20 +123,13 @@ class BacklashInverse:
     v0: float = 1.0
 
     inputs = ("u", "u1")
-    outputs = ("v",)
     states = ("side",)
-    memory = ("side",)
     no_split = "it takes the rate u' besides u"
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The side from which it starts."""
-        return {"side": float(self.v0)}
 
     def check(self) -> None:
         """The gap has a left and a right end; the side is one of two."""
         check_gap(self)
-        check_sides(self, 1)
+        check_sides(self)
 
     @equation
     def output(t, x, u, p):
@@ -168,7 +158,7 @@ class BacklashInverse:
 
 
 @record
-class PrandtlIshlinskiiInverse:
+class PrandtlIshlinskiiInverse(Plays):
     """Inverse of a Prandtl-Ishlinskii operator, which is one as well.
 
         v = W_0 u + sum_i W_i H_i,   H_i = min(max(H_i(t-), u - R_i), u + R_i)
@@ -196,24 +186,10 @@ class PrandtlIshlinskiiInverse:
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u in the operator", above=0)
-    w: tuple[float, ...] = param(
-        (0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays"
-    )
-    r: tuple[float, ...] = param(
+    w: Vector = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays")
+    r: Vector = param(
         (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds of the operator, increasing", above=0
     )
-    v0: float | tuple[float, ...] = 0.0
-
-    inputs = ("u",)
-    outputs = ("v",)
-    vector = True
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names memory[0], ..., one for each play."""
-        return memory_names("memory", len(self.r))
-
-    memory = states
 
     @property
     def initial(self) -> dict[str, float]:
@@ -223,7 +199,7 @@ class PrandtlIshlinskiiInverse:
         memories = [
             (self.w_0 + w[: i + 1].sum()) * z[i] + w[i + 1 :] @ z[i + 1 :] for i in range(len(w))
         ]
-        return started("memory", memories, len(self.r))
+        return dict(zip(self.states, map(float, memories), strict=True))
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -233,9 +209,8 @@ class PrandtlIshlinskiiInverse:
 
     def check(self) -> None:
         """The operator has an increasing loading curve, and as many memories as thresholds."""
+        super().check()
         check_weights(self, "so that the operator has an inverse")
-        check_thresholds(self)
-        checked_start(self, len(self.r))
 
     def derived(self) -> dict[str, Any]:
         """Weights W_0, W and thresholds R of the inverse."""

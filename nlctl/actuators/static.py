@@ -8,12 +8,13 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
+from .memories import FromUToV
 
 BOUNDED_OUTPUT = "its output is bounded for all u, so that no k >= k_1 > 0 keeps eps_u bounded"
 
 
 @record
-class DeadZone:
+class DeadZone(FromUToV):
     """Asymmetric dead zone with slopes that depend on the input (Lv et al. 2017, Example 1).
 
         v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
@@ -35,9 +36,6 @@ class DeadZone:
     ripple_l: float = param(0.2, unit="1", meaning="ripple of the left slope, cos u")
     b_r: float = param(0.5, unit="1", meaning="right break point", at_least=0)
     b_l: float = param(-0.3, unit="1", meaning="left break point", at_most=0)
-
-    inputs = ("u",)
-    outputs = ("v",)
 
     def check(self) -> None:
         """Assumption 1 wants a positive slope everywhere."""
@@ -67,7 +65,7 @@ class DeadZone:
 
 
 @record
-class Gain:
+class Gain(FromUToV):
     """Linear actuator.
 
         v = k u
@@ -84,9 +82,6 @@ class Gain:
 
     k: float = param(1.0, unit="1", meaning="gain")
 
-    inputs = ("u",)
-    outputs = ("v",)
-
     @property
     def gains(self) -> tuple[float, float]:
         """Bounds (k_1, k_2) of k in (2): the gain."""
@@ -99,7 +94,7 @@ class Gain:
 
 
 @record
-class Saturation:
+class Saturation(FromUToV):
     """Symmetric saturation, v = min(max(u, -limit), limit).
 
     No k >= k_1 > 0 keeps eps_u of (2) bounded for it: the paper's theory does not cover it.
@@ -113,8 +108,6 @@ class Saturation:
 
     limit: float = param(10.0, unit="1", meaning="largest |v|", above=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
     no_split = BOUNDED_OUTPUT
 
     @equation
@@ -129,7 +122,7 @@ class Saturation:
 
 
 @record
-class AsymmetricSaturation:
+class AsymmetricSaturation(FromUToV):
     """Saturation with other slopes and limits on either side.
 
         v = min(slope_r u, limit_r)    u >= 0
@@ -150,8 +143,6 @@ class AsymmetricSaturation:
     limit_r: float = param(10.0, unit="1", meaning="greatest v", above=0)
     limit_l: float = param(-6.0, unit="1", meaning="least v", below=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
     no_split = BOUNDED_OUTPUT
 
     @equation
@@ -167,7 +158,7 @@ class AsymmetricSaturation:
 
 
 @record
-class Quantiser:
+class Quantiser(FromUToV):
     """Uniform quantiser.
 
         v = q floor(u / q + 1/2)          mid-tread: 0 is a level
@@ -191,8 +182,6 @@ class Quantiser:
     q: float = param(0.1, unit="1", meaning="step", above=0)
     riser: bool = param(False, unit="1", meaning="whether 0 is a jump (mid-riser)")
 
-    inputs = ("u",)
-    outputs = ("v",)
     gains = (1.0, 1.0)
 
     @equation

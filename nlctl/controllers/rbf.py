@@ -16,11 +16,9 @@ from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import gaussian
-from ..params import param, record
+from ..params import Matrix, Vector, param, record, set_integer
 from ..plants import coordinate_names
 from ..wording import counted
-
-Matrix = tuple[tuple[float, ...], ...]
 
 
 def _rows(array: np.ndarray) -> Matrix:
@@ -167,7 +165,7 @@ class GaussianBasis:
     centres: Matrix = param(
         diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row", symbol="mu"
     )
-    widths: tuple[float, ...] = param(
+    widths: Vector = param(
         (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 
@@ -223,12 +221,11 @@ class NetworkWeights:
 
     outputs = ("W_psi", "W_norm")
     vector = True
-    output = staticmethod(network_output)
+    output = network_output
 
     def check(self) -> None:
         """A network has nodes."""
-        nodes = integer(type(self).__name__, "nodes", self.nodes, at_least=1)
-        object.__setattr__(self, "nodes", nodes)
+        set_integer(self, "nodes", at_least=1)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..expressions.graph import Untraceable
 from ..expressions.jacobian_source import jacobian_function
-from ..params import as_numbers, nested_tuple, param, record
+from ..params import Matrix, as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
 _SIZES = ("states", "known inputs")
@@ -79,12 +79,8 @@ class ExtendedKalmanFilter:
     h: Callable[[Any], Any] = first_state
     x0: Sequence[float] = ()
     P0: Sequence[Sequence[float]] = ()
-    Q: tuple[tuple[float, ...], ...] = param(
-        ((0.1, 0.0), (0.0, 0.1)), unit="1/s", meaning="intensity of the noise in x'"
-    )
-    R: tuple[tuple[float, ...], ...] = param(
-        ((0.1,),), unit="s", meaning="intensity of the noise in y"
-    )
+    Q: Matrix = param(((0.1, 0.0), (0.0, 0.1)), unit="1/s", meaning="intensity of the noise in x'")
+    R: Matrix = param(((0.1,),), unit="s", meaning="intensity of the noise in y")
 
     feedthrough = False
     vector = True

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import of_type
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import param, record
+from ..params import Matrix, param, record
 from ..wording import counted
 from .signals import estimate_names, set_names
 
@@ -43,19 +43,11 @@ class LuenbergerObserver:
 
     known: tuple[str, ...] = ("u",)
     measured: tuple[str, ...] = ("y",)
-    A: tuple[tuple[float, ...], ...] = param(
-        ((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant"
-    )
-    B: tuple[tuple[float, ...], ...] = param(
-        ((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant"
-    )
-    C: tuple[tuple[float, ...], ...] = param(
-        ((1.0, 0.0),), unit="1", meaning="matrix C of the plant"
-    )
-    D: tuple[tuple[float, ...], ...] = param(((0.0,),), unit="1", meaning="matrix D of the plant")
-    L: tuple[tuple[float, ...], ...] = param(
-        ((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer"
-    )
+    A: Matrix = param(((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant")
+    B: Matrix = param(((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant")
+    C: Matrix = param(((1.0, 0.0),), unit="1", meaning="matrix C of the plant")
+    D: Matrix = param(((0.0,),), unit="1", meaning="matrix D of the plant")
+    L: Matrix = param(((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer")
 
     feedthrough = False
     vector = True

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import param, record
+from ...params import param, record, set_integer
 from ..rbf import NetworkWeights, network_output, regressor_names, weight_inputs
 
 
@@ -71,8 +70,7 @@ class HistoryStack:
     def check(self) -> None:
         """A network has nodes, and a record room."""
         for name in ("nodes", "points"):
-            value = integer("HistoryStack", name, getattr(self, name), at_least=1)
-            object.__setattr__(self, name, value)
+            set_integer(self, name, at_least=1)
 
     def derived(self) -> dict[str, int]:
         """The number of points, for the equation."""

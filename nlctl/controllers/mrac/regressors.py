@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import record
+from ...params import record, set_integer
 from ...plants import coordinate_names, wing_rock_regressor
 from ..rbf import regressor_names
 
@@ -27,8 +26,7 @@ class _StateRegressor:
 
     def check(self) -> None:
         """An order."""
-        order = integer(type(self).__name__, "an order", self.order, at_least=1)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -46,11 +44,6 @@ class AffineRegressor(_StateRegressor):
     """Regressor of a linear plant with a constant disturbance: its states, and 1.
 
         psi = (x_1, ..., x_n, 1)
-
-    Parameters
-    ----------
-    order : int, optional
-        Order n >= 1 of the plant.
 
     Examples
     --------
@@ -70,11 +63,6 @@ class LinearRegressor(_StateRegressor):
     """Regressor of direct MRAC of a linear plant: its states and the command.
 
         psi = (x_1, ..., x_n, yd)
-
-    Parameters
-    ----------
-    order : int, optional
-        Order n >= 1 of the plant.
 
     Examples
     --------

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import param, record
+from ...params import param, record, set_integer
 from ...plants import coordinate_names
 from ...references import derivative_names
 from .prescribed import performance_bound
@@ -59,8 +58,7 @@ class FunnelControl:
 
     def check(self) -> None:
         """A relative degree."""
-        order = integer("FunnelControl", "an order", self.order, at_least=1)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1)
 
     @property
     def plant_order(self) -> int:
