@@ -215,18 +215,7 @@ class Apart:
 
 
 def apart(system: System) -> Apart:
-    """Return a copy of a diagram, with copies of its blocks.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block; its functions, matrices and records are those of the copy.
-
-    Returns
-    -------
-    Apart
-        The copy, and which block stands for which.
-    """
+    """Return a copy of a diagram, with copies of its blocks."""
     copies = Apart(system=None, pairs={})
 
     def copied(old: Any) -> Any:
