@@ -35,27 +35,13 @@ StateValue = Callable[[float, np.ndarray], float]
 
 @dataclass(frozen=True, kw_only=True)
 class Crowd:
-    """Switches that come ever closer together.
+    """Switches that come ever closer together."""
 
-    Attributes
-    ----------
-    row : int
-        Which condition, in the order of the engine.
-    last : float
-        Time of the last switch (s).
-    period : float
-        From the last switch but two to it: two of them (s).
-    ratio : float
-        Of two such periods in a row.
-    more : float
-        Switches that there would be until the end of the run, at that pace.
-    """
-
-    row: int
-    last: float
-    period: float
-    ratio: float
-    more: float
+    row: int  # which condition, in the order of the engine
+    last: float  # time of the last switch (s)
+    period: float  # from the last switch but two to it: two of them (s)
+    ratio: float  # of two such periods in a row
+    more: float  # switches that there would be until the end of the run, at that pace
 
     @property
     def end(self) -> float:

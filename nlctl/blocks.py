@@ -251,10 +251,8 @@ class Block(OwnParameters):
         return equation_arguments(self.current_spec)
 
     def _resolved(self, params: Mapping[str, Any]) -> Any:
-        """Return the record with overrides; they must not change the number of signals.
-
-        Without any it is the record itself, which was checked when it was made.
-        """
+        """Return the record with overrides; they must not change the number of signals."""
+        # Without any it is the record itself, which was checked when it was made.
         spec, given = self.spec, self._own(params)
         if not is_checked(spec) or any(v is not getattr(spec, k, given) for k, v in given.items()):
             spec = with_overrides(spec, given, self.name)

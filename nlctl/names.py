@@ -45,10 +45,8 @@ def unknown(
 
 
 def base_name(name: str) -> str:
-    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``.
-
-    Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
-    """
+    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``."""
+    # Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
     path, dot, last = name.rpartition(".")
     return path + dot + last.partition("[")[0]
 
@@ -257,10 +255,8 @@ class Parameters(dict[str, Any]):
         return True
 
     def _path_of_bare(self, name: str) -> str:
-        """Return the path of the block that a name without one means, if it means one.
-
-        It is a third-party block's, unless it looks like one of ours cut short.
-        """
+        """Return the path of the block that a name without one means, if it means one."""
+        # It is a third-party block's, unless it looks like one of ours cut short.
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
         if name in names or not twins:

@@ -417,11 +417,9 @@ def _arguments_type(name: str, fields: tuple[str, ...]) -> type:
 
 
 def equation_arguments(spec: Any) -> Any:
-    """Return what the equations of `spec` receive as ``p``: its numbers as a named tuple.
-
-    Vectors and matrices become read-only float arrays.  A record may add numbers that follow
-    from its parameters with a method ``derived(self) -> dict``.
-    """
+    """Return what the equations of `spec` receive as ``p``: its numbers as a named tuple."""
+    # Vectors and matrices become read-only float arrays. A record may add numbers that follow
+    # from its parameters with a method ``derived(self) -> dict``.
     values = {name: getattr(spec, name) for name in declared_params(spec)}
     if hasattr(spec, "derived"):
         values |= spec.derived()

@@ -100,15 +100,8 @@ class PureFeedback:
             if not np.isfinite(value):
                 raise ParameterError(f"PureFeedback needs a finite initial {name}, got {value}")
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(self.order)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names y, x1, ..., xn."""
-        return ("y", *self.states)
+    states = property(lambda self: coordinate_names(self.order))
+    outputs = property(lambda self: ("y", *self.states))
 
     @cached_property
     def terms(self) -> tuple[Callable, Callable]:
@@ -133,10 +126,8 @@ class PureFeedback:
 
 @equation
 def duffing_f(x, v, p):
-    """Example 1: f(x, v) = -p1 x1 - p x2 - x1^3 + h(x, v), with p = 0.2 + 0.2 cos(5 x1).
-
-    h(x, v) = (1 + 0.1 cos x1) (1 + 0.2 cos v) v is the non-affine term.
-    """
+    """Example 1: f(x, v) = -p1 x1 - p x2 - x1^3 + h(x, v), with p = 0.2 + 0.2 cos(5 x1)."""
+    # h(x, v) = (1 + 0.1 cos x1) (1 + 0.2 cos v) v is the non-affine term.
     x1, x2 = x
     damping = p.p_mean + p.p_ripple * np.cos(5 * x1)
     h = (1 + p.gain_x * np.cos(x1)) * (1 + p.gain_v * np.cos(v)) * v
@@ -145,22 +136,19 @@ def duffing_f(x, v, p):
 
 @equation
 def duffing_forcing(t, p):
-    """Example 1: q cos(w t) with q = 5 + 0.1 cos t and w = 0.5 + 0.1 sin t.
-
-    Read literally, w(t) t is a chirp: its instantaneous frequency grows with t.  With
-    ``integrate_w`` the phase is the integral of w from 0 to t, and the frequency stays bounded.
-    """
+    """Example 1: q cos(w t) with q = 5 + 0.1 cos t and w = 0.5 + 0.1 sin t."""
+    # Read literally, w(t) t is a chirp: its instantaneous frequency grows with t. With
+    # ``integrate_w`` the phase is the integral of w from 0 to t, and the frequency stays
+    # bounded.
     swing = 1 - np.cos(t) if p.integrate_w else t * np.sin(t)
     return (p.q_mean + p.q_ripple * np.cos(t)) * np.cos(p.w_mean * t + p.w_ripple * swing)
 
 
 @equation
 def duffing_d(x, t, p):
-    """Example 1: everything that a static network cannot represent.
-
-    The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is not
-    a function of x and so belongs to the disturbance of (1), not to g(x).
-    """
+    """Example 1: everything that a static network cannot represent."""
+    # The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is not
+    # a function of x and so belongs to the disturbance of (1), not to g(x).
     x1, x2 = x
     return duffing_forcing(t, p) + p.d_amplitude * (x1 * x1 + x2 * x2) * np.sin(t + p.d_phase)
 
@@ -218,10 +206,8 @@ class ForcedDuffing:
 
 @equation
 def genesio_f(x, v, p):
-    """Example 2: f(x, v) = -c x1 - b x2 - a x3 + x1^2 + h(x, v).
-
-    h(x, v) = (2 + cos x1) (1 + 0.2 sin^2 v) v is the non-affine term.
-    """
+    """Example 2: f(x, v) = -c x1 - b x2 - a x3 + x1^2 + h(x, v)."""
+    # h(x, v) = (2 + cos x1) (1 + 0.2 sin^2 v) v is the non-affine term.
     x1, x2, x3 = x
     sine = np.sin(v)
     h = (p.gain_mean + p.gain_x * np.cos(x1)) * (1 + p.gain_v * sine * sine) * v

@@ -42,11 +42,7 @@ class _Reference:
 
     inputs = ()
     feedthrough = False
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
+    outputs = property(lambda self: derivative_names(self.order))
 
     def check(self) -> None:
         """An integer number of derivatives."""
@@ -120,11 +116,7 @@ class FilteredStep(_Reference):
     omega: float = param(2.0, unit="rad/s", meaning="corner frequency of the filter", above=0)
 
     vector = True
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Those of its outputs."""
-        return self.outputs
+    states = property(lambda self: self.outputs)
 
     def derived(self) -> dict[str, Any]:
         """Coefficients of (s/omega + 1)^(n+1) at s^0, ..., s^n, times omega^(n+1)."""

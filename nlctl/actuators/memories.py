@@ -66,10 +66,7 @@ class Remembering(FromUToV):
     v0: float | tuple[float, ...] = 0.0
     states: ClassVar[Any]
 
-    @property
-    def memory(self) -> tuple[str, ...]:
-        """All states."""
-        return self.states
+    memory = property(lambda self: self.states)
 
     @property
     def initial(self) -> dict[str, float]:

@@ -121,10 +121,7 @@ class Plays(Remembering):
     vector = True
     r: ClassVar[Any]
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names memory[0], ..., one for each play."""
-        return memory_names("memory", len(self.r))
+    states = property(lambda self: memory_names("memory", len(self.r)))
 
     def check(self) -> None:
         """A weight for each threshold, thresholds that increase, finite memories."""

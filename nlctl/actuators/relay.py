@@ -187,11 +187,7 @@ class Preisach(Remembering):
     feedthrough = False
     vector = True
     no_split = BOUNDED_OUTPUT
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names side[0], ..., one for each relay."""
-        return memory_names("side", len(self.w))
+    states = property(lambda self: memory_names("side", len(self.w)))
 
     def check(self) -> None:
         """Each relay has two thresholds in order, a weight, and starts from one side."""

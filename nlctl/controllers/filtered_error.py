@@ -102,16 +102,8 @@ class FilteredError:
         """Order n of the plant."""
         return len(self.lambdas) + 1
 
-    @property
-    def plant_order(self) -> int:
-        """The order of the plants that it is made for, n: it sees no other states."""
-        return self.order
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd, yd1, ..., ydn."""
-        return (*coordinate_names(self.order), *derivative_names(self.order))
-
+    plant_order = property(lambda self: self.order)
+    inputs = property(lambda self: (*coordinate_names(self.order), *derivative_names(self.order)))
     outputs = ("e", "r", "Y_d")
 
     @equation

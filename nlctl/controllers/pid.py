@@ -212,10 +212,7 @@ class PID2:
         if not self.u_min < self.u_max:
             raise ParameterError(f"PID2 needs u_min < u_max, got {self.u_min:g} and {self.u_max:g}")
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the reference and the output, or of the error; and of what is applied."""
-        return (*self.signals, *([self.applied] if self.applied else []))
+    inputs = property(lambda self: (*self.signals, *([self.applied] if self.applied else [])))
 
     @cached_property
     def demand(self) -> Callable:

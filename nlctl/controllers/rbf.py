@@ -179,15 +179,8 @@ class GaussianBasis:
                 f"{counted(len(self.centres), 'centre')}, got {len(self.widths)}"
             )
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(len(self.centres[0]))
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[l-1]."""
-        return regressor_names(len(self.centres))
+    inputs = property(lambda self: coordinate_names(len(self.centres[0])))
+    outputs = property(lambda self: regressor_names(len(self.centres)))
 
     @equation
     def output(t, x, u, p):
@@ -227,15 +220,8 @@ class NetworkWeights:
         """A network has nodes."""
         set_integer(self, "nodes", at_least=1)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1]."""
-        return weight_inputs(self.nodes)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names W_hat[0], ..., W_hat[l-1]."""
-        return weight_names(self.nodes)
+    inputs = property(lambda self: weight_inputs(self.nodes))
+    states = property(lambda self: weight_names(self.nodes))
 
 
 @record

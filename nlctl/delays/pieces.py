@@ -21,35 +21,23 @@ _HALVINGS = 40
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothPiece:
-    """Polynomials that functions are for a while.
+    """Polynomials that functions are for a while."""
 
-    Attributes
-    ----------
-    start, length : float
-        Time (s).
-    powers : ndarray of shape (count, 6)
-        Coefficients of powers of z, from -1 to 1 in the piece.
-    fits : bool
-        Whether they go through the functions: a piece too short to be halved has a jump in it.
-    breaks : bool
-        Whether a function, or its slope, jumps in it or where it begins.
-    """
-
+    # time (s)
     start: float
     length: float
-    powers: np.ndarray
+    powers: np.ndarray  # (count, 6): coefficients of powers of z, from -1 to 1 in the piece
+    # whether they go through the functions: a piece too short to be halved has a jump in it
     fits: bool = True
-    breaks: bool = False
+    breaks: bool = False  # whether a function, or its slope, jumps in it or where it begins
 
 
 def smooth_pieces(
     values: Callable[[float], np.ndarray], begin: float, end: float, count: int
 ) -> Iterator[SmoothPiece]:
-    """Divide functions of time into pieces that polynomials of degree 5 go through.
-
-    A piece is halved until it is a polynomial to rounding, also at those of 1000 places that lie
-    in it.
-    """
+    """Divide functions of time into pieces that polynomials of degree 5 go through."""
+    # A piece is halved until it is a polynomial to rounding, also at those of 1000 places
+    # that lie in it.
     if not count:
         yield SmoothPiece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))
         return

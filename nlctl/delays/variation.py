@@ -16,22 +16,13 @@ _APART = 1e-9  # of the largest value: what jumps by more over 40 halvings is no
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """The variation V(t) of a delay over a run, piece by piece.
+    """The variation V(t) of a delay over a run, piece by piece."""
 
-    Attributes
-    ----------
-    starts, lengths : ndarray of shape (pieces,)
-        Times (s).
-    powers : ndarray of shape (pieces, 6)
-        Coefficients (s) of powers of z, from -1 to 1 in each piece.
-    kinks : ndarray of shape (kinks,)
-        Times (s) at which a derivative of V jumps.
-    """
-
+    # (pieces,): times (s)
     starts: np.ndarray
     lengths: np.ndarray
-    powers: np.ndarray
-    kinks: np.ndarray
+    powers: np.ndarray  # (pieces, 6): coefficients (s) of powers of z, from -1 to 1 in each piece
+    kinks: np.ndarray  # (kinks,): times (s) at which a derivative of V jumps
 
     def extreme(self, order: int, sign: int) -> tuple[float, float]:
         """Return where V, or its slope, is greatest or least, and how large it is there."""
@@ -100,10 +91,8 @@ def _check_continuous(made: Variation, fits: np.ndarray, path: str) -> None:
 
 
 def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> None:
-    """Refuse delays that a variation makes 0 or negative.
-
-    Shapes: `delays` (lanes,).
-    """
+    """Refuse delays that a variation makes 0 or negative."""
+    # Shapes: `delays` (lanes,).
     t, least = (0.0, 0.0) if made is None else made.extreme(0, -1)
     if not delays.min() + least > 0:
         raise ParameterError(

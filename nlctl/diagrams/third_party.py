@@ -80,13 +80,7 @@ class Named(_TakesADict):
 
 
 class Overridden(_TakesADict):
-    """A third-party block of a run of its own, see `apart`.
-
-    Attributes
-    ----------
-    nlctl_overrides : dict
-        What it alone reads in place of what python-control gives it.
-    """
+    """A third-party block of a run of its own, see `apart`."""
 
     def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read."""

@@ -6,6 +6,7 @@ passes as it is.  Where a condition begins it, `Latch` remembers since when that
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,19 @@ def is_present(t, u, p):
     return 0 <= age(t, u, p) < p.duration
 
 
+def while_present(faulty: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the output equation of a fault from what the signal is while it lasts."""
+    faulty = equation(faulty)
+
+    @equation
+    def output(t, x, u, p):
+        if is_present(t, u, p):
+            return (faulty(t, x, u, p),)
+        return (u[0],)
+
+    return output
+
+
 @record
 class _Effect:
     """What all faults share: when they are present.
@@ -56,11 +70,7 @@ class _Effect:
 
     outputs = ("faulty",)
     vector = True
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The signal, and what the latch says."""
-        return ("signal", "on", "since") if self.has_condition else ("signal",)
+    inputs = property(lambda self: ("signal", "on", "since") if self.has_condition else ("signal",))
 
     @equation
     def switching(t, x, u, p):
@@ -75,12 +85,7 @@ class Bias(_Effect):
 
     value: float = param(0.0, unit="1", meaning="offset, in the unit of the signal")
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, with the offset while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + p.value,)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + p.value)
 
 
 @record
@@ -89,12 +94,7 @@ class DriftFault(_Effect):
 
     value: float = param(0.0, unit="1/s", meaning="rate of the offset")
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, with the growing offset while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + p.value * age(t, u, p),)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + p.value * age(t, u, p))
 
 
 @record
@@ -103,12 +103,7 @@ class LossOfEffectiveness(_Effect):
 
     value: float = param(1.0, unit="1", meaning="factor")
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, times the factor while the fault lasts."""
-        if is_present(t, u, p):
-            return (p.value * u[0],)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: p.value * u[0])
 
 
 @record
@@ -131,24 +126,14 @@ class Noise(_Effect):
         omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
         return {"omega": omega, "phase": phase}
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, with noise while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + noise_value(t, p.value, p.omega, p.phase),)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + noise_value(t, p.value, p.omega, p.phase))
 
 
 @record
 class Outage(_Effect):
     """Nothing arrives: 0 while it lasts (dropout), or for ever (disconnection)."""
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, 0 while the fault lasts."""
-        if is_present(t, u, p):
-            return (0.0 * u[0],)  # NaN travels
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: 0.0 * u[0])  # NaN travels
 
 
 @record
@@ -157,12 +142,7 @@ class StuckAt(_Effect):
 
     value: float = param(0.0, unit="1", meaning="what it is stuck at, in the unit of the signal")
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, the value while the fault lasts."""
-        if is_present(t, u, p):
-            return (p.value + 0.0 * u[0],)  # NaN travels
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: p.value + 0.0 * u[0])  # NaN travels
 
 
 @record
@@ -174,12 +154,7 @@ class Late(_Effect):
         """The signal, what the latch says, and the signal as it was earlier."""
         return (*super().inputs, "late")
 
-    @equation
-    def output(t, x, u, p):
-        """The signal, the earlier one while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[-1],)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[-1])
 
 
 @record

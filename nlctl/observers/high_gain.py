@@ -82,16 +82,8 @@ class HighGainObserver:
                 "one"
             )
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the known inputs and of the output."""
-        return (*self.known, self.measured)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.alpha))
-
+    inputs = property(lambda self: (*self.known, self.measured))
+    states = property(lambda self: estimate_names(len(self.alpha)))
     outputs = states
 
     def derived(self) -> dict[str, Any]:

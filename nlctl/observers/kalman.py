@@ -110,20 +110,9 @@ class ExtendedKalmanFilter:
                 )
         self.jacobians  # noqa: B018 (it is refused here if there are none)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the known inputs and of the outputs."""
-        return (*self.known, *self.measured)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.Q))
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """The estimates, and the upper triangle P11, P12, ..., Pnn of the covariance."""
-        return (*self.outputs, *(f"P{i + 1}{j + 1}" for i, j in self.places))
+    inputs = property(lambda self: (*self.known, *self.measured))
+    outputs = property(lambda self: estimate_names(len(self.Q)))
+    states = property(lambda self: (*self.outputs, *(f"P{i + 1}{j + 1}" for i, j in self.places)))
 
     @property
     def places(self) -> list[tuple[int, int]]:

@@ -68,16 +68,8 @@ class LuenbergerObserver:
         set_names(self, "known", m)
         set_names(self, "measured", k)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the plant's inputs and outputs."""
-        return (*self.known, *self.measured)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.A))
-
+    inputs = property(lambda self: (*self.known, *self.measured))
+    states = property(lambda self: estimate_names(len(self.A)))
     outputs = states
 
     @equation

@@ -81,37 +81,20 @@ class Clock:
 
 
 class Moment(NamedTuple):
-    """Something that a clock does at certain instants.
+    """Something that a clock does at certain instants."""
 
-    Attributes
-    ----------
-    owner : hashable
-        Whose clock it is: a key of the mapping that says which clock that is.
-    samples : int
-        1 if it samples, 0 if delayed outputs follow.
-    """
-
-    owner: Hashable
-    samples: int
+    owner: Hashable  # whose clock it is: a key of the mapping that says which clock that is
+    samples: int  # 1 if it samples, 0 if delayed outputs follow
 
 
 Clocks = Mapping[Hashable, Clock]
 
 
 class Instants(NamedTuple):
-    """When something happens in a run.
+    """When something happens in a run."""
 
-    Attributes
-    ----------
-    times : ndarray of shape (m,)
-        Increasing (s).
-    which : ndarray of int, shape (m,)
-        Which of `patterns` happens.
-    patterns : tuple of frozenset of Moment
-    """
-
-    times: np.ndarray
-    which: np.ndarray
+    times: np.ndarray  # (m,): increasing (s)
+    which: np.ndarray  # (m,): which of `patterns` happens
     patterns: tuple[frozenset[Moment], ...]
 
 
@@ -123,12 +106,8 @@ def moments(clocks: Clocks) -> list[Moment]:
 
 def meetings(clocks: Clocks) -> list[frozenset[Moment]]:
     """Return what may happen at one instant: sets of moments whose instants meet."""
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
     found: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
-    for series, together in alike.items():
+    for series, together in _alike(clocks).items():
         found += [
             (what | together, (*others, series))
             for what, others in found
@@ -148,10 +127,7 @@ def instants(
 ) -> Instants:
     """Return what happens from `begin` on, and before `end`."""
     patterns = {pattern: i for i, pattern in enumerate(known)}
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
+    alike = _alike(clocks)
     if len(alike) == 1:  # nothing else can happen at these times
         ((series, together),) = alike.items()
         times = _times(series, begin, end)
@@ -167,15 +143,9 @@ def instants(
 
 
 def schedules(clocks: Clocks) -> list[tuple[tuple[int, int, int], frozenset[Moment]]]:
-    """Return begin, step and scale of each series of instants (begin + k step) / scale, and what.
-
-    Clocks with a jitter have none.
-    """
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
-    return [(_integers(series), together) for series, together in alike.items()]
+    """Return begin, step and scale of each series of instants (begin + k step) / scale."""
+    # Clocks with a jitter have none.
+    return [(_integers(series), together) for series, together in _alike(clocks).items()]
 
 
 def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
@@ -206,6 +176,15 @@ class _Series(NamedTuple):
     dt: Fraction
     jitter: float
     seed: int
+
+
+def _alike(clocks: Clocks) -> dict[_Series, frozenset[Moment]]:
+    """Return what happens together, by when it does."""
+    alike: dict[_Series, frozenset[Moment]] = {}
+    for moment in moments(clocks):
+        series = _series(moment, clocks)
+        alike[series] = alike.get(series, frozenset()) | {moment}
+    return alike
 
 
 def _series(moment: Moment, clocks: Clocks) -> _Series:

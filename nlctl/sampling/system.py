@@ -38,13 +38,11 @@ _HAPPENING: ContextVar[Happening | None] = ContextVar("nlctl_happening", default
 
 @contextmanager
 def happening(what: Happening = frozenset()) -> Iterator[None]:
-    """Say what happens at the instant at which a diagram with sampled blocks is evaluated.
-
-    Inside, derivatives of states of sampled blocks that nothing happens to are 0: between samples
-    they stand still.  Of those that sample now they are the next states, and their outputs are
-    the new ones.  Outside python-control is refused the derivatives: it would integrate over the
-    samples without a word.
-    """
+    """Say what happens at the instant at which a diagram with sampled blocks is evaluated."""
+    # Inside, derivatives of states of sampled blocks that nothing happens to are 0: between
+    # samples they stand still. Of those that sample now they are the next states, and their
+    # outputs are the new ones. Outside python-control is refused the derivatives: it would
+    # integrate over the samples without a word.
     token = _HAPPENING.set(what)
     try:
         yield
@@ -207,10 +205,8 @@ class Sampled(Around):
     def after(
         self, now: Happening, x: Any, due: Any, computed: Callable[[], tuple[Any, Any]]
     ) -> list[Any]:
-        """Return the parts of the states after what happens, one behind the other.
-
-        Shapes: `x` (nstates,), `due` (noutputs,).
-        """
+        """Return the parts of the states after what happens, one behind the other."""
+        # Shapes: `x` (nstates,), `due` (noutputs,).
         own, waiting, held = self.parts(x)
         held = due if self.releases(now) else held
         if not self.samples(now):

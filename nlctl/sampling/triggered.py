@@ -50,16 +50,8 @@ class TriggeredHold:
 
     feedthrough = False
     vector = True
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """u1, ..., un and the trigger."""
-        return (*(f"u{i + 1}" for i in range(self.n)), "trigger")
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """w1, ..., wn and the interval between the last two samples."""
-        return (*(f"w{i + 1}" for i in range(self.n)), "interval")
+    inputs = property(lambda self: (*(f"u{i + 1}" for i in range(self.n)), "trigger"))
+    outputs = property(lambda self: (*(f"w{i + 1}" for i in range(self.n)), "interval"))
 
     @property
     def states(self) -> tuple[str, ...]:

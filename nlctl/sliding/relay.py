@@ -121,10 +121,8 @@ class IdealRelay:
 
     @equation
     def output(t: float, x: Any, u: Any, p: Any) -> Any:
-        """Beside u = 0 the side, with its height; on it what keeps u' = 0.
-
-        A mode beyond 1 counts as it stands: it jumps, and nothing carries it along.
-        """
+        """Beside u = 0 the side, with its height; on it what keeps u' = 0."""
+        # A mode beyond 1 counts as it stands: it jumps, and nothing carries it along.
         (mode,) = x
         _, drift, gain = u
         keeping = np.where(gain == 0, 0.0, -(drift + p.rate * u[0]) / gain)

@@ -81,11 +81,10 @@ def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) ->
 def _signals_now(
     system: Any, t: float, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs and outputs of all parts: python-control's, or ours where it finds none.
-
-    python-control's first pass has inputs of 0, and it multiplies every output by every element of
-    its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls a loop.
-    """
+    """Return inputs and outputs of all parts: python-control's, or ours where it finds none."""
+    # python-control's first pass has inputs of 0, and it multiplies every output by every
+    # element of its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls
+    # a loop.
     signals = _settled_signals(system, t, x, u)
     if signals is not None:
         return signals
@@ -110,10 +109,8 @@ def _settled_signals(
     answer: Callable[[Any, float, np.ndarray, np.ndarray], np.ndarray | None] = _outputs_if_settled,
     product: Callable[[Any, Any], np.ndarray] = np.matmul, equal_nan: bool = False,
 ) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
-    """Return what the passes of ``_compute_static_io`` come to, None where they come to no end.
-
-    Parts whose inputs are as they were a pass before are not asked again.
-    """
+    """Return what the passes of ``_compute_static_io`` come to, None where they come to no end."""
+    # Parts whose inputs are as they were a pass before are not asked again.
     outside = product(system.input_map, u)
     inputs, places = outside, [*_places_of_parts(system)]
     count, outputs = system.connect_map.shape[1], np.zeros(sum(system.connect_map.shape))
@@ -162,13 +159,7 @@ def parts_now(
 
 
 class OwnParameters(ct.NonlinearIOSystem):
-    """A system that makes what its equations get of the overrides that python-control has.
-
-    Attributes
-    ----------
-    reads_a_dict : bool
-        Whether that is a dict: of a third-party system.
-    """
+    """A system that makes what its equations get of the overrides that python-control has."""
 
     reads_a_dict = False
 

@@ -73,20 +73,9 @@ class DynamicSurface:
                 f"tau and {len(self.c)} of c"
             )
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.c)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd, yd1."""
-        return (*coordinate_names(len(self.c)), "yd", "yd1")
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names a2, ..., an."""
-        return tuple(f"a{i}" for i in range(2, len(self.c) + 1))
+    plant_order = property(lambda self: len(self.c))
+    inputs = property(lambda self: (*coordinate_names(len(self.c)), "yd", "yd1"))
+    states = property(lambda self: tuple(f"a{i}" for i in range(2, len(self.c) + 1)))
 
     @equation
     def update(t, x, u, p):

@@ -76,20 +76,9 @@ class HistoryStack:
         """The number of points, for the equation."""
         return {"points": self.points}
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[l-1], x_n', u."""
-        return (*regressor_names(self.nodes), self.derivative, "u")
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names count, z[0], ..., Omega[0,0], ..."""
-        return ("count", *sum_names(self.nodes))
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """The outputs, and the point that was recorded last."""
-        return (*self.outputs, *(f"last[{i}]" for i in range(self.nodes)))
+    inputs = property(lambda self: (*regressor_names(self.nodes), self.derivative, "u"))
+    outputs = property(lambda self: ("count", *sum_names(self.nodes)))
+    states = property(lambda self: (*self.outputs, *(f"last[{i}]" for i in range(self.nodes))))
 
     @equation
     def update(t, x, u, p):
@@ -131,10 +120,7 @@ class ConcurrentWeights(NetworkWeights):
     nodes: int = 6
     Gamma: float = param(5.0, unit="1", meaning="adaptation gain, Gamma I", above=0)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1], z[0], ..., Omega[0,0], ..."""
-        return (*weight_inputs(self.nodes), *sum_names(self.nodes))
+    inputs = property(lambda self: (*weight_inputs(self.nodes), *sum_names(self.nodes)))
 
     @equation
     def update(t, x, u, p):

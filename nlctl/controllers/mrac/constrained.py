@@ -79,10 +79,7 @@ class ConstrainedError(WeightedError):
         order = len(self.K)
         return (*coordinate_names(order), *model_state_names(order), "du")
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names E_d1, ..., E_dn, beta_hat."""
-        return (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat")
+    states = property(lambda self: (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat"))
 
     @equation
     def update(t, x, u, p):

@@ -53,11 +53,7 @@ class StatePredictor:
         check_hurwitz("StatePredictor", "a", self.a)
         check_input_gain("StatePredictor", self.gain)
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn."""
-        return model_state_names(len(self.a))
-
+    states = property(lambda self: model_state_names(len(self.a)))
     outputs = states
 
     @equation

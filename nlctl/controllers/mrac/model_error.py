@@ -46,10 +46,7 @@ class WeightedError:
             raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
         check_hurwitz(who, "K", K)
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.K)
+    plant_order = property(lambda self: len(self.K))
 
     @property
     def lyapunov_matrix(self) -> np.ndarray:

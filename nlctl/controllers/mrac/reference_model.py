@@ -50,15 +50,8 @@ class ReferenceModel:
         """The roots must lie in the open left half plane."""
         check_hurwitz("ReferenceModel", "a", self.a)
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn."""
-        return model_state_names(len(self.a))
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn, nu."""
-        return (*self.states, "nu")
+    states = property(lambda self: model_state_names(len(self.a)))
+    outputs = property(lambda self: (*self.states, "nu"))
 
     @equation
     def update(t, x, u, p):

@@ -28,15 +28,8 @@ class _StateRegressor:
         """An order."""
         set_integer(self, "order", at_least=1)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(self.order)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[n]."""
-        return regressor_names(self.order + 1)
+    inputs = property(lambda self: coordinate_names(self.order))
+    outputs = property(lambda self: regressor_names(self.order + 1))
 
 
 @record
@@ -71,10 +64,7 @@ class LinearRegressor(_StateRegressor):
     [0.1 0.2 5. ]
     """
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd."""
-        return (*coordinate_names(self.order), "yd")
+    inputs = property(lambda self: (*coordinate_names(self.order), "yd"))
 
     @equation
     def output(t, x, u, p):

@@ -60,10 +60,7 @@ class FunnelControl:
         """A relative degree."""
         set_integer(self, "order", at_least=1)
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants of class (1) that it is made for."""
-        return self.order
+    plant_order = property(lambda self: self.order)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -76,15 +76,8 @@ class PrescribedPerformance:
                 f"value for each state of the plant, got {counted}"
             )
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.k)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd."""
-        return (*coordinate_names(len(self.k)), "yd")
+    plant_order = property(lambda self: len(self.k))
+    inputs = property(lambda self: (*coordinate_names(len(self.k)), "yd"))
 
     @equation
     def output(t, x, u, p):

@@ -21,25 +21,14 @@ _AT_ONCE = 8  # sums in registers
 
 @dataclass(frozen=True, kw_only=True)
 class SeriesLayout:
-    """Where things lie.
+    """Where things lie."""
 
-    Attributes
-    ----------
-    rows : int
-        Of the coefficients of one order.
-    at : dict
-        Rows of `c` from which on the arrays ``"w"``, ``"o"``, ``"a"`` and ``"q"`` lie, and the rows
-        ``"order"``, ``"rtol"`` and ``"atol"`` with the settings.
-    lanes : int
-        Number of members.
-    size : int
-        Rows of `c`.
-    """
-
-    rows: int
+    rows: int  # of the coefficients of one order
+    # rows of `c` from which on the arrays ``"w"``, ``"o"``, ``"a"`` and ``"q"`` lie, and the
+    # rows ``"order"``, ``"rtol"`` and ``"atol"`` with the settings
     at: dict[str, int]
-    lanes: int
-    size: int
+    lanes: int  # number of members
+    size: int  # rows of `c`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,10 +120,8 @@ def _sums_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
 
 
 def _vectors(fold: Fold, lanes: int) -> list[_Sum]:
-    """Return the vectors of sums: of all members, or of consecutive rows of a single one.
-
-    Those of a single member are padded: what is behind the last rows is read by nobody.
-    """
+    """Return the vectors of sums: of all members, or of consecutive rows of a single one."""
+    # Those of a single member are padded: what is behind the last rows is read by nobody.
     step = 1 if lanes > 1 else WIDE
     return [
         _Sum(

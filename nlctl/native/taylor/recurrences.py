@@ -47,51 +47,32 @@ class NoSeriesError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Fold:
-    """The sums over j = 1..k-1 of left_j right_{k-j}, of consecutive rows.
+    """The sums over j = 1..k-1 of left_j right_{k-j}, of consecutive rows."""
 
-    Attributes
-    ----------
-    left, right : int
-        First rows of the factors.
-    steps : tuple of int
-        1 where a factor has a row for each sum, 0 where it has one for all.
-    array : str
-        Where the sums are written, ``"a"`` or ``"q"``.
-    row, size : int
-        The first row there, and how many.
-    """
-
+    # first rows of the factors
     left: int
     right: int
-    steps: tuple[int, int]
-    array: str
+    steps: tuple[int, int]  # 1 where a factor has a row for each sum, 0 where it has one for all
+    array: str  # where the sums are written, ``"a"`` or ``"q"``
+    # the first row there, and how many
     row: int
     size: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recurrences:
-    """What is written at order 0 and at each order after it.
+    """What is written at order 0 and at each order after it."""
 
-    Attributes
-    ----------
-    first, following, last : list of Store
-        To ``"k"``, the coefficients of an order; at order 0 also to ``"o"``.  At order k they read
-        the coefficients ``"b"`` of order k - 1, the sums ``"a"`` and ``"q"``, and ``"o"``.  At the
-        highest order there are the states' alone, which need no sums.
-    folds : list of Fold
-    rows : mapping
-        Of every array.
-    sides : list of tuple
-        Rows of ``"k"`` for each comparison: the difference of what is compared, and the first of
-        its coefficients that is not 0; the same of what is 0 where `floor` and its like jump.
-    """
-
+    # to ``"k"``, the coefficients of an order; at order 0 also to ``"o"``. At order k they
+    # read the coefficients ``"b"`` of order k - 1, the sums ``"a"`` and ``"q"``, and ``"o"``.
+    # At the highest order there are the states' alone, which need no sums.
     first: list[Store]
     following: list[Store]
     last: list[Store]
     folds: list[Fold]
-    rows: dict[str, int]
+    rows: dict[str, int]  # of every array
+    # rows of ``"k"`` for each comparison: the difference of what is compared, and the first
+    # of its coefficients that is not 0; the same of what is 0 where `floor` and its like jump
     sides: list[tuple[int, int]]
 
 
@@ -99,10 +80,9 @@ def recurrences(
     graph: Graph, stores: Mapping[str, Sequence[Store]], sizes: Mapping[str, int], *,
     packed: bool, overflows: bool = True,
 ) -> Recurrences:  # fmt: skip
-    """Return how the coefficients of a right-hand side follow.
-
-    The first rows of an order are the states, then switching functions, then the right-hand side.
-    """
+    """Return how the coefficients of a right-hand side follow."""
+    # The first rows of an order are the states, then switching functions, then the right-hand
+    # side.
     reader = _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows)
     return reader.read(stores, packed)
 
@@ -112,39 +92,27 @@ _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coeffic
 
 @dataclass(kw_only=True)
 class _Reader:
-    """Goes through a graph.
-
-    Attributes
-    ----------
-    terms : dict
-        The k-th coefficient of each expression, None where it is 0.
-    slopes : dict
-        What an expression that is affine in time changes by, None for nothing; False for others.
-    values, before, sides : dict
-        Rows of "o" that have an expression's value, and rows of "k" that have its coefficients
-        or, of a comparison, its side.
-    distances : dict
-        Of what is compared with 0, its first coefficient that is not 0.
-    sums : dict
-        Which sums there are, by their factors.
-    pairs : list
-        See `Recurrences.sides`.
-    overflows : bool
-        Whether what is flat at arguments that overflow is constant there; not so on boxes.
-    """
+    """Goes through a graph."""
 
     graph: Graph
     n: int
     g: int
+    # whether what is flat at arguments that overflow is constant there; not so on boxes
     overflows: bool
+    # the k-th coefficient of each expression, None where it is 0
     terms: dict[Expr, Expr | None] = field(default_factory=dict)
+    # what an expression that is affine in time changes by, None for nothing; False for others
     slopes: dict[Expr, Expr | bool | None] = field(default_factory=dict)
+    # rows of "o" that have an expression's value, and rows of "k" that have its coefficients
+    # or, of a comparison, its side
     values: dict[Expr, int] = field(default_factory=dict)
     before: dict[Expr, int] = field(default_factory=dict)
     sides: dict[Expr, Expr] = field(default_factory=dict)
+    # of what is compared with 0, its first coefficient that is not 0
     distances: dict[Expr, Expr] = field(default_factory=dict)
+    # which sums there are, by their factors
     sums: dict[tuple[_Key, _Key], Expr] = field(default_factory=dict)
-    pairs: list[tuple[int, int]] = field(default_factory=list)
+    pairs: list[tuple[int, int]] = field(default_factory=list)  # see `Recurrences.sides`
     waiting: list[tuple[Expr, bool]] = field(default_factory=list)
     first: list[Store] = field(default_factory=list)
     following: list[Store] = field(default_factory=list)

@@ -33,26 +33,15 @@ _ONCE = threading.Lock()  # of several threads that need it one compiles
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """Machine code of the coefficients of some members.
-
-    Attributes
-    ----------
-    lowered : Lowered
-    prepare : callable
-        ``prepare(p, c)``.
-    functions : tuple of callable
-        Those of `_STEP_FUNCTIONS`.  The first one fills coefficients `k` of shape (orders, rows,
-        members): the states' are in the first rows, then those of the switching functions.
-    layout : SeriesLayout
-    sides : ndarray of shape (comparisons, 2)
-        See `Recurrences.sides`.
-    """
+    """Machine code of the coefficients of some members."""
 
     lowered: Lowered
-    prepare: Any
+    prepare: Any  # ``prepare(p, c)``
+    # those of `_STEP_FUNCTIONS`. The first one fills coefficients `k` of shape (orders, rows,
+    # members): the states' are in the first rows, then those of the switching functions.
     functions: tuple[Any, ...]
     layout: SeriesLayout
-    sides: np.ndarray
+    sides: np.ndarray  # (comparisons, 2): see `Recurrences.sides`
 
     def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
         """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""

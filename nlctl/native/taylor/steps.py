@@ -74,10 +74,9 @@ class _Function:
     # -- loops
 
     def rows(self, count: int, carried: int, write: _Write) -> list[Value]:
-        """Write what is done with the numbers from a place on; return the largest values.
-
-        The last rows of a single member are taken once more together with those before them.
-        """
+        """Write what is done with the numbers from a place on; return the largest values."""
+        # The last rows of a single member are taken once more together with those before
+        # them.
         width, total = self.width(count), count * self.lanes
         step = width or 1
         zeros = [constant(0.0, width)] * carried
@@ -112,10 +111,8 @@ class _Function:
     def polynomial(
         self, highest: str, at: str, h: Value, *, slope: bool, magnitudes: bool = False
     ) -> list[Value]:
-        """Return a polynomial's value at h, and its slope: from the highest order downwards.
-
-        With `magnitudes` the terms' magnitudes are added up, for h > 0.
-        """
+        """Return a polynomial's value at h, and its slope: from the highest order downwards."""
+        # With `magnitudes` the terms' magnitudes are added up, for h > 0.
         b, loop, after, width = self.b, self.b.label("orders"), self.b.label("value"), h.width
         top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
         read = self.magnitude if magnitudes else lambda value: value
@@ -239,11 +236,10 @@ class _Function:
         return self.b.wide(h, width) if width else h
 
     def judge(self, n: int, switching: int, compared: Sequence[int]) -> None:
-        """Write h times the defect, and the last term, over the tolerance.
-
-        Both are not finite where a state is not.  A third number is above 0 where something that
-        is compared may change its side, or its polynomial is not to be trusted.
-        """
+        """Write h times the defect, and the last term, over the tolerance."""
+        # Both are not finite where a state is not. A third number is above 0 where
+        # something that is compared may change its side, or its polynomial is not to be
+        # trusted.
         b, width, highest = self.b, self.width(n), self.highest()
         h, tolerances = self.steps(n), self.tolerances(n)
         power, last = self.power(highest, h), self.coefficients(highest)

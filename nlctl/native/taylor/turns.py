@@ -35,11 +35,9 @@ _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many 
 
 
 def may_turn(reading: Reading) -> bool:
-    """Whether runs of a diagram may go on by Taylor's method.
-
-    Memories and delays have no coefficients, and where clocks end the steps a run can be resumed
-    at a sample, and knows nothing of the steps before.
-    """
+    """Whether runs of a diagram may go on by Taylor's method."""
+    # Memories and delays have no coefficients, and where clocks end the steps a run can be
+    # resumed at a sample, and knows nothing of the steps before.
     program, lines = reading.program, reading.schedule.lines
     return bool(reading.system.nstates) and not (program.memory or program.sampled or lines)
 
@@ -92,10 +90,8 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
 
 
 def _fails(run: Run) -> bool:
-    """Whether Taylor's method does not get on, from a place where all is finite.
-
-    Where a guard is NaN it is, at that place: no other method may go on.
-    """
+    """Whether Taylor's method does not get on, from a place where all is finite."""
+    # Where a guard is NaN it is, at that place: no other method may go on.
     if not (run.task.taylor.highest and run.task.taylor.span):
         return False
     here = np.append(run.work.x, run.work.events.g_start)
