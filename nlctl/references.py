@@ -133,7 +133,6 @@ class FilteredStep(_Reference):
 
     @equation
     def output(t, x, u, p):
-        """The filter's states."""
         return x.copy()
 
 
@@ -182,7 +181,31 @@ class FunctionReference(_Reference):
 
 
 @record
-class BandLimitedNoise:
+class NoiseBand:
+    """What is noise in a band of frequencies, and how it is drawn."""
+
+    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
+    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
+    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
+    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
+
+    def check(self) -> None:
+        """A band has two ends."""
+        if not self.low < self.high:
+            who = type(self).__name__
+            raise ParameterError(f"{who} needs low < high, got {self.low:g} and {self.high:g}")
+
+    def spectrum(self, count: int) -> tuple[np.ndarray, ...]:
+        """Return frequencies and phases of so many signals, each of shape (count, components)."""
+        drawn = [
+            noise_spectrum(self.low, self.high, [self.seed, i], self.components)
+            for i in range(count)
+        ]
+        return tuple(map(np.array, zip(*drawn, strict=True)))
+
+
+@record
+class BandLimitedNoise(NoiseBand):
     """Adds band-limited noise to signals: measurement noise, or a disturbance on the way.
 
         out_i(t) = in_i(t) + n_i(t)
@@ -210,31 +233,18 @@ class BandLimitedNoise:
     inputs: tuple[str, ...] = ("x1", "x2")
     outputs: tuple[str, ...] = ("x1_measured", "x2_measured")
     rms: float = param(0.01, unit="1", meaning="root mean square of each noise", at_least=0)
-    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
-    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
-    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
-    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
 
     vector = True
 
     def check(self) -> None:
         """Signals come in pairs; a band has two ends."""
         pairs("BandLimitedNoise", self.inputs, self.outputs)
-        if not self.low < self.high:
-            raise ParameterError(
-                f"BandLimitedNoise needs low < high, got {self.low:g} and {self.high:g}"
-            )
+        super().check()
 
     def derived(self) -> dict[str, Any]:
         """Frequencies and phases, one row per signal."""
-        spectra = [
-            noise_spectrum(self.low, self.high, [self.seed, i], self.components)
-            for i in range(len(self.inputs))
-        ]
-        return {
-            "spectrum": np.array([s[0] for s in spectra]),
-            "angles": np.array([s[1] for s in spectra]),
-        }
+        omega, phase = self.spectrum(len(self.inputs))
+        return {"spectrum": omega, "angles": phase}
 
     @equation
     def output(t, x, u, p):

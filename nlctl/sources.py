@@ -119,7 +119,6 @@ class Sine(_Source):
 
     @equation
     def output(t, x, u, p):
-        """The sine."""
         return (p.offset + p.amplitude * np.sin(p.omega * t + p.phase),)
 
 

@@ -105,5 +105,4 @@ class Backlash(Remembering):
 
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return play_band(u, p)

@@ -103,7 +103,6 @@ class Lag(_Follower):
 
     @equation
     def update(t, x, u, p):
-        """The lag."""
         (v,) = x
         return ((p.k * u[0] - v) / p.T,)
 

@@ -68,7 +68,6 @@ class Coulomb(_ForceLaw):
 
     @equation
     def output(t, x, u, p):
-        """The force law."""
         (velocity,) = u
         return (p.F_c * np.sign(velocity) + p.sigma_2 * velocity,)
 
@@ -103,7 +102,6 @@ class Stribeck(_ForceLaw):
 
     @equation
     def output(t, x, u, p):
-        """The force law."""
         (velocity,) = u
         return (stribeck_level(velocity, p) * np.sign(velocity) + p.sigma_2 * velocity,)
 
@@ -176,7 +174,6 @@ class StickSlip(Remembering):
 
     @equation
     def commit(t, x, u, p):
-        """The mode."""
         (mode,) = x
         return (stick_mode(u[0], u[1], mode, p),)
 

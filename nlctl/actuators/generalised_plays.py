@@ -95,12 +95,10 @@ class GeneralisedPrandtlIshlinskii(Plays):
 
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (np.sum(p.w * generalised_plays(u[0], x, p)),)
 
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return generalised_plays(u[0], x, p)
 
     update = relaxation(commit)

@@ -69,7 +69,6 @@ class DeadZoneInverse(FromUToV):
 
     @equation
     def switching(t, x, u, p):
-        """The jump."""
         return (u[0],)
 
     @equation
@@ -143,7 +142,6 @@ class BacklashInverse(Remembering):
 
     @equation
     def commit(t, x, u, p):
-        """The side."""
         (side,) = x
         return (moving_side(u[1], side),)
 
@@ -220,12 +218,10 @@ class PrandtlIshlinskiiInverse(Plays):
 
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
 
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return unit_play(u[0], x, p.R)
 
     update = relaxation(commit)
@@ -237,5 +233,4 @@ class PrandtlIshlinskiiInverse(Plays):
 
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return weighted_band(u, p.W_0, p.W, p.R)

@@ -81,7 +81,6 @@ class Stop(Remembering):
 
     @equation
     def commit(t, x, u, p):
-        """The play."""
         (memory,) = x
         return (unit_play(u[0], memory, p.r),)
 
@@ -178,12 +177,10 @@ class PrandtlIshlinskii(Plays):
 
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
 
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return unit_play(u[0], x, p.r)
 
     update = relaxation(commit)
@@ -195,7 +192,6 @@ class PrandtlIshlinskii(Plays):
 
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return weighted_band(u, p.w_0, p.w, p.r)
 
 
@@ -257,11 +253,9 @@ class OneSidedDeadZones(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         beyond = np.where(p.r > 0, np.maximum(u[0] - p.r, 0.0), np.minimum(u[0] - p.r, 0.0))
         return (p.w_0 * u[0] + np.sum(p.w * beyond),)
 
     @equation
     def switching(t, x, u, p):
-        """The thresholds."""
         return u[0] - p.r

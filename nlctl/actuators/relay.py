@@ -102,7 +102,6 @@ class Relay(Remembering):
 
     @equation
     def commit(t, x, u, p):
-        """The side."""
         (side,) = x
         return (relay_side(u[0], side, p.on, p.off),)
 
@@ -110,7 +109,6 @@ class Relay(Remembering):
 
     @equation
     def switching(t, x, u, p):
-        """The thresholds."""
         return u[0] - p.on, u[0] - p.off
 
 
@@ -212,12 +210,10 @@ class Preisach(Remembering):
 
     @equation
     def commit(t, x, u, p):
-        """The sides."""
         return relay_side(u[0], x, p.alpha, p.beta)
 
     update = relaxation(commit)
 
     @equation
     def switching(t, x, u, p):
-        """All thresholds."""
         return np.concatenate((u[0] - p.alpha, u[0] - p.beta))

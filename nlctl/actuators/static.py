@@ -49,7 +49,6 @@ class DeadZone(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         (u1,) = u
         if p.b_l < u1 < p.b_r:  # false for NaN, which then reaches v
             return (0.0,)
@@ -89,7 +88,6 @@ class Gain(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The gain."""
         return (p.k * u[0],)
 
 
@@ -112,7 +110,6 @@ class Saturation(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         return (clip(u[0], -p.limit, p.limit),)
 
     @equation
@@ -147,7 +144,6 @@ class AsymmetricSaturation(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         slope = np.where(u[0] < 0, p.slope_l, p.slope_r)
         return (clip(slope * u[0], p.limit_l, p.limit_r),)
 
@@ -186,16 +182,13 @@ class Quantiser(FromUToV):
 
     @equation
     def output(t, x, u, p):
-        """The nearest level."""
         half = np.where(p.riser, 0.5, 0.0)
         return (p.q * (np.floor(u[0] / p.q + 0.5 - half) + half),)
 
     @equation
     def switching(t, x, u, p):
-        """The jumps."""
         return (np.sin(np.pi * (u[0] / p.q + np.where(p.riser, 0.0, 0.5))),)
 
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return u - 0.5 * p.q, u + 0.5 * p.q

@@ -59,6 +59,5 @@ class ExtremumSeeking:
 
     @equation
     def output(t, x, u, p):
-        """The estimate with its perturbation."""
         theta_hat, _, _ = x
         return (theta_hat + p.a * np.sin(p.omega * t),)

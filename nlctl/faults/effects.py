@@ -13,9 +13,9 @@ import numpy as np
 
 from ..actuators.memories import RELAXATION
 from ..equations import equation
-from ..errors import ParameterError
-from ..functions import noise_spectrum, noise_value
+from ..functions import noise_value
 from ..params import param, record
+from ..references import NoiseBand
 
 NEVER = 1e12
 """A time in s that no run reaches: as an onset, a fault that does not begin."""
@@ -107,24 +107,15 @@ class LossOfEffectiveness(_Effect):
 
 
 @record
-class Noise(_Effect):
+class Noise(NoiseBand, _Effect):
     """Band-limited noise, a fixed function of time: see `nlctl.references.BandLimitedNoise`."""
 
     value: float = param(0.0, unit="1", meaning="root mean square of the noise", at_least=0)
-    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
-    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
-    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
-    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
-
-    def check(self) -> None:
-        """A band has two ends."""
-        if not self.low < self.high:
-            raise ParameterError(f"Noise needs low < high, got {self.low:g} and {self.high:g}")
 
     def derived(self) -> dict[str, Any]:
         """Frequencies and phases, those of `nlctl.references.BandLimitedNoise` with one signal."""
-        omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
-        return {"omega": omega, "phase": phase}
+        omega, phase = self.spectrum(1)
+        return {"omega": omega[0], "phase": phase[0]}
 
     output = while_present(lambda t, x, u, p: u[0] + noise_value(t, p.value, p.omega, p.phase))
 
@@ -255,6 +246,5 @@ class Latch:
 
     @equation
     def output(t, x, u, p):
-        """What is remembered."""
         on, since = x
         return on, since

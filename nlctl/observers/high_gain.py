@@ -104,5 +104,4 @@ class HighGainObserver:
 
     @equation
     def output(t, x, u, p):
-        """The estimates."""
         return x.copy()

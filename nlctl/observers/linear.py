@@ -81,7 +81,6 @@ class LuenbergerObserver:
 
     @equation
     def output(t, x, u, p):
-        """The estimates."""
         return x.copy()
 
 

@@ -98,5 +98,4 @@ class Sampling:
 
     @equation
     def output(t, x, u, p):
-        """It has no signals."""
         return ()

@@ -11,12 +11,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from ..expressions.conditions import JUMPING
 from ..expressions.graph import Expr, Graph, needed
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
 _QUOTIENTS = {"remainder": "floor", "fmod": "trunc"}
-_JUMPS = (*_ORDERS, *_WHOLE, *_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,11 @@ class Branch:
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
     """Return the operations that may jump in expressions, parts first."""
     nodes = needed(exprs)
-    return [n for n in nodes if n.varies and n.op in _JUMPS and any(a.varies for a in n.args)]
+    return [
+        n
+        for n in nodes
+        if n.varies and (n.op in _ORDERS or n.op in JUMPING) and any(a.varies for a in n.args)
+    ]
 
 
 def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:

@@ -13,7 +13,7 @@ from ...equations import equation
 from ...errors import ParameterError
 from ...params import Vector, param, record
 from ...plants import coordinate_names
-from ..mrac import ModelReferenceLaw
+from ..mrac.laws import ModelReferenceLaw
 from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 
 
@@ -79,7 +79,6 @@ class DynamicSurface:
 
     @equation
     def update(t, x, u, p):
-        """The filters."""
         return surfaces(x, u, p)[1]
 
     @equation

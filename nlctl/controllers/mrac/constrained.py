@@ -42,7 +42,6 @@ class ConstrainedLaw:
 
     @equation
     def switching(t, x, u, p):
-        """The limits."""
         return u[0] - p.u_max, u[0] + p.u_max
 
 

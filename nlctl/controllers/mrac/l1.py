@@ -63,7 +63,6 @@ class StatePredictor:
 
     @equation
     def output(t, x, u, p):
-        """Its state."""
         return x.copy()
 
 
@@ -97,13 +96,11 @@ class FilteredLaw:
 
     @equation
     def update(t, x, u, p):
-        """The filter."""
         yd, W_psi = u
         return (-p.omega * (x[0] - (p.b * yd - W_psi) / p.gain),)
 
     @equation
     def output(t, x, u, p):
-        """Its state."""
         return (x[0],)
 
 

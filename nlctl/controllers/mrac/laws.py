@@ -41,7 +41,6 @@ class ModelReferenceLaw:
 
     @equation
     def output(t, x, u, p):
-        """The law."""
         nu, nu_e, W_psi = u
         return ((nu + nu_e - W_psi) / p.gain,)
 
@@ -67,5 +66,4 @@ class DirectLaw:
 
     @equation
     def output(t, x, u, p):
-        """The law."""
         return (-u[0],)

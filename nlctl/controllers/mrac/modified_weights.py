@@ -39,7 +39,6 @@ class EModifiedWeights(NetworkWeights):
 
     @equation
     def update(t, x, u, p):
-        """Adaptation law."""
         r, psi, W_hat = u[0], u[1:], x
         return p.Gamma * (r * psi - p.sigma * np.absolute(r) * W_hat)
 

@@ -47,7 +47,6 @@ class AffineRegressor(_StateRegressor):
 
     @equation
     def output(t, x, u, p):
-        """The states, and 1."""
         return np.append(u, 1.0)
 
 
@@ -68,7 +67,6 @@ class LinearRegressor(_StateRegressor):
 
     @equation
     def output(t, x, u, p):
-        """The signals themselves."""
         return np.copy(u)
 
 

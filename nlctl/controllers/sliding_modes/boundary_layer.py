@@ -41,13 +41,11 @@ class SlidingModeLaw:
 
     @equation
     def output(t, x, u, p):
-        """The law."""
         (r,) = u
         return (-p.K * clip(r / p.phi, -1.0, 1.0),)
 
     @equation
     def switching(t, x, u, p):
-        """The edges of the layer."""
         (r,) = u
         return r + p.phi, r - p.phi
 
@@ -131,13 +129,11 @@ class SuperTwistingLaw:
 
     @equation
     def output(t, x, u, p):
-        """The law."""
         (w,) = x
         (r,) = u
         return (w - p.k_1 * r / np.sqrt(np.maximum(np.absolute(r), p.phi)),)
 
     @equation
     def switching(t, x, u, p):
-        """The edges of the layer."""
         (r,) = u
         return r + p.phi, r - p.phi
