@@ -14,11 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = [
-    "AT_LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
-    "tolerance_of",
-]  # fmt: skip
-
 AT_LEAST = 5  # switches that are examined
 WITHIN = 100.0  # tolerances that what is compared changes by in between
 SECOND_ORDER = (

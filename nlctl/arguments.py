@@ -12,24 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .errors import ParameterError
-from .params import as_numbers, integer
-
-__all__ = [
-    "ATOL",
-    "RTOL",
-    "a_function",
-    "flag",
-    "fraction",
-    "integer",
-    "number",
-    "of_type",
-    "one_of",
-    "pairs",
-    "text",
-    "tolerances",
-    "tuple_of",
-    "vector",
-]
+from .params import as_numbers
+from .params import integer as integer
 
 _T = TypeVar("_T")
 RTOL, ATOL = 1e-8, 1e-10  # of every run unless it is given others: a member of an ensemble is a run

@@ -189,32 +189,11 @@ class Block(OwnParameters):
             )
         return complex(describing_function(self, A))
 
-    def answer(self, t: float, x: Any, u: Any) -> Any:
-        """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
-
-        Parameters
-        ----------
-        t : float
-            Time (s).
-        x : array_like of shape (n,)
-            States.
-        u : array_like of shape (m,)
-            Inputs.
-
-        Returns
-        -------
-        ndarray of shape (k,)
-            The outputs.
-
-        Raises
-        ------
-        UsageError
-            If nothing is: it is a transport delay, for example, which python-control would run
-            wrongly.
-        """
+    def _answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now."""
         supplied = supplied_of(self)
         if supplied is None:
-            return super().answer(t, x, u)
+            return super()._answer(t, x, u)
         now = supplied_now(self)
         if now is None:
             raise UsageError(f"block '{self.name}' {supplied.why}")
@@ -232,19 +211,8 @@ class Block(OwnParameters):
                 raise unknown("parameter", name, fields, f"of block '{self.name}'")
         return overrides
 
-    def taken(self, params: Mapping[str, Any]) -> Any:
-        """Return what equations get as `p`; python-control asks for it before a run.
-
-        Parameters
-        ----------
-        params : mapping
-            Overrides of this run, by the names of the block's parameters.
-
-        Returns
-        -------
-        object
-            What the equations read as `p`: a number or an array under each name.
-        """
+    def _taken(self, params: Mapping[str, Any]) -> Any:
+        """Return what equations get as `p`; python-control asks for it before a run."""
         before, self.current_spec = self.current_spec, self._resolved(params)
         if self.current_spec is before:
             return current_parameters(self)

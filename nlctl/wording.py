@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import SupportsIndex
 
-__all__ = ["counted", "some_of"]
-
 
 def counted(number: SupportsIndex, one: str, many: str = "") -> str:
     """Return a number and its noun: ``"1 state"``, ``"2 states"``."""

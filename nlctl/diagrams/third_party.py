@@ -68,10 +68,10 @@ class Named(_TakesADict):
 
     @params.setter
     def params(self, values: Mapping[str, Any]) -> None:
-        self.nlctl_own = self.taken(values or {})
+        self.nlctl_own = self._taken(values or {})
         set_parameters(self, None)
 
-    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+    def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read: its own values, overridden."""
         values, prefix = dict(self.nlctl_own), f"{self.name}."
         for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
@@ -82,7 +82,7 @@ class Named(_TakesADict):
 class Overridden(_TakesADict):
     """A third-party block of a run of its own, see `apart`."""
 
-    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+    def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read."""
         values = {**self.params, **params}
         for name, value in self.nlctl_overrides.items():

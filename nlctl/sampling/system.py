@@ -193,7 +193,7 @@ class Sampled(Around):
 
         return np.concatenate(self.after(now, x, self.oldest(oldest, x, p), computed))
 
-    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its outputs; see `happening`."""
         x = np.asarray(x, dtype=float)
         own, _, held = self.parts(x)

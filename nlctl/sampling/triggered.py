@@ -7,8 +7,6 @@ import numpy as np
 from ..equations import equation
 from ..params import param, record
 
-__all__ = ["TriggeredHold"]
-
 
 @record
 class TriggeredHold:

@@ -163,19 +163,19 @@ class OwnParameters(ct.NonlinearIOSystem):
 
     reads_a_dict = False
 
-    def taken(self, params: Mapping[str, Any]) -> Any:
+    def _taken(self, params: Mapping[str, Any]) -> Any:
         """Return what the equations get, of the overrides of a run."""
         raise NotImplementedError
 
-    def answer(self, t: float, x: Any, u: Any) -> Any:
+    def _answer(self, t: float, x: Any, u: Any) -> Any:
         """Return its outputs, with the parameters that it has now."""
         return super()._out(t, x, u)
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        self._current_params = type(self).taken(self, params or {})
+        self._current_params = type(self)._taken(self, params or {})
 
     def _out(self, t: float, x: Any, u: Any) -> Any:
-        return type(self).answer(self, t, x, u)  # an object of others may have one of its own
+        return type(self)._answer(self, t, x, u)  # an object of others may have one of its own
 
 
 class Around(ct.NonlinearIOSystem):
@@ -191,7 +191,7 @@ class Around(ct.NonlinearIOSystem):
         """Return its derivatives."""
         raise NotImplementedError
 
-    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its outputs."""
         raise NotImplementedError
 
@@ -214,7 +214,7 @@ class Around(ct.NonlinearIOSystem):
         return self.rates(t, x, u)
 
     def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
-        return self.answer(t, x, u)
+        return self._answer(t, x, u)
 
 
 class StandIn(ct.InputOutputSystem):

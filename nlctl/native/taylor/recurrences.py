@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 from ...expressions.arrays import scalar
 from ...expressions.conditions import at_integers, switching_function
-from ...expressions.derivatives import partials
+from ...expressions.derivatives import linear, partials
 from ...expressions.functions import FUNCTIONS
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from ...expressions.stage import Stage
@@ -236,30 +236,15 @@ class _Reader:
         graph, zero = self.graph, self.graph.const(0.0)
         if all(term is None for term in terms):
             return None
-        if node.op == "concat":
-            return graph.joined([(t or zero, n) for t, n in zip(terms, node.data, strict=True)])
         a, b = terms[0], terms[-1]
-        if node.op == "add":
-            return graph.op("add", a, b) if a and b else a or b
-        if node.op == "sub":
-            return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or zero)
         if node.op == "mul":
             other = node.args[0] if a is None else node.args[1]
             return None if other.op == "const" and other.data == 0.0 else graph.op(
                 "mul", other, a or b or zero
             )  # fmt: skip
-        if a is None:
-            return None
         if node.op == "div":
-            return graph.op("div", a, node.args[1])
-        if node.op == "item":
-            return graph.item(a, node.data)
-        if node.op == "slice":
-            start, step = node.data
-            return graph.part(a, start, step, node.size or 1)
-        if node.op == "sum":
-            return graph.sum(a, node.args[0].size or 1)
-        return graph.op("neg", a)
+            return graph.op("div", a, node.args[1]) if a else None
+        return linear(graph, node, terms)
 
     def _product(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         """a_0 b_k + a_k b_0 + sum a_j b_{k-j}; of what is affine there is one term of the sum."""
