@@ -14,6 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+__all__ = [
+    "AT_LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
+    "tolerance_of",
+]  # fmt: skip
+
 AT_LEAST = 5  # switches that are examined
 WITHIN = 100.0  # tolerances that what is compared changes by in between
 SECOND_ORDER = (
@@ -30,13 +35,27 @@ StateValue = Callable[[float, np.ndarray], float]
 
 @dataclass(frozen=True, kw_only=True)
 class Crowd:
-    """Switches that come ever closer together."""
+    """Switches that come ever closer together.
 
-    row: int  # which condition, in the order of the engine
-    last: float  # time of the last switch (s)
-    period: float  # from the last switch but two to it: two of them (s)
-    ratio: float  # of two such periods in a row
-    more: float  # switches that there would be until the end of the run, at that pace
+    Attributes
+    ----------
+    row : int
+        Which condition, in the order of the engine.
+    last : float
+        Time of the last switch (s).
+    period : float
+        From the last switch but two to it: two of them (s).
+    ratio : float
+        Of two such periods in a row.
+    more : float
+        Switches that there would be until the end of the run, at that pace.
+    """
+
+    row: int
+    last: float
+    period: float
+    ratio: float
+    more: float
 
     @property
     def end(self) -> float:

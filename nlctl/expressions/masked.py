@@ -59,11 +59,6 @@ class Masked(Computed):
 
     size = property(count)
 
-    def __pow__(self, exponent: Any) -> Masked:
-        if isinstance(exponent, Tracer | np.ndarray) and exponent.ndim:
-            raise Untraceable("an array next to elements that a mask chooses")
-        return Masked(self.whole**exponent, self.mask)
-
     def _text(self, *_: Any) -> Any:
         raise Untraceable("elements that a mask chooses, whose number only the run knows")
 
@@ -75,3 +70,12 @@ class MaskedPlaces(Special):
 
     def __init__(self, mask: Tracer) -> None:
         self.mask = mask
+
+
+def _power(self: Masked, exponent: Any) -> Masked:
+    if isinstance(exponent, Tracer | np.ndarray) and exponent.ndim:
+        raise Untraceable("an array next to elements that a mask chooses")
+    return Masked(self.whole**exponent, self.mask)  # type: ignore[operator]
+
+
+Masked.__pow__ = _power  # type: ignore[attr-defined]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
-from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable, needed
+from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 
 _Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
@@ -177,17 +177,20 @@ def _invert(self: Tracer) -> Tracer:
     """Return the negation of NumPy's truth values; of Python's own ~True is -2."""
     if any(e.kind != "b" for e in self.cells.flat):
         raise Untraceable("~ of numbers")
-    if not all(map(is_of_arrays, self.cells.flat)):
+    if not all(map(_is_of_arrays, self.cells.flat)):
         raise Ambiguous("takes ~ of a truth value, and ~True is -2 in Python: write not")
     return elementwise(self.graph, "not", self)
 
 
-def is_of_arrays(expr: Expr) -> bool:
-    """Whether a number or a condition is one of NumPy's: it depends on states or inputs."""
-    nodes = needed([expr])
-    return any(
-        e.op in ("call", "solve") or (e.op == "leaf" and e.data[0] in ("x", "u")) for e in nodes
-    )
+def _is_of_arrays(condition: Expr) -> bool:
+    """Whether a condition is one of NumPy's: it depends on states or inputs."""
+    waiting = [condition]
+    while waiting:
+        expr = waiting.pop()
+        if expr.op in ("call", "solve") or (expr.op == "leaf" and expr.data[0] in ("x", "u")):
+            return True
+        waiting.extend(expr.args)
+    return False
 
 
 def _integer(self: Tracer) -> int:
