@@ -71,7 +71,7 @@ class Clock:
         if self.jitter and self.jitter + self.delay >= self.dt:
             raise ParameterError(
                 f"Clock needs jitter + delay < dt, got {self.jitter:g} + {self.delay:g} and "
-                f"{self.dt:g} s: how many samples are on their way would depend on chance"
+                f"{self.dt:g} s: how many samples wait would depend on chance"
             )
 
     @property
@@ -100,20 +100,20 @@ class Instants(NamedTuple):
 
 def moments(clocks: Clocks) -> list[Moment]:
     """Return all that these clocks do."""
-    found = [Moment(owner, 1) for owner in clocks]
-    return found + [Moment(owner, 0) for owner, clock in clocks.items() if clock.delay]
+    sampling = [Moment(owner, 1) for owner in clocks]
+    return sampling + [Moment(owner, 0) for owner, clock in clocks.items() if clock.delay]
 
 
 def meetings(clocks: Clocks) -> list[frozenset[Moment]]:
     """Return what may happen at one instant: sets of moments whose instants meet."""
-    found: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
+    combined: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
     for series, together in _alike(clocks).items():
-        found += [
+        combined += [
             (what | together, (*others, series))
-            for what, others in found
+            for what, others in combined
             if all(_meet(series, other) for other in others)
         ] + [(together, (series,))]
-    return [what for what, _ in found]
+    return [what for what, _ in combined]
 
 
 def _meet(one: _Series, other: _Series) -> bool:

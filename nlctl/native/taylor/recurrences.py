@@ -13,7 +13,7 @@ differentiated in turn, as sin and cos.
 
 The sums are left to one loop, see `folds`; all else at an order k is a function like any other.
 What is affine in time, as are inputs between two break points, has no sums.  At a kink the side
-counts on which the solution goes on: that of the first coefficient that is not 0.  A function of
+counts on which the solution continues: that of the first coefficient that is not 0.  A function of
 what is so large that it does not depend on it any more, as 1 / cosh(t)^2, is constant: coefficients
 of an argument that overflows are not asked for.
 """
@@ -37,7 +37,7 @@ ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = (
     2,
 )  # rows of "w": k, 1 / k, and 1 for k = 1, otherwise 0
 _WEIGHT_ROWS = 3
-_LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that leaves nothing to tell
+_LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that says nothing more
 ROOM = 8  # rows that sums of vectors take are a multiple of this
 
 
@@ -217,7 +217,7 @@ class _Reader:
             return self.graph.op("mul", following, self.weight(RECIPROCAL_ROW))
         if node.op in ("call", "solve"):
             what = "an algebraic loop" if node.op == "solve" else f"the function {node.data[0]}"
-            raise NoSeriesError(f"{what} is solved or called as it stands")
+            raise NoSeriesError(f"{what} is solved or called unchanged")
         if node.op in FUNCTIONS:
             return self._function(node)
         if node.op == "select":
@@ -263,14 +263,14 @@ class _Reader:
     def _quotient(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         """q = a / b: q_k = (a_k - sum_{j=1}^{k} b_j q_{k-j}) / b_0."""
         graph, under = self.graph, node.args[1]
-        found = a
+        numerator = a
         if b is not None:
             last = graph.op("mul", b, self.value(node))
             inner = graph.op("add", self._sum(b, ("node", node)), last)
             inner = self._unless_flat(inner, under, graph.op("div", node, under))
-            found = graph.op("sub", a, inner) if a else graph.op("neg", inner)
+            numerator = graph.op("sub", a, inner) if a else graph.op("neg", inner)
         reciprocal = self.value(graph.op("div", graph.const(1.0), under))
-        return graph.op("mul", found, reciprocal) if found else None
+        return graph.op("mul", numerator, reciprocal) if numerator else None
 
     def _function(self, node: Expr) -> Expr | None:
         """Return the coefficient of a function of the table, as its row says."""
@@ -282,14 +282,14 @@ class _Reader:
         if isinstance(row, Callable):
             given = [scalar(self.graph, self.graph.number(a)) for a in node.args]
             return self.term(self.stage.copied(row)(*given).only)
-        found: Expr | None = None
+        total: Expr | None = None
         for i, (arg, term) in enumerate(zip(node.args, terms, strict=True)):
             if term is not None:
                 derivative = _steady(self.graph, self.partial(node, i), node)
                 part = self._chained(arg, term, derivative)
                 part = part and self._unless_flat(part, arg, derivative)
-                found = self.graph.op("add", found, part) if found and part else found or part
-        return self.graph.op("mul", found, self.weight(RECIPROCAL_ROW)) if found else None
+                total = self.graph.op("add", total, part) if total and part else total or part
+        return self.graph.op("mul", total, self.weight(RECIPROCAL_ROW)) if total else None
 
     def _chained(self, arg: Expr, term: Expr, derivative: Expr) -> Expr | None:
         """Return k times the coefficient of f(x): the sum over j = 1..k of j x_j d_{k-j}."""
@@ -297,16 +297,16 @@ class _Reader:
         factors, inner = _factors(derivative)
         slope = self.slope(arg)
         if not inner.varies:
-            found = graph.op("mul", graph.op("mul", term, self.weight(ORDER_ROW)), inner)
+            product = graph.op("mul", graph.op("mul", term, self.weight(ORDER_ROW)), inner)
         elif isinstance(slope, Expr):
-            found = graph.op("mul", slope, self.previous(inner))
+            product = graph.op("mul", slope, self.previous(inner))
         else:
             rate = graph.op("mul", term, self.weight(ORDER_ROW))
             last = graph.op("mul", rate, self.value(inner))
-            found = graph.op("add", self._sum(rate, ("node", inner)), last)
+            product = graph.op("add", self._sum(rate, ("node", inner)), last)
         for factor in factors:
-            found = graph.op("mul", factor, found) if factor else graph.op("neg", found)
-        return found
+            product = graph.op("mul", factor, product) if factor else graph.op("neg", product)
+        return product
 
     def _unless_flat(self, part: Expr, arg: Expr, derivative: Expr) -> Expr:
         """Return what follows from an argument, 0 where that is large and nothing follows."""
@@ -314,8 +314,8 @@ class _Reader:
         if not derivative.varies or not self.overflows:
             return part
         large = graph.op("gt", graph.op("absolute", arg), graph.const(_LARGE))
-        tells = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
-        flat = graph.op("and", large, graph.op("not", tells))  # NaN tells nothing: inf * 0
+        says = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
+        flat = graph.op("and", large, graph.op("not", says))  # NaN says nothing: inf * 0
         zero = graph.const(0.0)
         counts = self.value(graph.op("select", flat, zero, graph.const(1.0)))
         return graph.op("select", graph.op("ne", counts, zero), part, zero)
@@ -336,8 +336,8 @@ class _Reader:
             array = "q" if size else "a"
             room = -(-(size or 1) // ROOM) * ROOM if size else 1  # whole vectors are written
             self.sums[key] = self.graph.leaf(array, self._take(array, room), size)
-        found = self.sums[key]
-        return self.graph.op("neg", found) if turned else found
+        total = self.sums[key]
+        return self.graph.op("neg", total) if turned else total
 
     # -- conditions
 
@@ -354,7 +354,7 @@ class _Reader:
         if node.op in LOGIC or node.op == "select":
             return graph.op(node.op, *(self.side(a) for a in node.args))
         if node.op not in COMPARISONS:
-            raise NoSeriesError(f"it is not known on which side '{node.op}' goes on")
+            raise NoSeriesError(f"it is not known on which side '{node.op}' continues")
         return graph.op(node.op, self._side_of(graph.op("sub", *node.args)), zero)
 
     def _side_of(self, distance: Expr) -> Expr:
@@ -377,7 +377,7 @@ class _Reader:
 
     def _folds(self, packed: bool) -> list[Fold]:
         """Give the factors of sums their rows."""
-        zero, found, pairs, places = self.graph.const(0.0), [], [], {}
+        zero, folds, pairs, places = self.graph.const(0.0), [], [], {}
         for node, term in self.terms.items():
             if node.op == "leaf" and node.data[0] == "x" and node.data[2] < 2:
                 places[term] = node.data[1]  # where the states' own coefficients are
@@ -393,15 +393,15 @@ class _Reader:
             for left, right, total in numbers:
                 for factor, begin in zip((left, right), rows, strict=True):
                     self._later(begin + total.data[1], factor)
-            found.append(Fold(left=rows[0], right=rows[1], steps=(1, 1), array="a", row=0,
+            folds.append(Fold(left=rows[0], right=rows[1], steps=(1, 1), array="a", row=0,
                               size=len(numbers)))  # fmt: skip
         for left, right, total in pairs:
             if not (packed and total.size is None):
                 rows = [self._placed(factor, places) for factor in (left, right)]
                 steps = (int(left.size is not None), int(right.size is not None))
-                found.append(Fold(left=rows[0], right=rows[1], steps=steps, array=total.data[0],
+                folds.append(Fold(left=rows[0], right=rows[1], steps=steps, array=total.data[0],
                                   row=total.data[1], size=total.size or 1))  # fmt: skip
-        return found
+        return folds
 
     def _placed(self, factor: Expr, places: dict[Expr | None, int]) -> int:
         if factor not in places:

@@ -97,16 +97,16 @@ class _Function:
         index, first = f"%i.{loop}", len(b.lines)
         entries = [Value(f"%l{i}.{loop}", z.width) for i, z in enumerate(zeros)]
         b.lines += [""] * (1 + len(zeros))
-        found = list(write(index, entries))
+        values = list(write(index, entries))
         following = b.new(f"add i64 {index}, {step}").text
         more = b.new(f"icmp slt i64 {following}, {turns * step}").text
         b.lines[first] = f"{index} = phi i64 [0, %{before}], [{following}, %{b.block}]"
-        for i, (entry, zero, new) in enumerate(zip(entries, zeros, found, strict=True)):
+        for i, (entry, zero, new) in enumerate(zip(entries, zeros, values, strict=True)):
             ways = f"[{zero.text}, %{before}], [{new.text}, %{b.block}]"
             b.lines[first + 1 + i] = f"{entry.text} = phi {entry.type} {ways}"
         b.write(f"br i1 {more}, label %{loop}, label %{after}")
         b.begin(after)
-        return found
+        return values
 
     def polynomial(
         self, highest: str, at: str, h: Value, *, slope: bool, magnitudes: bool = False
@@ -124,19 +124,19 @@ class _Function:
         b.lines += [""] * (2 + len(start))
         entries = [Value(f"%p{i}.{loop}", width) for i in range(len(start))]
         below = b.new(f"getelementptr double, ptr %c.{loop}, i64 {-self.size}").text
-        found = [b.add(b.mul(entries[0], h), read(b.load(below, width)))]
+        values = [b.add(b.mul(entries[0], h), read(b.load(below, width)))]
         if slope:
-            found.append(b.add(b.mul(entries[1], h), entries[0]))
+            values.append(b.add(b.mul(entries[1], h), entries[0]))
         left = b.new(f"add i64 %left.{loop}, -1").text
         more = b.new(f"icmp sgt i64 {left}, 0").text
         b.lines[head] = f"%c.{loop} = phi ptr [{top}, %{before}], [{below}, %{loop}]"
         b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
-        for i, (entry, first, new) in enumerate(zip(entries, start, found, strict=True)):
+        for i, (entry, first, new) in enumerate(zip(entries, start, values, strict=True)):
             ways = f"[{first.text}, %{before}], [{new.text}, %{loop}]"
             b.lines[head + 2 + i] = f"{entry.text} = phi {entry.type} {ways}"
         b.write(f"br i1 {more}, label %{loop}, label %{after}")
         b.begin(after)
-        return found
+        return values
 
     def power(self, highest: str, h: Value) -> Value:
         """Return h to the power of the highest order."""
@@ -208,12 +208,12 @@ class _Function:
         def write(at: str, largest: Sequence[Value]) -> list[Value]:
             size = self.magnitude(self.read("x", at, width))
             scale = self.weight(size, tolerances)
-            found = []
+            parts = []
             for order, before in zip(orders, largest, strict=True):
                 where = b.new(f"getelementptr double, ptr {order}, i64 {at}").text
                 part = b.mul(self.magnitude(b.load(where, width)), scale)
-                found.append(self.larger(before, part))
-            return found
+                parts.append(self.larger(before, part))
+            return parts
 
         self.write_largest([self.over_lanes(value) for value in self.rows(n, GROWN, write)])
 
@@ -222,8 +222,8 @@ class _Function:
         highest, h = self.highest(), self.steps(n)
 
         def write(at: str, _: Sequence[Value]) -> list[Value]:
-            found = self.polynomial(highest, at, h, slope=True)
-            for array, value in zip(("x", "slope"), found, strict=True):
+            ends = self.polynomial(highest, at, h, slope=True)
+            for array, value in zip(("x", "slope"), ends, strict=True):
                 self.b.store(value, self.place(array, at))
             return []
 
@@ -255,11 +255,11 @@ class _Function:
             parts = zip(largest, (missed, term), strict=True)
             return [self.larger(before, part) for before, part in parts]
 
-        found = [self.over_lanes(value) for value in self.rows(n, 2, write)]
+        greatest = [self.over_lanes(value) for value in self.rows(n, 2, write)]
         doubts = constant(-1.0, self.lanes if self.lanes > 1 else 0)
         for row, count in runs([*range(n, n + switching), *compared]):
             doubts = self._doubts(row, count, self.below(highest), doubts)
-        self.write_largest([*found, doubts])
+        self.write_largest([*greatest, doubts])
 
     def _doubts(self, row: int, count: int, highest: str, before: Value) -> Value:
         """Return the largest doubt of some rows, or that of rows before."""
@@ -283,9 +283,9 @@ class _Function:
             doubt = b.select(b.compare("ogt", crossing, doubt), crossing, doubt)
             return [b.select(b.compare("ogt", doubt, largest[0]), doubt, largest[0])]
 
-        (found,) = self.rows(count, 1, write)
-        found = self.over_lanes(found)
-        return b.select(b.compare("ogt", found, before), found, before)
+        (most,) = self.rows(count, 1, write)
+        most = self.over_lanes(most)
+        return b.select(b.compare("ogt", most, before), most, before)
 
     def values(self, n: int, count: int) -> None:
         """Write the switching functions' polynomials at h."""
@@ -309,10 +309,10 @@ def runs(rows: Sequence[int]) -> list[tuple[int, int]]:
     >>> runs([7, 3, 4, 5])
     [(3, 3), (7, 1)]
     """
-    found: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for row in sorted(rows):
-        if found and row == sum(found[-1]):
-            found[-1] = (found[-1][0], found[-1][1] + 1)
+        if pairs and row == sum(pairs[-1]):
+            pairs[-1] = (pairs[-1][0], pairs[-1][1] + 1)
         else:
-            found.append((row, 1))
-    return found
+            pairs.append((row, 1))
+    return pairs
