@@ -8,7 +8,7 @@ import control as ct
 import numpy as np
 
 from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
+from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
 from ...params import Vector, param, record
@@ -141,9 +141,8 @@ def dynamic_surface_control(
     regressor, weights = fitting_network("dynamic_surface_control", basis, weights, AdaptiveWeights)
     pieces = {"surface": surface, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
-    systems = [as_system(piece, key) for key, piece in pieces.items()]
     return interconnect(
-        systems,
+        pieces,
         inputs=[*coordinate_names(order), "yd", "yd1"],
         outputs=["e", "r", "u", "W_norm"],
         name=name,

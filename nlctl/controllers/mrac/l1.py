@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 
 from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
+from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
 from ...params import Vector, param, record
@@ -167,9 +167,8 @@ def l1_adaptive(
     )
     error = ModelError(K=predictor.a, Q=(1.0,) * order) if error is None else error
     pieces = {"predictor": predictor, "error": error, "basis": regressor, "weights": weights}
-    systems = [as_system(piece, key) for key, piece in {**pieces, "law": law}.items()]
     return interconnect(
-        systems,
+        {**pieces, "law": law},
         inputs=[*coordinate_names(order), "yd"],
         outputs=["e", "r", "u", "W_norm", *model_state_names(order)],
         name=name,

@@ -83,13 +83,11 @@ def sliding_mode(
     >>> sliding_mode().output_labels
     ['e', 'r', 'u']
     """
-    blocks = {
-        "filtered_error": FilteredError() if filtered_error is None else filtered_error,
-        "law": SlidingModeLaw() if law is None else law,
-    }
-    systems = [as_system(piece, key) for key, piece in blocks.items()]
-    signals = systems[0].input_labels
-    return interconnect(systems, inputs=signals, outputs=["e", "r", "u"], name=name)
+    first = as_system(
+        FilteredError() if filtered_error is None else filtered_error, "filtered_error"
+    )
+    blocks = {"filtered_error": first, "law": SlidingModeLaw() if law is None else law}
+    return interconnect(blocks, inputs=first.input_labels, outputs=["e", "r", "u"], name=name)
 
 
 @record

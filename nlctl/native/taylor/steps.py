@@ -16,8 +16,9 @@ from collections.abc import Callable, Sequence
 
 from ..codegen.ir.text import Body, Module, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
-from .folds import WIDE, SeriesLayout
+from .folds import WIDE, SeriesLayout, Turns
 
+_ZERO = Value("0", 0, "i")
 GROWN = 4  # coefficients by whose growth a step is chosen
 _Write = Callable[[str, Sequence[Value]], Sequence[Value]]  # of a place and of largest values
 
@@ -91,70 +92,44 @@ class _Function:
         return self.lanes if self.lanes > 1 else WIDE if count >= WIDE else 0
 
     def _loop(self, turns: int, step: int, zeros: list[Value], write: _Write) -> list[Value]:
-        b, loop, after, before = self.b, self.b.label("rows"), self.b.label("end"), self.b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        index, first = f"%i.{loop}", len(b.lines)
-        entries = [Value(f"%l{i}.{loop}", z.width) for i, z in enumerate(zeros)]
-        b.lines += [""] * (1 + len(zeros))
-        values = list(write(index, entries))
-        following = b.new(f"add i64 {index}, {step}").text
-        more = b.new(f"icmp slt i64 {following}, {turns * step}").text
-        b.lines[first] = f"{index} = phi i64 [0, %{before}], [{following}, %{b.block}]"
-        for i, (entry, zero, new) in enumerate(zip(entries, zeros, values, strict=True)):
-            ways = f"[{zero.text}, %{before}], [{new.text}, %{b.block}]"
-            b.lines[first + 1 + i] = f"{entry.text} = phi {entry.type} {ways}"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
+        b = self.b
+        loop = Turns(b, [_ZERO, *zeros])
+        index, *entries = loop.carried
+        values = list(write(index.text, entries))
+        following = b.new(f"add i64 {index.text}, {step}")
+        loop.end(b.new(f"icmp slt i64 {following.text}, {turns * step}"), [following, *values])
         return values
+
+    def _countdown(self, turns: Turns, left: Value, following: Sequence[Value]) -> None:
+        """End a loop that has as many turns as `left`, which it carries last."""
+        less = self.b.new(f"add i64 {left.text}, -1")
+        turns.end(self.b.new(f"icmp sgt i64 {less.text}, 0"), [*following, less])
 
     def polynomial(
         self, highest: str, at: str, h: Value, *, slope: bool, magnitudes: bool = False
     ) -> list[Value]:
         """Return a polynomial's value at h, and its slope: from the highest order downwards."""
         # With `magnitudes` the terms' magnitudes are added up, for h > 0.
-        b, loop, after, width = self.b, self.b.label("orders"), self.b.label("value"), h.width
+        b, width = self.b, h.width
         top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
         read = self.magnitude if magnitudes else lambda value: value
         start = [read(b.load(top, width))] + [constant(0.0, width)] * slope
-        before = b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        head = len(b.lines)
-        b.lines += [""] * (2 + len(start))
-        entries = [Value(f"%p{i}.{loop}", width) for i in range(len(start))]
-        below = b.new(f"getelementptr double, ptr %c.{loop}, i64 {-self.size}").text
-        values = [b.add(b.mul(entries[0], h), read(b.load(below, width)))]
+        turns = Turns(b, [Value(top, 0, "p"), *start, Value(highest, 0, "i")])
+        place, *entries, left = turns.carried
+        below = b.new(f"getelementptr double, ptr {place.text}, i64 {-self.size}")
+        values = [b.add(b.mul(entries[0], h), read(b.load(below.text, width)))]
         if slope:
             values.append(b.add(b.mul(entries[1], h), entries[0]))
-        left = b.new(f"add i64 %left.{loop}, -1").text
-        more = b.new(f"icmp sgt i64 {left}, 0").text
-        b.lines[head] = f"%c.{loop} = phi ptr [{top}, %{before}], [{below}, %{loop}]"
-        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
-        for i, (entry, first, new) in enumerate(zip(entries, start, values, strict=True)):
-            ways = f"[{first.text}, %{before}], [{new.text}, %{loop}]"
-            b.lines[head + 2 + i] = f"{entry.text} = phi {entry.type} {ways}"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
+        self._countdown(turns, left, [below, *values])
         return values
 
     def power(self, highest: str, h: Value) -> Value:
         """Return h to the power of the highest order."""
-        b, loop, after, before = self.b, self.b.label("power"), self.b.label("known"), self.b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        head = len(b.lines)
-        b.lines += ["", ""]
-        entry = Value(f"%p.{loop}", h.width)
-        new = b.mul(entry, h)
-        left = b.new(f"add i64 %left.{loop}, -1").text
-        more = b.new(f"icmp sgt i64 {left}, 0").text
-        one = constant(1.0, h.width).text
-        b.lines[head] = f"{entry.text} = phi {entry.type} [{one}, %{before}], [{new.text}, %{loop}]"
-        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
-        return new
+        turns = Turns(self.b, [constant(1.0, h.width), Value(highest, 0, "i")])
+        so_far, left = turns.carried
+        power = self.b.mul(so_far, h)
+        self._countdown(turns, left, [power])
+        return power
 
     # -- largest values
 
