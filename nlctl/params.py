@@ -341,7 +341,7 @@ def integer(who: str, name: str, value: Any, at_least: int, at_most: float = mat
 
 
 def set_integer(spec: Any, name: str, at_least: int, at_most: float = math.inf) -> None:
-    """Make a field of a record that is no parameter an int."""
+    """Check an argument of a record, such as an order, and keep it as an int."""
     label = "an order" if name == "order" else name
     value = integer(type(spec).__name__, label, getattr(spec, name), at_least, at_most)
     object.__setattr__(spec, name, value)
