@@ -22,13 +22,13 @@ from .annotations import as_numbers, reporting
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 
-Vector = tuple[float, ...]
-Matrix = tuple[Vector, ...]
+Floats = tuple[float, ...]
+Matrix = tuple[Floats, ...]
 _T = TypeVar("_T")
 _KEY = "nlctl"
 _MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
 HIGHEST_ORDER = 100  # of plants and references: a block has a signal for each derivative
-EQUATIONS: WeakSet[Callable[..., Any]] = WeakSet()  # what `nlctl.equation` has marked
+MARKED: WeakSet[Callable[..., Any]] = WeakSet()  # what `nlctl.equation` has marked
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -210,7 +210,7 @@ def _complete(cls: Any) -> None:
     """Make the equations of a class static methods, and set what goes without saying."""
     fields = {field.name for field in dataclasses.fields(cls)}
     for name, value in list(vars(cls).items()):
-        if name not in fields and isinstance(value, FunctionType) and value in EQUATIONS:
+        if name not in fields and isinstance(value, FunctionType) and value in MARKED:
             setattr(cls, name, staticmethod(value))
     if hasattr(cls, "output"):
         cls.feedthrough = getattr(cls, "feedthrough", True)
@@ -254,7 +254,7 @@ def _inherited_entry(cls: type, name: str) -> list[str]:
 def _entry(field: Any, rule: Param | None) -> list[str]:
     """Return the lines of one field: name, type and default; meaning, unit and bounds."""
     kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
-    kind = {"Vector": "tuple of float", "Matrix": "tuple of tuple of float"}.get(kind, kind)
+    kind = {"Floats": "tuple of float", "Matrix": "tuple of tuple of float"}.get(kind, kind)
     default = "" if field.default is dataclasses.MISSING else _default_text(field.default)
     head = f"{field.name} : {kind}{default}"
     if rule is None:

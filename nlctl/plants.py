@@ -18,7 +18,7 @@ from .arguments import a_function
 from .equations import equation
 from .errors import ParameterError
 from .names import unknown
-from .params import HIGHEST_ORDER, Vector, param, record, set_integer
+from .params import HIGHEST_ORDER, Floats, param, record, set_integer
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock"]
 
@@ -310,7 +310,7 @@ class WingRock:
     [0.8, 0.4]
     """
 
-    w: Vector = param(
+    w: Floats = param(
         (0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214), unit="s^-2", meaning="weights w_0, ..., w_5"
     )
     L: float = param(3.0, unit="1/s^2", meaning="effect of the ailerons")

@@ -17,7 +17,7 @@ from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
-from .params import HIGHEST_ORDER, Vector, param, record, set_integer
+from .params import HIGHEST_ORDER, Floats, param, record, set_integer
 from .wording import counted
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
@@ -64,11 +64,11 @@ class SumOfSines(_Reference):
     [0.   0.75 0.  ]
     """
 
-    amplitudes: Vector = param((0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a")
-    frequencies: Vector = param(
+    amplitudes: Floats = param((0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a")
+    frequencies: Floats = param(
         (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0, symbol="w"
     )
-    phases: Vector = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
+    phases: Floats = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
 
     def derived(self) -> dict[str, Any]:
         """The number of derivatives, for the equation."""

@@ -13,7 +13,7 @@ import numpy as np
 from .arguments import are_names, flag, names_in, number, one_of
 from .equations import equation
 from .errors import ParameterError
-from .params import Vector, param, record
+from .params import Floats, param, record
 
 __all__ = ["Chirp", "Pulse", "PulseTrain", "Ramp", "Sine", "Square", "Step", "TimeTable"]
 
@@ -316,8 +316,8 @@ class TimeTable(_Source):
 
     hold: bool = False
     periodic: bool = False
-    times: Vector = param((0.0, 1.0), unit="s", meaning="times t_k", symbol="tau")
-    values: Vector = param((0.0, 1.0), unit="1", meaning="values at these times")
+    times: Floats = param((0.0, 1.0), unit="s", meaning="times t_k", symbol="tau")
+    values: Floats = param((0.0, 1.0), unit="1", meaning="values at these times")
 
     vector = True
 

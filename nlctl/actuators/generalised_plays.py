@@ -7,7 +7,7 @@ import numpy as np
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from .memories import relaxation
 from .prandtl_ishlinskii import Plays
 from .static import BOUNDED_OUTPUT
@@ -71,14 +71,14 @@ class GeneralisedPrandtlIshlinskii(Plays):
     [0.0, 0.9, -0.9]
     """
 
-    rising: Vector = param(
+    rising: Floats = param(
         (8.0, 0.14, -0.05, 0.0), unit="1", meaning="a_0, ..., a_3 of the rising envelope"
     )
-    falling: Vector = param(
+    falling: Floats = param(
         (8.4, 0.14, 0.1, 0.5), unit="1", meaning="a_0, ..., a_3 of the falling envelope"
     )
-    w: Vector = param((0.5, 0.2, 0.2, 0.1), unit="1", meaning="weights of the plays", above=0)
-    r: Vector = param((0.0, 0.2, 0.4, 0.6), unit="1", meaning="thresholds, increasing", at_least=0)
+    w: Floats = param((0.5, 0.2, 0.2, 0.1), unit="1", meaning="weights of the plays", above=0)
+    r: Floats = param((0.0, 0.2, 0.4, 0.6), unit="1", meaning="thresholds, increasing", at_least=0)
 
     no_split = BOUNDED_OUTPUT
 

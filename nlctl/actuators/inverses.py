@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..equations import equation
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from .backlash import check_gap
 from .memories import FromUToV, Remembering, relaxation
 from .prandtl_ishlinskii import (
@@ -184,8 +184,8 @@ class PrandtlIshlinskiiInverse(Plays):
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u in the operator", above=0)
-    w: Vector = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays")
-    r: Vector = param(
+    w: Floats = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays")
+    r: Floats = param(
         (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds of the operator, increasing", above=0
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from ..wording import counted
 from .memories import FromUToV, Remembering, memory_names, relaxation
 from .static import BOUNDED_OUTPUT
@@ -161,8 +161,8 @@ class PrandtlIshlinskii(Plays):
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u itself", above=0)
-    w: Vector = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the plays")
-    r: Vector = param((0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0)
+    w: Floats = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the plays")
+    r: Floats = param((0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0)
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -220,8 +220,8 @@ class OneSidedDeadZones(FromUToV):
     """
 
     w_0: float = param(1.0, unit="1", meaning="slope at u = 0", above=0)
-    w: Vector = param((-0.3, 0.4), unit="1", meaning="changes of slope, outwards")
-    r: Vector = param((-0.5, 0.7), unit="1", meaning="where the slope changes")
+    w: Floats = param((-0.3, 0.4), unit="1", meaning="changes of slope, outwards")
+    r: Floats = param((-0.5, 0.7), unit="1", meaning="where the slope changes")
 
     vector = True
 

@@ -11,7 +11,7 @@ from ..annotations import as_annotated
 from ..arguments import vector
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from .memories import Remembering, checked_start, memory_names, relaxation
 from .static import BOUNDED_OUTPUT
 
@@ -177,9 +177,9 @@ class Preisach(Remembering):
     [-1.  0.  1.  1.]
     """
 
-    alpha: Vector = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
-    beta: Vector = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
-    w: Vector = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
+    alpha: Floats = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
+    beta: Floats = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
+    w: Floats = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
     v0: float | tuple[float, ...] = -1.0
 
     feedthrough = False

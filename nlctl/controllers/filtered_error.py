@@ -9,7 +9,7 @@ import numpy as np
 
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 
@@ -78,7 +78,7 @@ class FilteredError:
     [2. 4. 1.]
     """
 
-    lambdas: Vector = param(
+    lambdas: Floats = param(
         (1.5,),
         unit="s^-i",
         meaning="lambda_1, ..., lambda_{n-1}; the order is their number + 1",

@@ -16,7 +16,7 @@ from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import gaussian
-from ..params import Matrix, Vector, param, record, set_integer
+from ..params import Floats, Matrix, param, record, set_integer
 from ..plants import coordinate_names
 from ..wording import counted
 
@@ -165,7 +165,7 @@ class GaussianBasis:
     centres: Matrix = param(
         diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row", symbol="mu"
     )
-    widths: Vector = param(
+    widths: Floats = param(
         (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 

@@ -12,7 +12,7 @@ from ..arguments import a_function
 from ..controllers.filtered_error import is_hurwitz
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import Vector, param, record
+from ..params import Floats, param, record
 from .signals import estimate_names, set_names
 
 
@@ -55,7 +55,7 @@ class HighGainObserver:
     measured: str = "y"
     known: tuple[str, ...] = ()
     model: Callable[[Any, Any], Any] = nothing_known
-    alpha: Vector = param(
+    alpha: Floats = param(
         (2.0, 1.0), unit="1", meaning="coefficients alpha_1, ..., alpha_n", above=0
     )
     epsilon: float = param(0.1, unit="s", meaning="time scale of the observer", above=0)

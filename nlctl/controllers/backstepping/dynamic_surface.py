@@ -11,7 +11,7 @@ from ...annotations import as_annotated
 from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import Vector, param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 from ..mrac.laws import ModelReferenceLaw
 from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
@@ -55,10 +55,10 @@ class DynamicSurface:
     -0.4
     """
 
-    c: Vector = param(
+    c: Floats = param(
         (2.0, 4.0), unit="1/s", meaning="gains c_1, ..., c_n; their number is the order n", above=0
     )
-    tau: Vector = param(
+    tau: Floats = param(
         (0.02,), unit="s", meaning="time constants tau_2, ..., tau_n of the filters", above=0
     )
 

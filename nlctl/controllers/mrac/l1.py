@@ -12,7 +12,7 @@ from ...annotations import as_annotated
 from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import Vector, param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from ..rbf import fitting_network
@@ -39,7 +39,7 @@ class StatePredictor:
     [2.25]
     """
 
-    a: Vector = param(
+    a: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
     )
     gain: float = param(1.0, unit="1", meaning="input gain of the plant")

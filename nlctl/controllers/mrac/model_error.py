@@ -9,7 +9,7 @@ import numpy as np
 
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import Vector, param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from .reference_model import model_state_names
@@ -32,10 +32,10 @@ def seen_error(E, p):
 class WeightedError:
     """What errors of adaptive loops share: their gains, and the matrix P that weights them."""
 
-    K: Vector = param(
+    K: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="gains of the error; their number is the order n"
     )
-    Q: Vector = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
+    Q: Floats = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
 
     vector = True
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations import equation
-from ...params import Vector, param, record
+from ...params import Floats, param, record
 from ..filtered_error import check_hurwitz
 
 
@@ -38,7 +38,7 @@ class ReferenceModel:
     [0.5 0.  0. ]
     """
 
-    a: Vector = param(
+    a: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
     )
     b: float = param(4.0, unit="s^-n", meaning="gain of the command")

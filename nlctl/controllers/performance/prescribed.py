@@ -6,7 +6,7 @@ import numpy as np
 
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import Vector, param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 
 
@@ -56,10 +56,10 @@ class PrescribedPerformance:
     nan
     """
 
-    k: Vector = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
-    rho_0: Vector = param((3.0, 6.0), unit="1", meaning="bounds at t = 0", above=0)
-    rho_inf: Vector = param((0.1, 1.0), unit="1", meaning="bounds at last", above=0)
-    decay: Vector = param(
+    k: Floats = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
+    rho_0: Floats = param((3.0, 6.0), unit="1", meaning="bounds at t = 0", above=0)
+    rho_inf: Floats = param((0.1, 1.0), unit="1", meaning="bounds at last", above=0)
+    decay: Floats = param(
         (1.0, 1.0), unit="1/s", meaning="rates of decay of the bounds", at_least=0, symbol="l"
     )
 
