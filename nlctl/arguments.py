@@ -5,7 +5,6 @@ Every message names who asked, the argument, the rule and the value.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Any, TypeVar
 
@@ -14,6 +13,7 @@ import numpy as np
 from .errors import ParameterError
 from .params import as_numbers
 from .params import integer as integer
+from .wording import nearest
 
 _T = TypeVar("_T")
 RTOL, ATOL = 1e-8, 1e-10  # of every run unless it is given others: a member of an ensemble is a run
@@ -24,8 +24,7 @@ def one_of(who: str, name: str, value: object, options: Iterable[str]) -> Any:
     options = list(options)
     if isinstance(value, str) and value in options:
         return value
-    text = value.lower() if isinstance(value, str) else ""
-    near = difflib.get_close_matches(text, options, n=1, cutoff=0.6)
+    near = nearest(value, options, most=1, cutoff=0.6) if isinstance(value, str) else []
     hint = f"; nearest: '{near[0]}'" if near else ""
     rule = " or ".join(f"'{option}'" for option in options)
     raise ParameterError(f"{who} needs {name} to be {rule}, got {value!r}{hint}")

@@ -13,14 +13,13 @@ difference (``tests/diagrams/test_copied_parameters.py``).
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import control as ct
 
 from .errors import AmbiguousNameError, ParameterError, UnknownNameError
-from .wording import counted
+from .wording import counted, nearest
 
 _LISTED = 24  # names that a message lists; it says how many more there are
 
@@ -34,7 +33,7 @@ def unknown(
 ) -> UnknownNameError:
     """Make the error for an unknown `name`: it says what exists, nearest first."""
     known = list(known)
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+    near = nearest(name, known, most=3, cutoff=0.5)
     if near:
         hint = "nearest: " + ", ".join(f"'{n}'" for n in near)
     else:

@@ -1,7 +1,9 @@
-"""How text counts: a number agrees with its noun, and with its verb."""
+"""How messages are worded: a number agrees with its noun, a wrong name has its nearest."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import SupportsIndex
 
 
@@ -24,3 +26,12 @@ def numbered(what: str, count: int) -> list[str]:
     ['guard 1', 'guard 2']
     """
     return [what] if count == 1 else [f"{what} {k + 1}" for k in range(count)]
+
+
+def nearest(name: str, known: Iterable[str], most: int, cutoff: float) -> list[str]:
+    """Return the names that come nearest to one, capital letters or not, the nearest first."""
+    plain: dict[str, list[str]] = {}
+    for option in known:
+        plain.setdefault(option.lower(), []).append(option)
+    near = difflib.get_close_matches(name.lower(), plain, n=most, cutoff=cutoff)
+    return list(dict.fromkeys(option for text in near for option in plain[text]))[:most]

@@ -36,6 +36,7 @@ from .statistics.sequential import SequentialTest, confidence_sequence, decide, 
 from .statistics.verdict import Verdict, bound_verdict, test_verdict
 from .stl.formula import always, eventually, in_band
 from .stl.spec import Requirement, Spec, margin, margins, unfinished_margin
+from .stl.text import parse_formula
 from .uncertainty.binding import diagrams, resolved
 from .uncertainty.design import (
     Design,
@@ -111,6 +112,7 @@ __all__ = [
     "morris",
     "nominal",
     "one_at_a_time",
+    "parse_formula",
     "prepare",
     "regional",
     "resolved",

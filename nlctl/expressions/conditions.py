@@ -24,13 +24,16 @@ JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arct
 
 def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions switch at, parts first."""
-    nodes = needed(exprs, known)
+    roots = list(exprs)
+    always = {node for node in needed(roots, known) if is_of_infinity(node)}
+    nodes = needed(roots, {*known, *always})
     return tuple(node for node in nodes if node.varies and node not in known and _switches(node))
 
 
 def _switches(node: Expr) -> bool:
     if node.op in _OF_DIFFERENCES:
-        return any(arg.varies for arg in node.args) and not _of_truths(node)
+        moves = any(arg.varies for arg in node.args)
+        return moves and not _of_truths(node) and not is_of_infinity(node)
     return (
         node.op in _OF_SIGNS
         or node.op in _OF_FIRSTS
@@ -42,6 +45,13 @@ def _switches(node: Expr) -> bool:
 def at_integers(node: Expr) -> bool:
     """Return whether an operation jumps where something is an integer, as `floor` and `%` do."""
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
+
+
+def is_of_infinity(node: Expr) -> bool:
+    """Return whether an operation compares with infinity: with all numbers it gives the same."""
+    return node.op in _OF_DIFFERENCES and any(
+        arg.op == "const" and abs(arg.data) == math.inf for arg in node.args
+    )
 
 
 def _of_truths(node: Expr) -> bool:

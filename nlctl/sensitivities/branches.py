@@ -11,12 +11,14 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..expressions.conditions import JUMPING
+from ..expressions.conditions import JUMPING, is_of_infinity
 from ..expressions.graph import Expr, Graph, needed
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
 _QUOTIENTS = {"remainder": "floor", "fmod": "trunc"}
+_FAR = 1e300
+_JUMPS = (*_ORDERS, *JUMPING)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +36,9 @@ def jumping(exprs: Iterable[Expr]) -> list[Expr]:
     """Return the operations that may jump in expressions, parts first."""
     nodes = needed(exprs)
     return [
-        n
-        for n in nodes
-        if n.varies and (n.op in _ORDERS or n.op in JUMPING) and any(a.varies for a in n.args)
-    ]
+        n for n in nodes
+        if n.varies and n.op in _JUMPS and any(a.varies for a in n.args) and not is_of_infinity(n)
+    ]  # fmt: skip
 
 
 def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:
@@ -67,7 +68,14 @@ def _side_of(
     extent = graph.const(0.0)
     for part in parts:
         extent = graph.op("add", extent, graph.op("absolute", part))
+    level, extent = bounded(graph, level), bounded(graph, extent)
     return Branch(now=now, level=level, extent=extent, margin=margin, value=value)
+
+
+def bounded(graph: Graph, level: Expr) -> Expr:
+    """Return a level that is finite, with parameters that are infinite: never met, and at rest."""
+    low = graph.op("maximum", level, graph.const(-_FAR))
+    return graph.op("minimum", low, graph.const(_FAR))
 
 
 def _of_order(graph: Graph, op: str, numbers: Sequence[Expr], kept: Expr) -> Branch:

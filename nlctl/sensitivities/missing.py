@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from ..expressions.evaluate import evaluate_expressions
+from ..expressions.graph import Expr
 from ..native import Compiled
 from ..native.happened import row_labels
 from ..native.integrate.state import Status
@@ -21,6 +22,10 @@ _TOGETHER = "two things happen at one instant, and each alone at another if it i
 _GRAZING = "a condition is met at a rate of 0 (grazing), and may not be met if it is moved"
 _RETURNS = "a jump at a time that moves comes back through a delay"
 _ENDLESS = "switches follow each other without end"
+_LOST = "the derivatives cannot be integrated further, although the run itself can"
+_KINK = "the run stays on a kink, and on either side of it if it is moved"
+_FIRST = "what jumps at the start is at a kink or jump, and on either side of it if it is moved"
+_PAIRS = 32  # of times one after the other, at which a run may be on a kink
 _START = "the run starts on a condition, and on either side of it if it is moved"
 _MARKS = (("together", _TOGETHER), ("at_reset", _TOGETHER), ("grazing", _GRAZING))
 
@@ -30,15 +35,21 @@ def missing(
     of_whom: tuple[Compiled, tuple[str, ...]],
     trajectory: Trajectory,
     given: tuple[np.ndarray, ...],
+    beginning: dict[str, np.ndarray],
 ) -> list[NoDerivative]:
     """Return why there are no derivatives from some time on, in the order of time."""
     compiled, names = of_whom
     run = _Run(
         differentiated=differentiated, compiled=compiled, names=names, trajectory=trajectory,
-        given=given,
+        given=given, beginning=beginning,
     )  # fmt: skip
     first = sorted(run.later(), key=lambda lack: lack.time)[:1]
-    return [*run.at_start(), *first]
+    lacks: list[NoDerivative] = []
+    for lack in (*run.at_start(), *run.at_first_jump(), *run.at_kinks()):
+        known = {name for other in lacks for name in other.with_respect_to}
+        others = tuple(name for name in lack.with_respect_to if name not in known)
+        lacks += [replace(lack, with_respect_to=others)] if others else []
+    return [*lacks, *first]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +60,12 @@ class _Run:
     compiled: Compiled
     names: tuple[str, ...]
     trajectory: Trajectory
-    given: tuple[np.ndarray, ...]
+    given: tuple[np.ndarray, ...]  # times, the state at the start, parameters, inputs
+    beginning: dict[str, np.ndarray]  # what memories are driven by at the start, if anything
 
     def later(self) -> list[NoDerivative]:
         """Return why there are none behind the start."""
-        times, start, p, _ = self.given
+        times, start, p = self.given[:3]
         places, end = self.differentiated.places, float(self.trajectory.statistics.time)
         last = self.trajectory.states[:, -1] if self.trajectory.time.size else start
         lacks = [
@@ -70,37 +82,89 @@ class _Run:
             lacks.append(self._lack(self.trajectory.since, _ENDLESS))
         elif self.trajectory.statistics.status is Status.CHATTERING:
             lacks.append(self._lack(end, _ENDLESS))
+        elif self.trajectory.statistics.status is not Status.OK:
+            lacks.append(self._lack(end, _LOST))
         return [lack for lack in lacks if lack.time <= times[-1]]
 
     def at_start(self) -> list[NoDerivative]:
         """Return by what there are none, as the run starts on a condition that it moves."""
         source, sides = self.differentiated.sides.source, self.differentiated.sides.sides
         levels = [source.graph.item(s.here.level, k) for s in sides for k in range(s.rows)]
-        values = self._at_start(levels)
-        met = [level for level, v in zip(levels, values, strict=True) if np.all(v == 0.0)]
-        zero, without = source.graph.const(0.0), []
-        for name, seed in zip(self.names, self.differentiated.saltation.seeds, strict=True):
-            moves = [
-                e or zero
-                for level in met
-                for e in self.differentiated.saltation.change(level, seed)
-            ]
-            if any(np.any(v != 0.0) for v in self._at_start(moves)):
-                without.append(name)
-        if not without:
-            return []
-        time = float(self.given[0][0])
-        return [NoDerivative(time=time, where="", why=_START, with_respect_to=tuple(without))]
+        return self._where_met(levels, self._start, _START)
 
-    def _at_start(self, exprs: list) -> list[np.ndarray]:
-        """Return the values of expressions where the run starts."""
+    def at_first_jump(self) -> list[NoDerivative]:
+        """Return by what there are none, as what is sampled or driven at the start has two."""
+        if not self.beginning:
+            return []
+        source, last = self.differentiated.sides.source, self.differentiated.places.last
+        sampled = source.program.sampled and self.beginning["x"][last, 0] == self.given[0][0]
+        choices = source.choices if sampled else []
+        return [
+            *self._where_met(choices, self._start, _FIRST),
+            *self._where_met(source.edges, self.beginning, _FIRST),
+        ]
+
+    def at_kinks(self) -> list[NoDerivative]:
+        """Return by what there are none, as the run stays on a kink of its equations."""
+        source, trajectory = self.differentiated.sides.source, self.trajectory
+        count = min(trajectory.time.size - 1, _PAIRS)
+        if count < 1:
+            return []
+        first = np.unique(np.linspace(0, trajectory.time.size - 2, count).astype(int))
+        one, other = self._along(first), self._along(first + 1)
+        levels = [*source.kinks, *source.choices]
+        return self._where_met(levels, one, _KINK, other)
+
+    def _where_met(
+        self,
+        levels: list[Expr],
+        at: dict[str, np.ndarray],
+        why: str,
+        later: dict[str, np.ndarray] | None = None,
+    ) -> list[NoDerivative]:
+        """Return by what there is none from when on: a level is 0, and later, and moves there."""
+        later, zero, lacks = later or at, self.differentiated.sides.source.graph.const(0.0), []
+        met = [
+            (level, (now == 0.0) & (then == 0.0))
+            for level, now, then in zip(
+                levels, self._values(levels, at), self._values(levels, later), strict=True
+            )
+            if np.any((now == 0.0) & (then == 0.0))
+        ]
+        change = self.differentiated.saltation.change
+        for name, seed in zip(self.names, self.differentiated.saltation.seeds, strict=True):
+            moves = self._values([change(level, seed)[0] or zero for level, _ in met], later)
+            parts = [
+                np.atleast_2d(zeros & (v != 0.0)).any(axis=0)
+                for v, (_, zeros) in zip(moves, met, strict=True)
+            ]
+            times = at["t"][0][np.any([np.broadcast_to(v, at["t"].size) for v in parts], axis=0)]
+            if parts and times.size:
+                lacks.append((float(times[0]), name))
+        return [
+            NoDerivative(
+                time=time, where="", why=why,
+                with_respect_to=tuple(name for other, name in lacks if other == time),
+            ) for time in sorted({time for time, _ in lacks})
+        ]  # fmt: skip
+
+    def _values(self, exprs: list[Expr], at: dict[str, np.ndarray]) -> list[np.ndarray]:
+        equations = self.differentiated.sides.source.equations
+        return evaluate_expressions(exprs, at, searches_of(equations))
+
+    @property
+    def _start(self) -> dict[str, np.ndarray]:
+        """Return what expressions read where the run starts."""
         times, start, p, u = self.given
         wide = np.zeros((self.differentiated.extended.schedule.ninputs, 1))
         wide[: u.shape[0], 0] = u[:, 0]
-        arrays = {"t": times[:1, None], "x": start[:, None], "u": wide, "p": p[:, None]}
-        return evaluate_expressions(
-            exprs, arrays, searches_of(self.differentiated.sides.source.equations)
-        )
+        return {"t": times[:1][None], "x": start[:, None], "u": wide, "p": p[:, None]}
+
+    def _along(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Return what expressions read at some of the output times."""
+        trajectory, p = self.trajectory, self.given[2]
+        arrays = {"t": trajectory.time[None], "x": trajectory.states, "u": trajectory.inputs}
+        return {**{name: array[:, rows] for name, array in arrays.items()}, "p": p[:, None]}
 
     def _lack(self, time: float, why: str) -> NoDerivative:
         """Return it with the names of what happens then."""

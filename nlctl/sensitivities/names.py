@@ -92,8 +92,8 @@ def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:
     key = name.rpartition(".")[2]
     if any(owner is node for node in compiled.schedule.samplings):
         raise CompileError(
-            f"'{name}' says when samples are taken: derivatives by clocks are not known; take "
-            "differences of runs"
+            f"'{name}' says when samples are taken, or what a converter keeps of them: derivatives "
+            "by these are not known; take differences of runs"
         )
     if supplied_of(owner.system) is PAST and key == "delay":
         raise CompileError(

@@ -22,6 +22,7 @@ from ..native.response import respond
 from ..native.results import Trajectory
 from ..native.settings import Settings
 from ..responses.arguments import input_array, state_array
+from .directions import SomeRows
 from .missing import missing
 from .names import Observed, VariedQuantity, observed_signals, varied_quantities
 from .program import Differentiated, parameters_with, with_its_derivatives
@@ -60,7 +61,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     scale = np.array([abs(v) or 1.0 for v in values])
     span = float(run.times[-1] - run.times[0])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
-    start = _start(differentiated, quantities, run, (u, x0, scale), whole)
+    start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
     integrated = trajectory(differentiated.compiled, run.times, u, start, whole, run.settings)
     _audit(compiled, integrated, p, run)
     if integrated.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
@@ -69,7 +70,8 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
             params=run.params, audit=False,
         )  # fmt: skip
     names = tuple(quantity.name for quantity in quantities)
-    lacks = missing(differentiated, (compiled, names), integrated, (run.times, start, whole, u))
+    given = (run.times, start, whole, u)
+    lacks = missing(differentiated, (compiled, names), integrated, given, beginning)
     return _response(differentiated, (signals, quantities), (run.times, integrated), scale, lacks)
 
 
@@ -114,8 +116,8 @@ def _start(
     run: RunWithDerivatives,
     given: tuple[np.ndarray, np.ndarray, np.ndarray],
     p: np.ndarray,
-) -> np.ndarray:
-    """Return the initial state of a run with derivatives."""
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return the initial state, and what drives memories there, behind all that happens at once."""
     (u, x0, scale), places = given, differentiated.places
     start = np.zeros(places.size)
     start[: places.states] = x0
@@ -124,19 +126,28 @@ def _start(
             start[places.derivative(j) + quantity.state] = scale[j]
     end = float(run.times[-1])
     start[places.together :] = end + 1.0 + abs(end)  # not yet
-    if differentiated.sides.rows:
-        start[places.kept : places.together] = _sides_at(differentiated, run, u, start, p)
-    return start
+    sides = differentiated.sides
+    if not sides.rows and not differentiated.compiled.program.sampled:
+        return start, {}
+    arrays = _beginning(differentiated, run, u, start, p)
+    start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
+    driven = list(sides.source.driven)
+    arrays["x"][driven, 0] = x0[driven]  # from where they are moved
+    for j in range(places.by):
+        pieces = [(e, 1) for e in differentiated.saltation.at_start(j).values()]
+        rows = [places.derivative(j) + m for m in driven]
+        start[rows] = _values(differentiated, pieces, arrays)
+    return start, arrays
 
 
-def _sides_at(
+def _beginning(
     differentiated: Differentiated,
     run: RunWithDerivatives,
     u: np.ndarray,
     start: np.ndarray,
     p: np.ndarray,
-) -> np.ndarray:
-    """Return the sides on which a run begins, behind all that happens at once."""
+) -> dict[str, np.ndarray]:
+    """Return what a run begins with, behind all that happens at once."""
     compiled, varied = differentiated.compiled, variations(differentiated.compiled, run.times)
     first = prepared(compiled, run.times, u, start[:, None], p[:, None], run.settings, varied)
     with np.errstate(all="ignore"):
@@ -144,11 +155,18 @@ def _sides_at(
     work = first.work
     arrays = {"t": work.t[None, :], "x": work.x, "u": work.u, "p": p[:, None]}
     arrays["t"] = np.maximum(arrays["t"][:, :1] * 0 + run.times[0], first.lanes["right"][:1])
-    now = differentiated.sides.now
-    values = evaluate_expressions([e for e, _ in now], arrays, searches_of(compiled.equations))
+    return arrays
+
+
+def _values(
+    differentiated: Differentiated, pieces: Sequence[SomeRows], arrays: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Return the rows of some pieces."""
+    searches = searches_of(differentiated.compiled.equations)
+    values = evaluate_expressions([e for e, _ in pieces], arrays, searches)
     parts = [np.broadcast_to(v.reshape(-1), (n,)) if v.size in (1, n) else v.reshape(-1)
-             for v, (_, n) in zip(values, now, strict=True)]  # fmt: skip
-    return np.concatenate(parts)
+             for v, (_, n) in zip(values, pieces, strict=True)]  # fmt: skip
+    return np.concatenate([np.empty(0), *parts])
 
 
 def _audit(

@@ -19,6 +19,7 @@ from functools import cached_property
 
 from ..expressions.graph import Expr, Graph, needed
 from ..native.sliding.pieces import replaced_parts
+from .branches import bounded
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .names import StatePlaces
 from .sides import KeptSide, KeptSides
@@ -156,6 +157,11 @@ class Saltation:
             for j in range(places.by)
             for m in driven
         }
+
+    def at_start(self, j: int) -> dict[int, Expr]:
+        """Return derivatives of memories that a run begins by driving, by their states."""
+        zero = self.source.graph.const(0.0)
+        return {m: self.change(e, self.seeds[j])[0] or zero for m, e in self.source.driven.items()}
 
     # -- states ----------------------------------------------------------------------------------
 
@@ -315,6 +321,7 @@ class Saltation:
         far = nearest = graph.const(_FAR)
         yes, fallen_guards = graph.const(True), []
         for guard in guards:
+            guard = bounded(graph, guard)
             size = graph.op("absolute", guard)
             rate, cause = self._met(yes, guard, size, self.source.flow)
             if rate is not None:

@@ -18,6 +18,7 @@ import numpy as np
 from ..blocks import supplied_of
 from ..errors import CompileError
 from ..expressions.arrays import Tracer
+from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
@@ -82,9 +83,34 @@ class EquationParts:
                 "an algebraic loop has jumps in it: derivatives of a run do not know its signals "
                 "on both sides; put a lag into the loop"
             )
-        roots = [e for e, _ in (*self.flow, *self.arriving)]
-        roots += self.driven.values()
+        roots = self._flowing
         return [e for e in jumping(roots) if not only_bends(self.graph, roots, e, self.p)]
+
+    @property
+    def _flowing(self) -> list[Expr]:
+        """What a run is made of between its events."""
+        return [*(e for e, _ in (*self.flow, *self.arriving)), *self.driven.values()]
+
+    @cached_property
+    def kinks(self) -> list[Expr]:
+        """Levels of what has another derivative on either side; a driven memory is at its own."""
+        roots = [*self._flowing, *(e for e, _ in self.equations.pieces("y"))]
+        levels = self._levels([e for e in conditions(roots) if e not in self.jumps])
+        return [level for level in levels if not self.leaves([level], self.driven)]
+
+    @cached_property
+    def choices(self) -> list[Expr]:
+        """Levels of what has another derivative on either side, in samples."""
+        names = [name for name in self.equations.results if name.startswith("sample")]
+        return self._levels(conditions(e for name in names for e, _ in self.equations.pieces(name)))
+
+    @cached_property
+    def edges(self) -> list[Expr]:
+        """Levels of what memories are driven by."""
+        return self._levels(conditions(self.driven.values()))
+
+    def _levels(self, of: Iterable[Expr]) -> list[Expr]:
+        return [switching_function(self.graph, condition) for condition in of]
 
     def time(
         self, pieces: Sequence[SomeRows], time: Expr | None = None, delays_move: bool = True
@@ -217,7 +243,8 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
     except Untraceable:
         return False
     apart = zip(values[::2], values[1::2], strict=True)
-    return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
+    with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
+        return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
 
 
 def _free(
@@ -246,6 +273,6 @@ def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
             array, start, step = node.data
             rows[array] = max(rows[array], start + step * ((node.size or 1) - 1) + 1)
     arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
-    size = np.where(p == 0.0, 1.0, np.abs(p))[:, None]
+    size = np.where((p == 0.0) | ~np.isfinite(p), 1.0, np.abs(p))[:, None]
     arrays["p"] = p[:, None] + _NEAR * size * rng.normal(size=(p.size, _POINTS))
     return arrays

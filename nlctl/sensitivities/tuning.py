@@ -285,6 +285,11 @@ def _problem(
 
 def _margins(spec: Any, cost: Any) -> tuple[MetricLike, ...]:
     """Return the requirements of a spec, of several, or of one."""
+    if isinstance(spec, str):
+        raise ParameterError(
+            f"tune needs requirements, got the text {spec!r}: from nlctl.analysis.robustness, "
+            f'Requirement(key="R1", formula=parse_formula({spec!r}), until=10.0)'
+        )
     metrics = getattr(spec, "requirements", spec)
     metrics = tuple(metrics) if isinstance(metrics, Iterable) else (metrics,)
     for metric in metrics if cost is None else (*metrics, cost):

@@ -183,6 +183,8 @@ def test_a_name_that_nobody_reads_is_refused_everywhere(enter, make, name):
 def test_the_nearest_name_is_given():
     with pytest.raises(UnknownNameError, match=r"nearest: .*'slow\.tau'"):
         ENTRIES["run"](two(), {"slow.tua": 1.0})
+    with pytest.raises(UnknownNameError, match=r"nearest: 'slow\.tau'"):
+        ENTRIES["run"](two(), {"Slow.TAU": 1.0})
     with pytest.raises(ParameterError, match=r"block 'slow' needs a number for tau.* got 'a'"):
         ENTRIES["run"](two(), {"slow.tau": "a"})
     with pytest.raises(ParameterError, match="names of parameters, got 1"):

@@ -468,3 +468,63 @@ def test_actuators_behind_a_sampled_law(actuator, own):
         own | {"source.c(0)": 1.0, "law.K": 1.5, "plant.a": 0.5, "source.w": 2.0},
         {"source.c": 1.0}, h=1e-4,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_play_that_the_start_drives(sampled):
+    """u = t - k drives v(0) = 0 to c - k, and holds it there until u - c is above: t > 2 c."""
+    source = ct.nlsys(
+        None, lambda t, x, u, p: [t - p["k"]], inputs=0, outputs=["u"], params={"k": 1.0},
+        dt=0.05 if sampled else 0, name="source",
+    )  # fmt: skip
+    loop = nlctl.interconnect(
+        {
+            "source": nlctl.sampled(source) if sampled else source,
+            "gap": nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.3, c_l=-0.3),
+            "plant": ct.nlsys(
+                lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, inputs=["v"], outputs=["y"],
+                states=["x"], name="plant",
+            ),
+        }, outputs=["v", "y"],
+    )  # fmt: skip
+    t = np.array([0.0, 0.1, 0.3, 0.55])
+    made = nlctl.sensitivity_response(loop, t, with_respect_to=["source.k", "gap.c_l", "gap.c_r"])
+    assert made.success
+    assert np.allclose(made["v", "source.k"], -1)
+    assert np.allclose(made["y", "source.k"], -t)
+    assert np.allclose(made["y", "gap.c_l"], -t)
+    assert np.allclose(made["y", "gap.c_r"], 0)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda t, x, u, p: [-p["a"] * x[0] if x[0] < p["infinite"] else 0.0],
+        lambda t, x, u, p: [-np.clip(p["a"] * x[0], -np.inf, p["infinite"])],
+        lambda t, x, u, p: [-p["a"] * x[0] if np.isfinite(x[0]) else 1.0],
+        lambda t, x, u, p: [-p["a"] * np.nan_to_num(x[0])],
+        lambda t, x, u, p: [-p["a"] * x[0] + 0.0 * int(x[0] + 2)],
+        lambda t, x, u, p: [-p["a"] * x[0] + 0.0 * round(x[0])],
+    ],
+    ids=["if", "clip", "isfinite", "nan_to_num", "int", "round"],
+)
+def test_bounds_that_are_infinite(law):
+    """What compares with infinity is never met: x = exp(-a t)."""
+    t = np.linspace(0, 2, 5)
+    plant = block(law, {"a": 2.0, "infinite": np.inf})
+    made = nlctl.sensitivity_response(plant, t, 0, [0.4], with_respect_to="plant.a")
+    assert made.success
+    assert np.allclose(made["x", "plant.a"], -0.4 * t * np.exp(-2 * t), rtol=0, atol=1e-8)
+
+
+def test_python_rounds():
+    """x' = 1 and y' = round(x / q): each step, at q (k + 1/2), moves with q."""
+    for whole, shift in ((round, 0.5), (int, 1.0)):
+        steps = block(
+            lambda t, x, u, p, whole=whole: [1.0, whole(x[0] / p["q"])], {"q": 0.3}, ("x", "y")
+        )
+        made = nlctl.sensitivity_response(steps, [0, 1], 0, [1e-3, 0.0], with_respect_to="plant.q")
+        places = 0.3 * (np.arange(4) + shift)
+        assert made.success
+        slope = -sum(k + shift for k, place in enumerate(places) if place < 1)
+        assert abs(made["y", "plant.q"][-1] - slope) < 1e-7

@@ -218,3 +218,10 @@ def test_both_examples():
     for example in (nlctl.paper.example_1(), nlctl.paper.example_2()):
         found = nlctl.tune(example, space, spec, budget=40, starts=1)
         assert found.margin > found.margin_before + 0.3
+
+
+def test_text_is_refused_with_what_reads_it():
+    """The words of a study file are a formula, and a requirement has a name and an end."""
+    lag = nlctl.block(nlctl.Lag(T=1.0), "lag")
+    with pytest.raises(nlctl.errors.ParameterError, match=r"parse_formula\('always \|v\| <= 1'\)"):
+        nlctl.tune(lag, {"lag.T": (0.1, 2.0)}, "always |v| <= 1")

@@ -118,6 +118,69 @@ def test_start_on_one_of_many_conditions():
     assert made["x", "plant.p[0]"][-1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("law", "start"),
+    [
+        (lambda t, x, u, p: [-abs(x[0]) + p["p"]], 0.0),
+        (lambda t, x, u, p: [max(x[0] + p["p"], 0.0)], 0.0),
+        (lambda t, x, u, p: [1 - np.clip(x[0] - p["p"], -1, 1)], 1.0),
+        (lambda t, x, u, p: [np.where(x[0] > p["p"], p["p"] - x[0], 0.0)], 0.0),
+    ],
+    ids=["abs", "max", "clip", "where"],
+)
+@pytest.mark.parametrize("by", ["plant.x(0)", "plant.p"])
+def test_at_rest_on_a_kink(law, start, by):
+    """A loop that rests there goes one way or the other, as -x and x: no derivative, from 0 on."""
+    made = nlctl.sensitivity_response(
+        block(law, {"p": 0.0}), np.linspace(0, 2, 5), 0, [start], with_respect_to=by
+    )
+    (lack,) = made.missing
+    assert (lack.time, lack.with_respect_to) == (0.0, (by,))
+    assert "kink" in lack.why
+    assert np.array_equal(np.isnan(made["x", by]), made.time > 0)
+
+
+def test_through_a_kink():
+    """x' = 1 + |x| passes 0: exp(t) by x(0), although the run starts there."""
+    t = np.linspace(0, 2, 5)
+    plant = block(lambda t, x, u, p: [1 + abs(x[0])], {"p": 0.0})
+    made = nlctl.sensitivity_response(plant, t, with_respect_to="plant.x(0)")
+    assert made.success
+    assert np.allclose(made["x", "plant.x(0)"], np.exp(t), rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("law", "block_of_memory"),
+    [
+        (lambda t, x, u, p: [max(-4 * u[0], p["least"])], False),
+        (lambda t, x, u, p: [1.0 if u[0] > -p["least"] / 4 else 0.0], False),
+        (lambda t, x, u, p: [-p["least"] - 3 * u[0]], True),
+    ],
+    ids=["kink", "jump", "edge of a gap"],
+)
+def test_first_sample_at_a_kink(law, block_of_memory):
+    """What is sampled at t = 0, with x(0) = 1 / 4, is at its limit; or at the edge of a gap."""
+    sampled = nlctl.sampled(
+        ct.nlsys(None, law, inputs=["x"], outputs=["u"], params={"least": -1.0}, dt=0.1, name="law")
+    )
+    plant = ct.nlsys(
+        lambda t, x, u, p: [u[0]], lambda t, x, u, p: x, inputs=["v"], outputs=["x"],
+        states=["x"], name="plant",
+    )  # fmt: skip
+    gap = (
+        nlctl.Backlash(m_r=1.0, m_l=1.0, c_r=0.25, c_l=-0.25)
+        if block_of_memory
+        else nlctl.Gain(k=1.0)
+    )
+    loop = nlctl.interconnect({"law": sampled, "gap": gap, "plant": plant}, outputs=["x"])
+    for by in ("plant.x(0)", "law.least"):
+        made = nlctl.sensitivity_response(loop, [0, 0.5], 0, {"plant.x": 0.25}, with_respect_to=by)
+        (lack,) = made.missing
+        assert (lack.time, lack.with_respect_to) == (0.0, (by,))
+        assert "at the start" in lack.why
+        assert np.isnan(made["x", by][-1])
+
+
 def test_bounces_without_end():
     """Bounces accumulate at t_1 (1 + e) / (1 - e): NaN behind, for the signals as well."""
     made = nlctl.sensitivity_response(

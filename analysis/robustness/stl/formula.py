@@ -27,7 +27,7 @@ from nlctl.names import unknown
 
 from .piecewise import Trace, extremes, largest, pointwise_maximum, with_vertices
 
-HOW = 'in_band("y", upper=1.0), always(...), eventually(...)'
+HOW = 'in_band("y", upper=1.0), always(...), eventually(...), parse_formula("always y <= 1")'
 
 
 class Formula:

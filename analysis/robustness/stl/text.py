@@ -32,9 +32,29 @@ EXAMPLE = "always from 10 s on |e| <= 0.15"
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a requirement such as ``always from 10 s on |e| <= 0.15``."""
-    # It is the inverse of ``str(formula)`` up to the six digits that this prints and to scales
-    # other than the default one.
+    """Read a formula such as ``always from 10 s on |e| <= 0.15``, as study files have them.
+
+    Parameters
+    ----------
+    text : str
+        What ``str(formula)`` prints: bands, ``and``, ``or``, ``not``, ``always`` and ``eventually``
+        with ``in [0.5, 2] s`` or ``from 10 s on``, and parentheses.
+
+    Returns
+    -------
+    Formula
+        With scales that follow from the bounds.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be read: where, and what is expected there.
+
+    Examples
+    --------
+    >>> print(parse_formula("always from 10 s on |e| <= 0.15"))
+    always from 10 s on |e| <= 0.15
+    """
     reader = _Reader(text)
     formula = _formula(reader, 0)
     if reader.here:
