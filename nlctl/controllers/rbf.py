@@ -11,7 +11,6 @@ import numpy as np
 
 from ..annotations import as_annotated
 from ..arguments import integer, number, tuple_of
-from ..blocks import Spec
 from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
@@ -251,7 +250,7 @@ class AdaptiveWeights(NetworkWeights):
 
 
 def fitting_network(
-    who: str, basis: Spec, weights: Any, default: Callable[..., Any]
+    who: str, basis: Any, weights: Any, default: Callable[..., Any]
 ) -> tuple[ct.InputOutputSystem, Any]:
     """Return a regressor as a block, and its weights."""
     regressor = as_system(basis, "basis")
