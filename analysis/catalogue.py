@@ -28,14 +28,10 @@ _GROUPS = (
 _OF_FUNCTIONS = (*_GROUPS, "sampling", "faults")
 
 
-def _modules() -> list[Any]:
-    return [importlib.import_module(f"nlctl.{group}") for group in _GROUPS]
-
-
 def block_records() -> dict[str, type]:
     """Return every block record of nlctl by name."""
     records = {}
-    for module in _modules():
+    for module in (importlib.import_module(f"nlctl.{group}") for group in _GROUPS):
         for name in module.__all__:
             thing = getattr(module, name)
             if isinstance(thing, type) and dataclasses.is_dataclass(thing):
@@ -54,10 +50,8 @@ def named_block(name: str) -> type:
 
 
 def block_summaries() -> dict[str, dict[str, str]]:
-    """Return the first line of each block record's docstring: ``{group: {name: line}}``.
-
-    The names are those of `block_records`, in the same order.
-    """
+    """Return the first line of each block record's docstring: ``{group: {name: line}}``."""
+    # The names are those of `block_records`, in the same order.
     return {group: _summaries(group, _is_record) for group in _GROUPS}
 
 

@@ -6,54 +6,31 @@ controller itself by ``tests/blocks/test_controller_guide.py``; importing this t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 __all__ = ["GUIDES", "ControllerGuide", "rows_of"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class ControllerGuide:
-    """What one controller is for.
+    """What one controller is for."""
 
-    Attributes
-    ----------
-    name : str
-        What it is called here.
-    plant : str
-        Class of plants that it is made for.
-    measured : tuple of str
-        Its inputs, for a plant of order 2 where the order is free.
-    known : str
-        What has to be known of the plant, actuator and reference.
-    proved : str
-        What is proved of the loop, and by whom.
-    proof : str
-        Name of the kind of certificate that `nlctl.analysis.lyapunov.certify` finds for its loops;
-        empty if there is none.
-    states, parameters : int
-        How many the controller has with these defaults: every state is an integrator.
-    time : float or None
-        Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``);
-        None where it does not fit that loop.
-    code : str
-        One line that makes it.
-    instead : tuple of str
-        Names of `nlctl` that may replace a piece of it.
-    """
-
-    name: str
-    plant: str
-    measured: tuple[str, ...]
-    known: str
-    proved: str
+    name: str  # What it is called here.
+    plant: str  # Class of plants that it is made for.
+    measured: tuple[str, ...]  # Its inputs, for a plant of order 2 where the order is free.
+    known: str  # What has to be known of the plant, actuator and reference.
+    proved: str  # What is proved of the loop, and by whom.
+    # Name of the kind of certificate that `nlctl.analysis.lyapunov.certify` finds for its loops;
+    # empty if there is none.
     proof: str = ""
-    states: int
+    states: int  # How many the controller has with these defaults: every state is an integrator.
     parameters: int
+    # Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``); None
+    # where it does not fit that loop.
     time: float | None
-    code: str
-    instead: tuple[str, ...] = ()
+    code: str  # One line that makes it.
+    instead: tuple[str, ...] = ()  # Names of `nlctl` that may replace a piece of it.
 
 
 _CLASS_1 = "pure-feedback (1), any order"
@@ -84,7 +61,7 @@ GUIDES = (
         proof="sliding mode",
         states=0,
         parameters=3,
-        time=1.5,
+        time=1.4,
         code="nlctl.sliding_mode()",
         instead=("SlidingModeLaw",),
     ),
@@ -96,7 +73,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} r = 0 in finite time for r' = u + d without the boundary layer",
         states=1,
         parameters=4,
-        time=1.5,
+        time=1.6,
         code="nlctl.sliding_mode(law=nlctl.controllers.SuperTwistingLaw())",
     ),
     ControllerGuide(
@@ -107,7 +84,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that e stays in the funnel; at its boundary u is NaN",
         states=0,
         parameters=4,
-        time=6.4,
+        time=4.1,
         code="nlctl.controllers.FunnelControl()",
     ),
     ControllerGuide(
@@ -118,7 +95,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that e stays within its bound; at the bound u is NaN",
         states=0,
         parameters=4,
-        time=2.0,
+        time=1.9,
         code="nlctl.controllers.PrescribedPerformance()",
     ),
     ControllerGuide(
@@ -129,7 +106,7 @@ GUIDES = (
         proved="nothing for all time: the theorem fails as printed; the ledger checks its lines",
         states=29,
         parameters=9,
-        time=1.9,
+        time=2.1,
         code="nlctl.adaptive_neural(order=2)",
         instead=("LeakyNussbaumLaw", "DeadZoneNussbaumLaw", "MonotoneNussbaumLaw", "FixedGainLaw"),
     ),
@@ -142,7 +119,7 @@ GUIDES = (
         proof="known sign",
         states=28,
         parameters=11,
-        time=1.6,
+        time=1.8,
         code="nlctl.adaptive_neural(order=2, law=nlctl.controllers.KnownSignLaw())",
     ),
     ControllerGuide(
@@ -153,7 +130,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} that all signals stay bounded from a compact set",
         states=28,
         parameters=7,
-        time=1.4,
+        time=1.5,
         code="nlctl.dynamic_surface_control()",
     ),
     ControllerGuide(
@@ -165,7 +142,7 @@ GUIDES = (
         proof="reference model",
         states=5,
         parameters=7,
-        time=1.4,
+        time=1.3,
         code="nlctl.mrac()",
         instead=(
             *("EModifiedWeights", "ProjectedWeights", "ConcurrentWeights", "HistoryStack"),
@@ -181,7 +158,7 @@ GUIDES = (
         proof="reference model",
         states=5,
         parameters=6,
-        time=1.4,
+        time=1.1,
         code="nlctl.mrac(law=nlctl.controllers.DirectLaw())",
     ),
     ControllerGuide(
@@ -206,7 +183,7 @@ GUIDES = (
         proved=f"{_PUBLISHED} a bound of the error under an L1 condition that you check",
         states=6,
         parameters=10,
-        time=4.4,
+        time=4.1,
         code="nlctl.l1_adaptive()",
     ),
     ControllerGuide(

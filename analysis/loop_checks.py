@@ -12,10 +12,13 @@ import numpy as np
 
 from nlctl import native
 from nlctl.arguments import ATOL, RTOL
+from nlctl.delays.transport import PAST
+from nlctl.diagrams import leaves, supplied_blocks
 from nlctl.diagrams.points import rates_and_outputs
 from nlctl.errors import DivergedError, InexactWarning, UsageError
 from nlctl.native.describe import called
 from nlctl.response import input_output_response
+from nlctl.sampling.system import clocks_of
 from nlctl.wording import counted, some_of
 
 from .lyapunov.ledger import Ledger, ledger
@@ -32,6 +35,7 @@ __all__ = [
 ]
 
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
+_LATE = 0.05  # of the run: its end, whose samples are compared
 _TIGHTER = 1e-2  # of the tolerances, for the comparison
 _SAME = 1e-4  # of a signal's range
 
@@ -165,19 +169,42 @@ def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
     what = "The state at the end is a stable equilibrium"
     if not (ct.isctime(loop) and loop.nstates):
         return LoopCheck(what=what, found="the loop has no rates", status="not applicable")
+    delayed = supplied_blocks(loop, PAST)
+    if delayed:
+        finding = (
+            f"'{delayed[0].name}' delays its signals, and what is on the way is not a state; "
+            "nlctl.frequency_response is exact with delays, and so are margins of it"
+        )
+        return LoopCheck(what=what, found=finding, status="not applicable")
     t, x, u = float(response.time[-1]), response.x[:, -1], response.u[:, -1]
-    rates, _ = rates_and_outputs(loop, dict(params))(t, x, u)
-    moved = np.ptp(response.x, axis=1) + np.finfo(float).eps * np.max(np.abs(response.x), axis=1)
-    share = np.abs(rates) * (t - float(response.time[0])) / np.maximum(moved, np.finfo(float).tiny)
+    share = _still_moves(loop, response, params)
     if not np.max(share) <= _REST:
         name = response.state_names[int(np.argmax(share))]
         return LoopCheck(what=what, found=f"{name} still moves at the end", status="not applicable")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InexactWarning)  # that is said in another line
-            A = native.compile(loop, params=dict(params)).linearize(x, u, t, dict(params)).A
+            linear = native.compile(loop, params=dict(params)).linearize(x, u, t, dict(params))
     except UsageError as error:
         return LoopCheck(what=what, found=str(error), status="not applicable")
-    slowest = float(np.max(np.linalg.eigvals(A).real))
-    finding = f"the largest real part of an eigenvalue of its linearisation is {slowest:.4g} 1/s"
-    return LoopCheck(what=what, found=finding, status="pass" if slowest < 0 else "caution")
+    poles, per_period = np.linalg.eigvals(linear.A), not linear.isctime()
+    size = "absolute value" if per_period else "real part"
+    slowest = float(np.max(np.abs(poles) if per_period else poles.real))
+    finding = f"the largest {size} of an eigenvalue of its linearisation is {slowest:.4g}"
+    finding += f", per {linear.dt:g} s" if per_period else " 1/s"
+    return LoopCheck(
+        what=what, found=finding, status="pass" if slowest < float(per_period) else "caution"
+    )
+
+
+def _still_moves(loop: Any, response: Any, params: Mapping[str, Any]) -> np.ndarray:
+    """Return how far states would move in the time of the run, as they do at its end."""
+    # as a share of how far they have moved; what samples and slides has no rates that say it
+    t, x = np.asarray(response.time), response.x
+    span, eps, tiny = float(t[-1] - t[0]), np.finfo(float).eps, np.finfo(float).tiny
+    moved = np.maximum(np.ptp(x, axis=1) + eps * np.max(np.abs(x), axis=1), tiny)
+    if supplied_blocks(loop) or clocks_of(leaf.system for leaf in leaves(loop)):
+        late = x[:, t >= t[-1] - _LATE * span]
+        return np.ptp(late, axis=1) / _LATE / moved
+    rates, _ = rates_and_outputs(loop, dict(params))(float(t[-1]), x[:, -1], response.u[:, -1])
+    return np.abs(rates) * span / moved

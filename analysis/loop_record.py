@@ -81,10 +81,8 @@ def facts_and_unseen(
 
 
 def _steady(system: ct.InputOutputSystem, content: Mapping[str, _T]) -> dict[str, _T]:
-    """Number the names that python-control gives, ``sys[7]``, by where they stand.
-
-    It counts the systems of a process.
-    """
+    """Number the names that python-control gives, ``sys[7]``, by where they stand."""
+    # It counts the systems of a process.
     every = " ".join(place.system.name for place in places(system))
     numbers = {name: f"sys {i}" for i, name in enumerate(dict.fromkeys(GIVEN.findall(every)))}
     return {GIVEN.sub(lambda m: numbers.get(m[0], m[0]), k): v for k, v in content.items()}
@@ -124,15 +122,11 @@ def _parts(system: System) -> list[Any]:
     if isinstance(system, ct.StateSpace):
         return [[system.A, system.B, system.C, system.D], timebase]
     if isinstance(system, ct.TransferFunction):
-        return [*(_numbers_of(a) for a in (system.num_array, system.den_array)), timebase]
+        arrays = system.num_array, system.den_array
+        return [*([np.asarray(p).tolist() for p in np.ravel(a)] for a in arrays), timebase]
     functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
     signals = [system.input_labels, system.output_labels, system.state_labels]
     return [type(system).__qualname__, functions, signals, timebase]
-
-
-def _numbers_of(polynomials: Any) -> list[Any]:
-    """Return the coefficients of an array of polynomials."""
-    return [np.asarray(p).tolist() for p in np.ravel(polynomials)]
 
 
 def _wiring(diagram: Any) -> str:

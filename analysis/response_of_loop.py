@@ -40,16 +40,14 @@ def own_parameters(loop: Any, response: Any) -> dict[str, Any]:
 def check_response(
     loop: Any, response: Any, params: Mapping[str, Any] | None = None, names: Sequence[str] = ()
 ) -> None:
-    """Refuse a response that is not one of a loop.
-
-    At twelve samples the outputs must be those that the loop has at the response's states.  Over
-    twelve spans between samples the loop is simulated from the states at the beginning and must
-    come to those at the end, to a hundredth of how far each state moves and a thousandth of its
-    largest sample so far.  What samples, delays or slides cannot begin anywhere: it is
-    simulated as a whole, and states and outputs at twelve samples are compared.  A loop that
-    differs by less counts as this one; a response that was simulated so coarsely that it
-    is wrong by more is refused too.
-    """
+    """Refuse a response that is not one of a loop."""
+    # At twelve samples the outputs must be those that the loop has at the response's states. Over
+    # twelve spans between samples the loop is simulated from the states at the beginning and must
+    # come to those at the end, to a hundredth of how far each state moves and a thousandth of its
+    # largest sample so far. What samples, delays or slides cannot begin anywhere: it is simulated
+    # as a whole, and states and outputs at twelve samples are compared. A loop that differs by less
+    # counts as this one; a response that was simulated so coarsely that it is wrong by more is
+    # refused too.
     params = own_parameters(loop, response) if params is None else dict(params)
     check_shape(loop, response, names)
     t, finite = np.asarray(response.time, dtype=float), np.isfinite(response.x).all(axis=0)

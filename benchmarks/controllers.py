@@ -1,7 +1,8 @@
 """How long a run of Example 1 takes with each controller: python benchmarks/controllers.py.
 
 The loop of the paper with the controller's defaults, 20 s at the default tolerances, as machine
-code on one core; the shortest of many runs. The table has multiples of the time with PID.
+code on one core, as time of the processor; the shortest of many runs. The table has multiples of
+the time with PID.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ def compiled(code: str) -> nlctl.native.Compiled:
 
 
 def seconds(loop: nlctl.native.Compiled) -> float:
-    """Return the time of one run."""
-    began = time.perf_counter()
+    """Return the processor's time of one run (s)."""
+    began = time.process_time()
     nlctl.input_output_response(loop, TIMES)
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 def main() -> None:

@@ -6,7 +6,8 @@ Each round makes the same steps of 10 ms in three ways, one after the other: by 
 `nlctl.input_output_response` of the compiled diagram over one step from the last state, and so by
 python-control at the same tolerances.  The ratios are those of the shortest times.  The last two
 forget delays, clocks and memories from step to step: these loops have none, but for the last one,
-whose state says what its memory is.
+whose state says what its memory is.  A second table has the time of a step for each member of
+`nlctl.vector_stepper`, next to as many steppers, as time of the processor.
 """
 
 from __future__ import annotations
@@ -86,8 +87,43 @@ def ways(system: Any) -> list[Callable[[np.ndarray], float]]:
     return [stepped, by_runs(native), by_runs(reference)]
 
 
+def together(system: Any, size: int) -> tuple[float, float]:
+    """Return the times of a step for each member: of a vector stepper, of as many steppers."""
+    compiled = nlctl.compile(system)
+    many = nlctl.vector_stepper(compiled, DT, size)
+    alone = [nlctl.stepper(compiled, DT) for _ in range(size)]
+    inputs = np.random.default_rng(0).normal(size=(STEPS + 1, size, 1))
+
+    def each_alone(row: np.ndarray) -> None:
+        for one, u in zip(alone, row, strict=True):
+            one.step(u)
+
+    best = []
+    for step in (many.step, each_alone):
+        times = []
+        for _ in range(ROUNDS):
+            step(inputs[0])
+            start = time.process_time()
+            for row in inputs[1:]:
+                step(row)
+            times.append((time.process_time() - start) / STEPS / size)
+        best.append(min(times))
+    return best[0], best[1]
+
+
+def show_members(console: Console, systems: dict[str, Any]) -> None:
+    """Print a table of members that are stepped together."""
+    table = Table("system", "members", "together, us each", "steppers, us each", "ratio")
+    for name, system in systems.items():
+        for size in (1, 8, 64):
+            many, alone = together(system, size)
+            times = (f"{1e6 * many:.1f}", f"{1e6 * alone:.1f}")
+            table.add_row(name, str(size), *times, f"{alone / many:.1f}")
+    console.print(table)
+
+
 def main() -> None:
-    """Print a table."""
+    """Print both tables."""
     console = Console()
     table = Table("system", "stepper, ms", "nlctl's runs, ms", "python-control's, ms", "ratios")
     console.print(machine())
@@ -100,6 +136,7 @@ def main() -> None:
         ratios = " and ".join(f"{other / stepper:.0f}" for other in others)
         table.add_row(name, *(f"{1e3 * t:.3f}" for t in (stepper, *others)), ratios)
     console.print(table)
+    show_members(console, systems)
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ extensions = [
     "block_pages",
     "root_files",
     "linked",
+    "live_panels",
 ]
 root_doc = "index"
 exclude_patterns = ["auto/**/*.py", "auto/**/*.ipynb", "gallery", "tutorials", "how-to/*.py"]
@@ -94,6 +95,12 @@ sphinx_gallery_conf = {
     "nested_sections": False,
     "backreferences_dir": "auto/used",  # which scripts use a name: its page says so
     "doc_module": ("nlctl",),
-    "reset_modules": ("matplotlib", "strict.warnings_are_errors", "strict.labels_fit"),
+    "reset_modules": (
+        "matplotlib",
+        "strict.warnings_are_errors",
+        "strict.labels_fit",
+        "live_panels.note_runs",
+    ),
+    "image_scrapers": ("matplotlib", "live_panels.panel_scraper"),
 }
 warnings.filterwarnings("ignore", message=".*non-interactive.*", category=UserWarning)

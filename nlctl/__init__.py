@@ -18,7 +18,10 @@ _listed, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> object:
     """Return what is listed; of what has moved into a room, with a warning that names it."""
     if name not in __all__:
-        from .host.rooms import found_in_room  # late: few ask
+        from .host.rooms import found_in_room, with_nearest  # late: few ask
 
-        return found_in_room(name) or _listed(name)
+        try:
+            return found_in_room(name) or _listed(name)
+        except AttributeError:
+            raise AttributeError(with_nearest(name, __all__)) from None
     return _listed(name)

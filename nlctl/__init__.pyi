@@ -53,6 +53,7 @@ from .native import (
     linearize,
     stepper,
     typeset,
+    vector_stepper,
 )
 from .params import param, record
 from .plants import PureFeedback
@@ -136,5 +137,6 @@ __all__ = [
     "stepper",
     "tune",
     "typeset",
+    "vector_stepper",
     "with_faults",
 ]

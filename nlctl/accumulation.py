@@ -1,22 +1,27 @@
-"""Switches that accumulate: they come ever closer together, and there is no end of them.
+"""Switches and jumps that accumulate: ever closer together, and there is no end of them.
 
 Behind a lag, or with u'' as the first derivative of its input that it acts on, a sign drives its
 input back and forth through 0 (second-order sliding).  Where every way back is shorter than the
 one before, the switches are so many that no run comes to its end: in a geometric sequence, whose
 sum is finite, or as exp(t).  Each engine asks `crowd_of` for the times at which one condition has
 been at 0, and `reached` and `tolerance_of` for whether what is compared is still more than nothing.
+
+Jumps of a guard accumulate before a time (Zeno) where the times in which their distances halve
+become shorter as well: a geometric sequence, or one as 1 / n^2, but none as 1 / n.  `jumps_end` is
+asked at each jump, by machine code too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 __all__ = [
-    "AT_LEAST", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of", "reached",
-    "tolerance_of",
+    "AT_LEAST", "PACE", "SECOND_ORDER", "WITHIN", "Crowd", "accumulation_words", "crowd_of",
+    "jumps_end", "limit_of", "reached", "tolerance_of",
 ]  # fmt: skip
 
 AT_LEAST = 5  # switches that are examined
@@ -29,6 +34,12 @@ SECOND_ORDER = (
 _LOCATED = 50.0  # relative tolerances by which periods fall at least; switches are located to 10
 _FALLS = 0.2  # part by which it is enough that they fall, whatever the tolerance is
 _FINITE = 0.9  # of two periods: those that fall as 1 / n do not fall so much for long
+
+PACE = 8  # numbers that are kept of a guard's jumps
+_LAST, _APART, _BEGUN, _HALF, _AT, _TOOK, _HALVED, _JUMPS = range(PACE)
+_SHORTER, _AT_ONCE = 0.9, 1e-3  # of the time of the halving before: that of 1 / n is as long
+_FEW, _NEAR = 6, 1e-9  # halvings, of a sequence whose rest is this part of its time so far
+_LONG, _COUNT = 13, 1000  # halvings and jumps after which none is waited for
 
 StateValue = Callable[[float, np.ndarray], float]
 
@@ -107,3 +118,43 @@ def accumulation_words(which: tuple[str, str], crowd: Crowd, beyond: str) -> str
         f"the switches of {whose} accumulate {where}: two of them in {crowd.period:.3g} s at "
         f"t = {crowd.last:.6g} s, {left} to come, {beyond}; {SECOND_ORDER}"
     )
+
+
+def jumps_end(pace: np.ndarray, t: float) -> bool:
+    """Note that a guard has fallen; return whether its jumps accumulate before a time close by.
+
+    Shapes: `pace` (PACE,), zeros before the first jump.
+    """
+    apart = t - pace[_LAST] if pace[_JUMPS] > 0.0 else np.inf
+    pace[_LAST] = t
+    pace[_JUMPS] += 1.0
+    shorter = apart < pace[_APART]
+    pace[_APART] = apart
+    if shorter and apart > 0.5 * pace[_HALF]:
+        return False
+    took, before = t - pace[_AT], pace[_TOOK]
+    pace[_AT], pace[_HALF] = t, apart
+    follows = before == np.inf or _AT_ONCE * before < took < _SHORTER * before
+    if not (shorter and follows):  # a sequence may begin here
+        pace[_BEGUN], pace[_TOOK], pace[_HALVED] = t, np.inf, 0.0
+        pace[_JUMPS] = min(pace[_JUMPS], 1.0)
+        return False
+    pace[_TOOK] = took
+    pace[_HALVED] += 1.0
+    rest = took / (1.0 - _SHORTER)
+    is_near = pace[_HALVED] >= _FEW and rest <= _NEAR * (t - pace[_BEGUN])
+    return is_near or (pace[_HALVED] >= _LONG and pace[_JUMPS] >= _COUNT)
+
+
+def limit_of(times: Sequence[float], last: float) -> float:
+    """Return where jumps at these times accumulate: `last`, where they have no limit."""
+    pace, took = np.zeros(PACE), np.inf
+    for t in times:
+        before, ends = pace[_TOOK], jumps_end(pace, t)
+        took = pace[_TOOK] / before if ends else np.inf
+    if took < 1.0:
+        return float(times[-1] + pace[_TOOK] * took / (1.0 - took))
+    apart = [b - a for a, b in pairwise(times[-3:])]
+    if len(apart) == 2 and 0.0 < apart[1] < apart[0]:
+        return times[-1] + apart[1] ** 2 / (apart[0] - apart[1])  # of a geometric sequence
+    return last

@@ -25,8 +25,9 @@ from typing import Any, Literal, TypeVar, Union
 import numpy as np
 import numpy.typing as npt
 
-from .errors import DivergedError, ParameterError, UsageError
+from .errors import DivergedError, ParameterError, UnknownKeywordError, UsageError
 from .host.checkout import SOURCES
+from .names import unknown
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _MANY = (collections.abc.Sequence, collections.abc.Collection, collections.abc.Iterable,
@@ -52,7 +53,11 @@ def as_annotated(function: _F) -> _F:
         reported: Any = function
         reported.__init__ = reporting(reported.__init__, reported.__name__)
         return reported
-    return reporting(function, function.__name__)
+    from .attributes import with_returned
+
+    called = reporting(function, function.__name__)
+    called.__doc__ = with_returned(function)
+    return called
 
 
 def reporting(
@@ -67,6 +72,8 @@ def reporting(
         except (UsageError, DivergedError):
             raise
         except Exception as error:
+            if isinstance(error, TypeError) and (unknown_one := _misspelt(function, who, kwargs)):
+                raise unknown_one from None
             if _says_it(error) or (rest := _complaint(function, who, args, kwargs, rule)) is None:
                 raise
             raise ParameterError(rest) from error
@@ -92,6 +99,20 @@ def _says_it(error: Exception) -> bool:
     last = traceback.extract_tb(error.__traceback__)[-1]
     ours = any(Path(last.filename).is_relative_to(folder) for folder in SOURCES)
     return ours and (last.line or "").startswith("raise ")
+
+
+def _misspelt(function: Any, who: str, kwargs: Mapping[str, Any]) -> Exception | None:
+    """Return the error for an argument that a function does not have, if there is one."""
+    parameters = inspect.signature(function).parameters
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
+        return None
+    known = [name for name in parameters if name != "self"]
+    wrong = next((name for name in kwargs if name not in known), None)
+    return (
+        None
+        if wrong is None
+        else unknown("argument", wrong, known, f"of {who}", UnknownKeywordError)
+    )
 
 
 def _complaint(function: Any, who: str, args: Any, kwargs: Any, rule: Any) -> str | None:

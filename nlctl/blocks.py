@@ -21,6 +21,7 @@ from .params import (
     record_rows,
     with_overrides,
 )
+from .probing import probed
 from .supplied import Supplied, supplied_now
 from .upstream.control_internals import (
     Around,
@@ -29,7 +30,6 @@ from .upstream.control_internals import (
     set_parameters,
 )
 from .upstream.systems import System
-from .wording import counted
 
 _Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs
 
@@ -336,6 +336,8 @@ def _check_has_equations(spec: Any) -> None:
     """Refuse what lacks signals or an equation; all that is missing is named."""
     if isinstance(spec, type):
         raise BlockError(f"{spec.__name__} is a class: make a record of it first")
+    if isinstance(spec, str):
+        raise BlockError(f"block needs a record and then its name, got the text {spec!r} first")
     needed = ["inputs", "outputs", "states", "feedthrough", "output"]
     needed += ["update"] if getattr(spec, "states", ()) else []
     if hasattr(spec, "guard") != hasattr(spec, "reset"):
@@ -431,33 +433,18 @@ def _count(system: Block, what: str) -> int:
 
 
 def _probe(system: Block) -> None:
-    """Call the equations once: sizes must match, and feedthrough must be declared truly."""
+    """Call the equations once: they must run, sizes match, and feedthrough be declared truly."""
     spec, who = system.spec, f"{type(system.spec).__name__} (block '{system.name}')"
     if supplied_of(system) is not None:
         return
-    x, u, p = default_state(system), np.full(system.ninputs or 0, 0.25), current_parameters(system)
-    with np.errstate(all="ignore"):
-        results = [("output", spec.output, system.noutputs)]
-        if system.nstates:
-            results.append(("update", spec.update, system.nstates))
-        if memory_states(spec):
-            results.append(("commit", spec.commit, len(memory_states(spec))))
-        if hasattr(spec, "reset"):
-            results.append(("reset", spec.reset, system.nstates or 0))
-        for what, function, count in results:
-            got = np.size(function(0.0, x, u, p))
-            if got != count:
-                names = system.output_labels if what == "output" else system.state_labels
-                raise BlockError(
-                    f"{who} returns {counted(got, 'value')} from {what}, needs {count}: "
-                    f"{', '.join(names)}"
-                )
-        # With NaN for an input, an output that it reaches turns NaN as well.
-        if not spec.feedthrough and system.ninputs:
-            before = np.asarray(spec.output(0.0, x, u, p), dtype=float)
-            after = np.asarray(spec.output(0.0, x, u * np.nan, p), dtype=float)
-            if not np.array_equal(before, after, equal_nan=True):
-                label = system.output_labels[int(np.argmax(before != after))]
-                raise BlockError(
-                    f"{who} declares feedthrough = False, but output '{label}' depends on the input"
-                )
+    names: dict[str, Any] = {"output": system.output_labels}
+    if system.nstates:
+        names["update"] = system.state_labels
+    if memory_states(spec):
+        names["commit"] = memory_states(spec)
+    if hasattr(spec, "reset"):
+        names |= {"guard": None, "reset": system.state_labels if system.nstates else ()}
+    if hasattr(spec, "switching"):
+        names["switching"] = None
+    u = np.full(system.ninputs or 0, 0.25)
+    probed(who, spec, names, default_state(system), u, current_parameters(system))

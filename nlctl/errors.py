@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -184,26 +182,21 @@ class ZenoError(DivergedError):
     """
 
     @classmethod
-    def of(cls, block: str, times: Sequence[float], reached: float) -> ZenoError:
-        """Return the error of a block whose guard has fallen at these times.
+    def of(cls, block: str, limit: float) -> ZenoError:
+        """Return the error of a block whose guard falls again and again.
 
         Parameters
         ----------
         block : str
             Its name.
-        times : sequence of float
-            When it fell (s), in order.
-        reached : float
-            Time of the last jump (s).
+        limit : float
+            Time at which the jumps accumulate (s).
 
         Returns
         -------
         ZenoError
-            With the limit of these times, or the last jump where they have none.
+            With that time.
         """
-        limit, apart = reached, [b - a for a, b in pairwise(times[-3:])]
-        if len(apart) == 2 and 0.0 < apart[1] < apart[0]:
-            limit = times[-1] + apart[1] ** 2 / (apart[0] - apart[1])  # of a geometric sequence
         return cls(
             f"block '{block}' jumps without end before t = {limit:.6g} s (Zeno): a guard that "
             "falls again and again needs a reset, or another state, that ends it",

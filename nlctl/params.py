@@ -21,6 +21,7 @@ import numpy as np
 from .annotations import as_numbers, reporting
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
+from .pickles import state_of, with_state
 
 Floats = tuple[float, ...]
 Matrix = tuple[Floats, ...]
@@ -101,7 +102,7 @@ def param(
     symbol : str, optional
         What formulas call it, where that is not its name: ``"mu"`` for centres.
     may_be_empty : bool, optional
-        Whether a vector may have no element.
+        Whether a vector may have no element, and a matrix no column.
 
     Returns
     -------
@@ -200,9 +201,19 @@ def record(cls: type[_T]) -> type[_T]:
         for name in given:
             if name not in known:
                 raise unknown("parameter", name, known, f"of {cls.__name__}", UnknownKeywordError)
-        init(self, *arguments, **given)
+        if arguments:
+            example = f"{cls.__name__}({known[0]}=...)" if known else f"{cls.__name__}()"
+            raise UnknownKeywordError(
+                f"{cls.__name__} takes no positional argument, got {str(arguments[0])[:40]!r}: "
+                f"parameters go by name, {example}"
+            )
+        init(self, **given)
 
     described.__init__ = reporting(by_name, described.__name__)
+    if "__getstate__" not in cls.__dict__:
+        names = tuple(f.name for f in dataclasses.fields(described))
+        described.__getstate__ = functools.partialmethod(state_of, names)
+        described.__setstate__ = with_state
     return described
 
 
@@ -306,8 +317,11 @@ def check_params(spec: Any) -> None:
 def _normalised(who: str, name: str, value: object, rule: Param, kind: Any) -> Any:
     """Return `value` as bool, int, float or nested tuple of floats."""
     ndim = rule.ndim
-    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray) and not len(value):
-        return ()
+    if rule.may_be_empty and isinstance(value, tuple | list | np.ndarray):
+        if not len(value):
+            return ()
+        if np.shape(value)[1:] == (0,) and ndim == 2:  # rows without a column
+            return ((),) * len(value)
     if kind in (bool, "bool"):
         if not isinstance(value, bool | np.bool_):
             raise ParameterError(f"{who} needs {name} to be True or False, got {value!r}")

@@ -273,7 +273,7 @@ def _computed(run: RunArguments, engine: str) -> Response:
         is_ring = isinstance(error, AlgebraicLoopError) and _is_sampled(run.system)
         if engine != "auto" or not interpretable or supplied_blocks(run.system, SLIDING) or is_ring:
             raise
-        warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=3)
+        warnings.warn(f"python-control takes over: {error}", EngineWarning, stacklevel=4)
     return python_control_response(replace(run, solver=dict(run.solver) | {"method": None}), _known)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .arguments import are_names, flag, names_in, number, one_of
+from .arguments import are_names, flag, names_in, one_of
 from .equations import equation
 from .errors import ParameterError
 from .params import Floats, param, record
@@ -327,7 +327,11 @@ class TimeTable(_Source):
         flag("TimeTable", "hold", self.hold)
         flag("TimeTable", "periodic", self.periodic)
         n = len(self.times)
-        number("TimeTable", "the number of times", n, at_least=2, at_most=_MOST)
+        if not 2 <= n <= _MOST:
+            raise ParameterError(
+                f"TimeTable needs 2 to {_MOST} times, got {n}: what is longer is an input of the "
+                "run, nlctl.input_output_response(loop, times, values), with hold='zoh' for steps"
+            )
         if n != len(self.values):
             raise ParameterError(
                 f"TimeTable needs as many values as times, got {len(self.values)} and {n}"

@@ -1,14 +1,19 @@
 """What tests have in common: hypothesis settings, one cache of machine code, marks, Ctrl-C."""
 
+import gc
 import os
 import signal
+import sys
 import tempfile
 
 import pytest
+from examples import many
 from hypothesis import settings
 
-# The same examples in every run, and no clocks.
-settings.register_profile("nlctl", deadline=None, derandomize=True, database=None, max_examples=50)
+# The same examples in every run, and no clocks; more of them once a week.
+settings.register_profile(
+    "nlctl", deadline=None, derandomize=True, database=None, max_examples=many(50, part=3)
+)
 settings.load_profile("nlctl")
 
 NEEDY = ("weekly", "browser", "cluster", "docs", "export", "upstream")  # marks of what counts as ci
@@ -25,6 +30,24 @@ def pytest_configure(config):
         folder = tempfile.TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         os.environ["NLCTL_CONFIG_DIR"] = folder.name
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Spare the garbage collector what imports leave: it is there until the end.
+
+    Looking through it again and again takes as long as the imports do.  Behind them no bytecode is
+    written: tests edit files within a second, which bytecode does not notice.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
+        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+        sys.dont_write_bytecode = True
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks

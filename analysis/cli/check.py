@@ -83,11 +83,9 @@ def repeat_command(
 
 
 def worst_lines(ledger: Ledger) -> list[Line]:
-    """Return one line for each run that violates one; if none does, |r| <= C_0 of (36).
-
-    Margins of different lines have different units; that of (36) says which run is nearest to
-    its bound.
-    """
+    """Return one line for each run that violates one; if none does, |r| <= C_0 of (36)."""
+    # Margins of different lines have different units; that of (36) says which run is nearest to its
+    # bound.
     first: dict[int, Line] = {}
     for line in ledger.violated:
         first.setdefault(line.member, line)

@@ -24,10 +24,8 @@ def write_export(
     name: str | None,
     out: Path,
 ) -> list[Path]:
-    """Write what a loop's name stands for; return the files.
-
-    All content is made before the first file is written.
-    """
+    """Write what a loop's name stands for; return the files."""
+    # All content is made before the first file is written.
     from .loops import assignments, named_loop
 
     if target != "c" and target not in TARGETS:
@@ -66,10 +64,8 @@ def write_fmu(
     stop_time: float,
     out: Path,
 ) -> Path:
-    """Write what a loop's name stands for as an FMU; return the file.
-
-    `others` are options that are of controllers alone.
-    """
+    """Write what a loop's name stands for as an FMU; return the file."""
+    # `others` are options that are of controllers alone.
     from .loops import assignments, named_loop
 
     given = [option for option, value in others.items() if value is not None]

@@ -8,6 +8,7 @@ from typing import Any
 
 from nlctl.errors import ParameterError, UsageError
 
+USUAL_STEP = 0.01  # s, between samples of a run where none is given
 _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
 
@@ -18,25 +19,61 @@ def named_loop(name: str) -> Any:
     if ":" in name:
         from ..studies.resolve import named_function  # takes a second
 
-        loop = named_function(name, Path.cwd())()  # who types its name wants it called
+        function = named_function(name, Path.cwd())
+        _check_takes_nothing(name, function)
+        loop = function()  # who types its name wants it called
     else:
         from nlctl.paper import named_example
 
+        if name.endswith(".py"):
+            raise ParameterError(f"'{name}' lacks the function that returns the loop: {name}:make")
         try:
             loop = named_example(name)()
         except UsageError as error:
             raise ParameterError(f"{error}; {_OWN}") from None
     if not is_system(loop):
         raise ParameterError(f"{name} needs to return a diagram, it returned {type(loop).__name__}")
-    return loop
+    return in_state_space(loop)
+
+
+def _check_takes_nothing(name: str, function: Any) -> None:
+    """Refuse a function that cannot be called without arguments."""
+    import inspect
+
+    try:
+        signature = inspect.signature(function)
+        signature.bind()
+    except TypeError:
+        raise ParameterError(
+            f"{name} needs a function without arguments, got "
+            f"{name.rpartition(':')[2]}{signature}: give each a default, or write one that calls it"
+        ) from None
+    except ValueError:  # what is written in C does not say
+        return
+
+
+def in_state_space(system: Any) -> Any:
+    """Return a diagram with states: a transfer function as a control.StateSpace of its signals."""
+    import control as ct
+
+    if not isinstance(system, ct.TransferFunction):
+        return system
+    names = {"inputs": system.input_labels, "outputs": system.output_labels}
+    return ct.ss(system, name=system.name, **names)
 
 
 _OWN = "a loop of your own is path/to/file.py:function or package.module:function"
 
 
-def sampled_times(until: float, step: float) -> Any:
-    """Return the times of a run, 0 to `until` in s."""
+def sampled_times(until: float, step: float, loop: Any) -> Any:
+    """Return the times of a run, 0 to `until` in s; a loop in discrete time has its own step."""
     import numpy as np
+
+    if loop.isdtime(strict=True):
+        period = 1.0 if loop.dt is True else float(loop.dt)
+        if step not in (USUAL_STEP, period):
+            raise ParameterError(f"'{loop.name}' is sampled every {period:g} s: leave --step out")
+        step = period
 
     if not (0 < step < until < float("inf")):
         raise ParameterError(f"simulate needs 0 < step < until, got step {step:g}, until {until:g}")
@@ -45,6 +82,8 @@ def sampled_times(until: float, step: float) -> Any:
             f"simulate needs at most {_MOST_SAMPLES:.0e} samples, got until {until:g} s / step "
             f"{step:g} s: take a longer --step"
         )
+    if loop.isdtime(strict=True):
+        return step * np.arange(int(until / step * (1 + 1e-12)) + 1)
     return np.linspace(0, until, round(until / step) + 1)
 
 

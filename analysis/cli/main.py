@@ -8,8 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from .loops import USUAL_STEP
 from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line, say
+from .printing import error_line, error_text, say
 from .report import Input, Set, register_reports
 from .studies import FAILS, OPEN, register_studies
 from .tune import register_tuning
@@ -60,7 +61,7 @@ def simulate(
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
     ] = "auto",
     until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
-    step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = 0.01,
+    step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = USUAL_STEP,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
 ) -> None:
@@ -292,17 +293,31 @@ register_studies(app)
 register_tuning(app)
 
 
-def main() -> None:
-    """Run the command line; what the user can put right ends in one sentence and exit code 2.
+def _say_warnings() -> None:
+    """Print warnings of nlctl as sentences; others stay as Python has them."""
+    import warnings
 
-    An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
-    """
+    usual = warnings.showwarning
+
+    def shown(message: Any, category: Any, *place: Any, **more: Any) -> None:
+        if category.__module__.partition(".")[0] == "nlctl":
+            error_line(f"nlctl: {message}")
+        else:
+            usual(message, category, *place, **more)
+
+    warnings.showwarning = shown
+
+
+def main() -> None:
+    """Run the command line; what the user can put right ends in one sentence and exit code 2."""
+    # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
     from nlctl.errors import DivergedError, UsageError
 
+    _say_warnings()
     try:
         app()
     except (UsageError, DivergedError, OSError) as error:
-        error_line(f"nlctl: {error}")
+        error_line(f"nlctl: {error_text(error)}")
         raise SystemExit(2) from None
     except KeyboardInterrupt:
         error_line("nlctl: interrupted")

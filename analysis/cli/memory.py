@@ -17,11 +17,9 @@ TO_RUN = 200 * 2**20
 
 
 def check_memory(needed: int = TO_RUN) -> None:
-    """Refuse to begin where the process may not have what a run takes (``ulimit -v``).
-
-    Compilers of C++ end the process where they get no memory, and its threads may wait for others
-    that never began: afterwards nobody can say which.
-    """
+    """Refuse to begin where the process may not have what a run takes (``ulimit -v``)."""
+    # Compilers of C++ end the process where they get no memory, and its threads may wait for others
+    # that never began: afterwards nobody can say which.
     try:
         import resource
     except ImportError:  # not of this system

@@ -8,13 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .loops import USUAL_STEP
 from .simulation import simulated
 
 if TYPE_CHECKING:
     from ..report.document import Report
     from ..robustness.stl.spec import Requirement
 
-HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, 0.01  # s, as `nlctl simulate` has them
+HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, USUAL_STEP  # s, as `nlctl simulate` has them
 
 
 def is_loop_name(text: str) -> bool:

@@ -25,6 +25,13 @@ def error_line(text: object) -> None:
     print(printable(text), file=sys.stderr)
 
 
+def error_text(error: Exception) -> str:
+    """Return what an error says; of the system's without its number."""
+    if isinstance(error, OSError) and error.strerror and error.filename:
+        return f"{error.strerror}: '{error.filename}'"
+    return str(error)
+
+
 def in_json(content: Any) -> str:
     """Return content as JSON that is safe to print."""
     text = json.dumps(content, indent=1, ensure_ascii=False)

@@ -103,7 +103,8 @@ def report(
         bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
     ] = False,
     live: Annotated[
-        bool, typer.Option("--live", help="Let the page of a loop or study run it, with sliders.")
+        bool,
+        typer.Option("--live", help="Let the page run what it shows, with sliders."),
     ] = False,
     move: Annotated[
         list[str] | None,
@@ -141,13 +142,12 @@ def report(
         is_loop = what is not None and is_loop_name(str(what))
         _check_loop_options(is_loop, set_, input_, until, step, require)
         check_junit(junit)
-        if (live or move) and (what is None or is_paper_name(str(what))):
-            raise _no_live()
-        if what is None:
-            written = _paper("lv_2017", out or Path("reports/paper"), jobs, far=far, **options)
-        elif is_paper_name(str(what)):
-            key = paper_key(str(what), "file, folder or paper")
-            written = _paper(key, out or Path("reports", key), jobs, far=far, **options)
+        if what is None or is_paper_name(str(what)):
+            if move:
+                raise _no_names()
+            key = "lv_2017" if what is None else paper_key(str(what), "file, folder or paper")
+            folder = out or Path("reports", "paper" if what is None else key)
+            written = _paper(key, folder, jobs, far=far, live=live, **options)
         elif is_loop:
             run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE,
                    move or live, require or [])  # fmt: skip
@@ -174,12 +174,11 @@ class WrittenPage:
     code: int
 
 
-def _no_live() -> UsageError:
+def _no_names() -> UsageError:
     from nlctl.errors import UsageError
 
     return UsageError(
-        "--live and --move are of a loop or a study; the paper's loops are 'nlctl report "
-        "nlctl.paper:example_1 --live' and example_2"
+        "--move is of a loop or a study; the page of a paper has its own sliders, with --live"
     )
 
 
@@ -216,8 +215,8 @@ def _loop(
 
 
 def _paper(
-    name: str, out: Path, jobs: int, *, far: bool, pdf: bool, interactive: bool, force: bool,
-    stamp: Stamp,
+    name: str, out: Path, jobs: int, *, far: bool, live: bool, pdf: bool, interactive: bool,
+    force: bool, stamp: Stamp,
 ) -> WrittenPage:  # fmt: skip
     """Reproduce a paper."""
     with _other_process() as beside:
@@ -229,12 +228,19 @@ def _paper(
         from .terminal import progress_bar
 
         reproduction = named_paper(name)
+        if live:
+            from ..reproductions.live import check_moved, with_parts_live
+
+            check_moved(reproduction.paper)
         reproduction.clear(out, force=force)
         composed = reproduction.compose(
             out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, notify=notify
         )
-        options = " --far" * far + " --interactive" * interactive
-        report = stamped(replace(composed.report, command=composed.report.command + options), stamp)
+        report = composed.report
+        if live:
+            report = with_parts_live(reproduction.paper, report)
+        options = " --far" * far + " --interactive" * interactive + " --live" * live
+        report = stamped(replace(report, command=report.command + options), stamp)
         page = write_report(
             report, out, interactive=interactive, force=force, pool=beside, drawn=composed.drawn
         )
@@ -391,11 +397,9 @@ def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
-    """Print what differs, one thing a line; return whether nothing does.
-
-    Two runs are compared by their results where one of them has no report.  The folder of a run
-    has to be whole.
-    """
+    """Print what differs, one thing a line; return whether nothing does."""
+    # Two runs are compared by their results where one of them has no report. The folder of a run
+    # has to be whole.
     from ..report.compare import compare_contents
     from ..studies import origin_differences, run_differences
     from ..studies.differences import long_table_differences

@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from nlctl.attributes import described_record
 
-@dataclass(frozen=True, kw_only=True)
+
+@described_record
 class Simulated:
-    """A loop, what was set of it, and its run.
-
-    Attributes
-    ----------
-    loop : control.InputOutputSystem
-    response : Response
-    params, start : dict
-        Parameters and initial states that were set.
-    """
+    """A loop, what was set of it, and its run."""
 
     loop: Any
     response: Any
-    params: Mapping[str, Any]
-    start: Mapping[str, float]
+    params: Mapping[str, Any]  # Parameters and initial states that were set.
+    start: Mapping[str, float]  # Parameters and initial states that were set.
 
 
 def simulated(
@@ -39,8 +32,8 @@ def simulated(
     from .loops import assignments, input_values, named_loop, sampled_times
     from .terminal import progress_bar
 
-    times = sampled_times(until, step)
     loop = named_loop(name)
+    times = sampled_times(until, step, loop)
     params, start = assignments(loop, settings)
     u = input_values(loop, inputs)[:, None] + 0 * times
     with progress_bar(f"simulating {name}", until) as advance:

@@ -22,7 +22,7 @@ from nlctl.wording import counted
 
 from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
-from .printing import error_line, in_json, say
+from .printing import error_line, error_text, in_json, say
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
@@ -255,7 +255,9 @@ def check_run_path(run: Path) -> None:
     from nlctl.errors import UsageError
 
     if run.exists() and not run.is_dir():
-        raise UsageError(f"'{run}' is a file, and a run is a folder: name '{run.parent}'")
+        loop = f"a loop of it is {run.as_posix()}:NAME" if run.suffix == ".py" else ""
+        advice = loop or f"name '{run.parent}'"
+        raise UsageError(f"'{run}' is a file, and a run is a folder: {advice}")
 
 
 def run_folder(study: Path) -> Path:
@@ -267,10 +269,8 @@ def run_folder(study: Path) -> Path:
 def _saying_how_to_resume(
     study: Path, options: list[str], folder: Path, resume: bool, json: bool
 ) -> Iterator[None]:
-    """Print the command that resumes, where a run ends early and may be continued.
-
-    It resumes from the moment on at which the folder holds the study; before, it begins.
-    """
+    """Print the command that resumes, where a run ends early and may be continued."""
+    # It resumes from the moment on at which the folder holds the study; before, it begins.
     kept = folder / "study.toml"
     is_taken = kept.exists() and not resume  # by a run that is there already: it is refused
     try:
@@ -327,7 +327,7 @@ def _fail(error: Exception, json: bool) -> None:
     message = (
         f"{TOO_LITTLE} ({error or type(error).__name__})"
         if is_short_of_memory(error)
-        else str(error)
+        else error_text(error)
     )
     if not json:
         error_line(f"nlctl: {message}")

@@ -76,13 +76,9 @@ def report_study(
         data = Path(os.path.relpath(result.folder, out))
         report = replace(report, files={(data / k).as_posix(): v for k, v in report.files.items()})
     folder = result.folder if out is None else out
-    with recorded_page(folder) if _is_in_run(folder, result) else nullcontext():
+    is_in_run = folder.resolve() == result.folder.resolve()  # in whose record it is then kept
+    with recorded_page(folder) if is_in_run else nullcontext():
         return write_report(report, folder, interactive=interactive, force=force), result
-
-
-def _is_in_run(page: Path, result: Result) -> bool:
-    """Whether a page lies in the folder of its run, in whose record it is then kept."""
-    return page.resolve() == result.folder.resolve()
 
 
 def _run(path: Path, threads: int | None, watch: Watch | None, force: bool, trust: bool) -> Result:

@@ -24,15 +24,17 @@ PERIOD = 0.25  # s between updates: drawing a bar takes as long as a run
 def sweep_bar(
     what: str, console: Console | None = None, confidence: float = 0.99
 ) -> Iterator[Callable[[SweepProgress], None]]:
-    """Show a bar on stderr while the body runs; elsewhere a line now and then.
-
-    With the bar stand the rows, the rate, the remaining time, the violations so far and, for
-    independent draws, bounds of their probability that hold at any time.
-    """
+    """Show a bar on stderr while the body runs; elsewhere a line now and then."""
+    # With the bar stand the rows, the rate, the remaining time, the violations so far and, for
+    # independent draws, bounds of their probability that hold at any time.
     console = console or Console(stderr=True)
     if not console.is_terminal:
         now: list[SweepProgress] = []
-        with progress_lines(what, lambda: _line(now[-1], confidence) if now else "begun"):
+
+        def line() -> str:
+            return f"{rows_text(now[-1])}, {found_text(now[-1], confidence)}" if now else "begun"
+
+        with progress_lines(what, line):
             yield lambda progress: now.__setitem__(slice(None), [progress])
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[rows]}"))
@@ -60,10 +62,6 @@ def sweep_bar(
             )
 
         yield show
-
-
-def _line(progress: SweepProgress, confidence: float) -> str:
-    return f"{rows_text(progress)}, {found_text(progress, confidence)}"
 
 
 def rows_text(progress: SweepProgress) -> str:

@@ -93,16 +93,14 @@ def show_metrics(times: np.ndarray, signals: Mapping[str, np.ndarray]) -> None:
     for name, y in signals.items():
         late = over(times, y, half, times[-1])
         numbers = (peak(times, y), peak(*late), rms(*late), final(times, y))
-        table.add_row(name, *(f"{v:.6g}" for v in numbers))
+        table.add_row(name, *(f"{v + 0.0:.6g}" for v in numbers))  # no -0
     Console().print(table)
 
 
 def trace_of(error: BaseException) -> str:
-    """Return what is printed of an error that is not a mistake of usage.
-
-    Where it comes from a function of the user's, that is its kind, its message and the lines of
-    the user's files; otherwise the whole trace.
-    """
+    """Return what is printed of an error that is not a mistake of usage."""
+    # Where it comes from a function of the user's, that is its kind, its message and the lines of
+    # the user's files; otherwise the whole trace.
     frames = traceback.extract_tb(error.__traceback__)
     users = [frame for frame in frames if _is_users(Path(frame.filename))]
     if not users:

@@ -6,17 +6,16 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, ORANGE, WIDTH
 
 from ..robustness.stl.spec import violates
-from .labels import number_axes, plain
+from .labels import draws, number_axes, plain
 from .searches import COLOURS, MAP_INK, centred
 
 REACH = 1.0  # margins beyond are drawn there
 
 
-@as_annotated
+@draws
 def fault_margins(margin: pd.Series) -> Figure:
     """Least margin that each fault leaves, with its name at the left.
 
@@ -24,11 +23,6 @@ def fault_margins(margin: pd.Series) -> Figure:
     ----------
     margin : pandas.Series
         Least margin by the name of the fault.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(margin.index)
     value = np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
@@ -40,7 +34,7 @@ def fault_margins(margin: pd.Series) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def fault_pairs(margin: pd.DataFrame) -> Figure:
     """Least margin under each pair of faults; on the diagonal under one alone.
 
@@ -48,11 +42,6 @@ def fault_pairs(margin: pd.DataFrame) -> Figure:
     ----------
     margin : DataFrame
         Square and symmetric, with the names of the faults.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     count = len(margin)
     figure = Figure(figsize=(WIDTH, 2.2 + 0.22 * count), layout="constrained")

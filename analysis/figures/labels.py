@@ -1,18 +1,30 @@
-"""Names that users give as labels, and numbers of any size: harmless to draw."""
+"""What all figures share; names that users give as labels, and numbers of any size, drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import inspect
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import WIDTH, set_style
 from nlctl.plotting.labels import plain
 
 _LARGEST = 1e100  # transforms of axes overflow from about 1e306 on
+_RETURNS = "\n\nReturns\n-------\nFigure\n    Of matplotlib; nothing is written or shown."
+_F = TypeVar("_F", bound=Callable[..., Figure])
+
+
+def draws(function: _F) -> _F:
+    """Mark a function that draws: what all of them return is said here."""
+    parameters, *raises = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises\n")
+    function.__doc__ = "".join([parameters, _RETURNS, *raises])
+    return as_annotated(function)
 
 
 def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:

@@ -7,15 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, TIME, legend_above, stacked_axes
 from nlctl.plotting.labels import plain
+
+from .labels import draws
 
 Bands = Mapping[str, tuple[np.ndarray, np.ndarray]]
 """Lower and upper end of a band over time, by the signal that it is drawn with."""
 
 
-@as_annotated
+@draws
 def overlaid(
     before: tuple[np.ndarray, Mapping[str, np.ndarray]],
     after: tuple[np.ndarray, Mapping[str, np.ndarray]],
@@ -32,11 +33,6 @@ def overlaid(
         Of all signals.
     bands : tuple of two mappings of str to two arrays of shape (m,), optional
         Bands of ensembles before and after, by signal; drawn where both have one.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     names = [name for name in before[1] if name in after[1]]
     figure, axes = stacked_axes(rows=max(1, len(names)), height=1.9 if len(names) > 1 else 2.6)

@@ -26,9 +26,10 @@ from nlctl.plotting.axes import (
 
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.long_run import LongRun
+from .labels import draws
 
 
-@as_annotated
+@draws
 def burst(run: LongRun) -> Figure:
     """A long run until its gain loses the sign: zeta and |e|, and the end of both, with r and u.
 
@@ -36,11 +37,6 @@ def burst(run: LongRun) -> Figure:
     ----------
     run : LongRun
         A run that ends in a burst.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
     (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.25, 1))
@@ -75,7 +71,7 @@ def burst(run: LongRun) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) -> Figure:
     """The paper in one picture: the output follows, and zeta drifts until N changes its sign.
 
@@ -87,11 +83,6 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
         Output and reference.
     run : LongRun or None
         The same loop until its burst; without it only the output is drawn.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure = Figure(figsize=(WIDTH, 2.3 if run is None else 4.2), layout="constrained")
     axes = np.ravel(figure.subplots(1 if run is None else 2, 1))
@@ -153,7 +144,7 @@ def windowed_maximum(time: np.ndarray, y: np.ndarray, window: float = 4 * np.pi)
     return np.array([time[0] + (number[starts] + 0.5) * window, largest])[:, :-1]
 
 
-@as_annotated
+@draws
 def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     """The Nussbaum argument of long runs that do not burst, and where it is predicted to stop.
 
@@ -161,11 +152,6 @@ def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     ----------
     runs : mapping
         `LongRun` by the name of the loop.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     for (label, run), (colour, style) in zip(runs.items(), STYLES, strict=False):
@@ -179,7 +165,7 @@ def long_zeta(runs: Mapping[str, LongRun]) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
     """V over time against what bounds it; a bound that is infinite is named in the legend.
 
@@ -189,11 +175,6 @@ def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
         Times (s).
     curves : mapping
         V and its bounds by name, each of shape (m,).
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     for (label, y), (colour, style) in zip(curves.items(), STYLES, strict=False):
@@ -206,7 +187,7 @@ def lyapunov_bound(t: np.ndarray, curves: Mapping[str, np.ndarray]) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def inequality_margins(margins: Sequence[Margin]) -> Figure:
     """Margin of each inequality over time, one panel each; a dot where it is least.
 
@@ -214,11 +195,6 @@ def inequality_margins(margins: Sequence[Margin]) -> Figure:
     ----------
     margins : sequence of Margin
         Those of inequalities, over the samples of one run.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, axes = _panels(margins)
     for ax, margin in zip(axes, margins, strict=True):
@@ -234,7 +210,7 @@ def inequality_margins(margins: Sequence[Margin]) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def equality_residuals(margins: Sequence[Margin]) -> Figure:
     """Distance between the sides of each equation over its size, and the tolerance.
 
@@ -242,11 +218,6 @@ def equality_residuals(margins: Sequence[Margin]) -> Figure:
     ----------
     margins : sequence of Margin
         Those of equations, over the samples of one run.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, axes = _panels(margins, sharey=True)
     for ax, margin in zip(axes, margins, strict=True):
@@ -280,7 +251,7 @@ def _least(t: np.ndarray, y: np.ndarray, count: int = 600) -> tuple[np.ndarray, 
     return t[at], y[at]
 
 
-@as_annotated
+@draws
 def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     """Numbers with their kind as bars on a logarithmic axis, what is proved in a colour of its own.
 
@@ -291,11 +262,6 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     ----------
     values : mapping
         Number and its kind by name.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     shown = {name: pair for name, pair in values.items() if np.isfinite(pair[0])}
     numbers = [number for number, _ in shown.values()]

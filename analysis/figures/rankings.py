@@ -10,13 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, ORANGE, PURPLE, SHORT_LINE, legend_above
 
-from .labels import arms, drawable, number_axes, within_reach
+from .labels import arms, drawable, draws, number_axes, within_reach
 
 
-@as_annotated
+@draws
 def screening(effects: pd.DataFrame) -> Figure:
     """Mean magnitude of the effects of each quantity with its interval, and their deviation.
 
@@ -24,11 +23,6 @@ def screening(effects: pd.DataFrame) -> Figure:
     ----------
     effects : pandas.DataFrame
         As `elementary_effects` returns it, a row for each quantity.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     effects = effects.sort_values("mu_star", ascending=False, kind="stable")
     effects = drawable(effects, "mu_star", "low", "high", "sigma")
@@ -41,7 +35,7 @@ def screening(effects: pd.DataFrame) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def shares(indices: pd.DataFrame) -> Figure:
     """Shares of the variance: of each quantity by itself, and with all its interactions.
 
@@ -49,11 +43,6 @@ def shares(indices: pd.DataFrame) -> Figure:
     ----------
     indices : pandas.DataFrame
         As `sobol_indices` returns them, a row for each quantity.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     indices = indices.sort_values("ST", ascending=False, kind="stable")
     indices = drawable(indices, "S1", "S1_low", "S1_high", "ST", "ST_low", "ST_high")
@@ -65,7 +54,7 @@ def shares(indices: pd.DataFrame) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def tornado(effects: pd.DataFrame, value: float) -> Figure:
     """What each quantity does to a number at either end of its box, by derivatives and by runs.
 
@@ -76,11 +65,6 @@ def tornado(effects: pd.DataFrame, value: float) -> Figure:
         ``run_high`` by runs.
     value : float
         The number at the nominal values.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     reach = effects[["low", "high"]].abs().max(axis=1).fillna(-1.0)
     order = np.argsort(-reach.to_numpy(), kind="stable")
@@ -107,7 +91,7 @@ def tornado(effects: pd.DataFrame, value: float) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def set_apart(table: pd.DataFrame) -> Figure:
     """How far failing runs lie from passing ones in each quantity.
 
@@ -115,11 +99,6 @@ def set_apart(table: pd.DataFrame) -> Figure:
     ----------
     table : pandas.DataFrame
         A row for each quantity, with the column ``statistic``.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     table = table.sort_values("statistic", ascending=False, kind="stable")
     figure, ax = number_axes(table.index)
@@ -128,7 +107,7 @@ def set_apart(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def violation_rates(ranking: pd.DataFrame) -> Figure:
     """Share of violations of each option with its interval.
 
@@ -136,11 +115,6 @@ def violation_rates(ranking: pd.DataFrame) -> Figure:
     ----------
     ranking : pandas.DataFrame
         A row for each option, with its rate and the interval.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(ranking.index)
     shares = drawable(ranking, "rate", "rate_low", "rate_high")
@@ -150,7 +124,7 @@ def violation_rates(ranking: pd.DataFrame) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str) -> Figure:
     """Median paired differences with their intervals; what is infinite is drawn at the edge.
 
@@ -162,11 +136,6 @@ def paired_differences(table: pd.DataFrame, labels: Sequence[str], quantity: str
         One for each row of `table`.
     quantity : str
         Name of the axis.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(labels)
     exact = table["median"].to_numpy(dtype=float)

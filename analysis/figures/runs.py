@@ -15,7 +15,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import (
     BLUE,
     GREY,
@@ -29,7 +28,7 @@ from nlctl.plotting.axes import (
 from nlctl.plotting.bands import Limit, bands
 
 from ..robustness.stl.spec import violates
-from .labels import arms, within_reach
+from .labels import arms, draws, within_reach
 
 CLIP = 2.0
 """Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""
@@ -42,7 +41,7 @@ def clipped_margins(values: object) -> np.ndarray:
     return within_reach(np.maximum(np.where(np.isnan(y), -np.inf, y), -CLIP))
 
 
-@as_annotated
+@draws
 def margins_figure(values: np.ndarray) -> Figure:
     """How many runs have which margin, and the share of runs with at most that margin.
 
@@ -50,11 +49,6 @@ def margins_figure(values: np.ndarray) -> Figure:
     ----------
     values : ndarray of shape (runs,)
         Margins; those of runs that ended early are drawn at the edge.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
     counts, part = figure.subplots(1, 2)
@@ -86,7 +80,7 @@ def margins_figure(values: np.ndarray) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def running_estimate(
     curve: pd.DataFrame, limit: float | None = None, fixed: tuple[float, float] | None = None
 ) -> Figure:
@@ -100,11 +94,6 @@ def running_estimate(
         Of the claim.
     fixed : tuple of 2 floats, optional
         Exact bounds after the last run, which decide where the number of runs was fixed.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     n = curve.index.to_numpy()
@@ -129,7 +118,7 @@ def running_estimate(
     return figure
 
 
-@as_annotated
+@draws
 def fans(
     time: np.ndarray,
     signals: Mapping[str, np.ndarray],
@@ -160,11 +149,6 @@ def fans(
         By signal, where they are known.
     groups : sequence of str, optional
         The kind of each run.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     lines = {"worst run": worst, "nominal": nominal}
     figure, _ = bands(time, signals, lines, limits=limits, units=units, groups=groups)

@@ -12,7 +12,6 @@ from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import (
     BLUE,
     GREEN,
@@ -27,7 +26,7 @@ from nlctl.plotting.axes import (
 )
 
 from ..robustness.stl.spec import violates
-from .labels import arms, drawable, number_axes, plain, within_reach
+from .labels import arms, drawable, draws, number_axes, plain, within_reach
 from .runs import clipped_margins
 
 SEARCHERS = {"corners": GREY, "uniform": BLUE, "CMA-ES": GREEN}
@@ -35,7 +34,7 @@ MAP_INK = "#111111"  # on the map, which is light on dark pages as well
 COLOURS = ListedColormap(colormaps["PuOr"](np.linspace(0.15, 0.85, 256)))  # MAP_INK shows on all
 
 
-@as_annotated
+@draws
 def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     """Lowest margin found after each run of a search, in the colour of what chose the run.
 
@@ -45,11 +44,6 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
         Lowest margin so far.
     searchers : sequence of str
         What chose each run.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     y, names = clipped_margins(lowest), np.asarray(searchers, dtype=object)
@@ -69,7 +63,7 @@ def search(lowest: np.ndarray, searchers: Sequence[str]) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def deviations(table: pd.DataFrame) -> Figure:
     """How far the quantities of some rows deviate from nominal, in sides of the box.
 
@@ -78,11 +72,6 @@ def deviations(table: pd.DataFrame) -> Figure:
     table : DataFrame
         One row per quantity, one column per row of the study; 1 is the upper end of the box, -1
         the lower one.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(table.index)
     table, height = drawable(table, *table.columns), 0.7 / len(table.columns)
@@ -98,7 +87,7 @@ def deviations(table: pd.DataFrame) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | None = None) -> Figure:
     """Share of violations with its interval against the size of the uncertainty.
 
@@ -110,11 +99,6 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
         A factor to be marked.
     limit : float, optional
         A rate to be marked.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     size = within_reach(curve.index)
@@ -132,7 +116,7 @@ def degradation(curve: pd.DataFrame, at: float | None = None, limit: float | Non
     return figure
 
 
-@as_annotated
+@draws
 def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     """Lowest margin that was found at each size that was tried, and the radius.
 
@@ -142,11 +126,6 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
         Sizes that were tried, with the lowest margin at each.
     radius : float
         The robustness radius.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     size, margin = within_reach(steps["size"]), clipped_margins(steps["margin"])
@@ -165,7 +144,7 @@ def radius_steps(steps: pd.DataFrame, radius: float) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def failure_map_figure(
     points: pd.DataFrame,
     triangles: np.ndarray,
@@ -193,11 +172,6 @@ def failure_map_figure(
         Nominal values of both quantities, marked by a star; none by default.
     box : tuple of 2 pairs, optional
         What the study takes to be possible: ends of both quantities.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
 
     Raises
     ------

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, set_style
 from nlctl.plotting.labels import plain
+
+from .labels import draws
 
 _LOOKS = {  # how a claim ended: colour, marker, word
     "holds": (BLUE, "o", "holds"),
@@ -23,7 +24,7 @@ ROW, PANEL, _FRAME = 0.3, 1.1, 0.9  # in
 _MOST = 20  # labels of revisions
 
 
-@as_annotated
+@draws
 def trend(
     labels: Sequence[str],
     claims: Mapping[str, Sequence[str]],
@@ -40,11 +41,6 @@ def trend(
         not made.
     numbers : mapping of str to sequence of float
         By name; what is not finite is a gap.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     heights = [_FRAME / 2 + ROW * len(claims)] * bool(claims) + [PANEL] * len(numbers)
     figure = Figure(figsize=(WIDTH, sum(heights) + _FRAME), layout="constrained")

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from nlctl.annotations import as_annotated
 from nlctl.plotting.axes import (
     BLUE,
     GREEN,
@@ -18,7 +17,7 @@ from nlctl.plotting.axes import (
     stacked_axes,
 )
 
-from .labels import number_axes, within_reach
+from .labels import draws, number_axes, within_reach
 from .runs import clipped_margins
 
 _CHOSEN = {
@@ -28,7 +27,7 @@ _CHOSEN = {
 }
 
 
-@as_annotated
+@draws
 def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     """Draw what every choice of gains was worth, by the runs until then, and the best so far.
 
@@ -38,11 +37,6 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
         As that of `nlctl.sensitivities.Tuned`.
     cost : bool, optional
         Whether it is the cost that counts.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     y = within_reach(history["cost"]) if cost else clipped_margins(history["margin"])
@@ -59,7 +53,7 @@ def tried(history: pd.DataFrame, cost: bool = False) -> Figure:
     return figure
 
 
-@as_annotated
+@draws
 def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figure:
     """Draw what each gain has bought: with it alone as found, and with all others as found.
 
@@ -71,11 +65,6 @@ def bought(gains: pd.DataFrame, before: float, after: float, what: str) -> Figur
         The least margin, or the cost, with all gains of the start and as found.
     what : str
         Name of the axis.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, ax = number_axes(gains.index)
     figure.set_figheight(figure.get_figheight() + 0.9)
@@ -105,7 +94,7 @@ def _confined(values: np.ndarray, before: float, after: float) -> np.ndarray:
     return np.nan_to_num(np.clip(values, low, high), nan=low)
 
 
-@as_annotated
+@draws
 def margins_of_both(before: np.ndarray, after: np.ndarray) -> Figure:
     """Draw the share of rows with at most a margin, before and after.
 
@@ -113,11 +102,6 @@ def margins_of_both(before: np.ndarray, after: np.ndarray) -> Figure:
     ----------
     before, after : ndarray of shape (rows,)
         Margins of the same rows.
-
-    Returns
-    -------
-    Figure
-        Of matplotlib; nothing is written or shown.
     """
     figure, (ax,) = stacked_axes()
     for y, colour, style, label in ((before, GREY, "--", "before"), (after, BLUE, "-", "after")):

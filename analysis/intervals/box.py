@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import Literal
 
 import control as ct
 import numpy as np
 
 from nlctl.annotations import as_annotated, as_numbers
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.wording import counted
@@ -18,20 +18,9 @@ Cell = tuple[tuple[float, float], ...]
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Box:
     """A product of intervals with named sides.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Coordinates, ``("x1", "x2", "v")``.
-    low, high : tuple of float
-        Ends of the sides; a side may be infinite.
-    provenance : {"given", "sampled"}
-        "sampled" for a box that trajectories have visited.
-    how : str
-        Where the box comes from.
 
     Examples
     --------
@@ -41,11 +30,12 @@ class Box:
     ((-1.0, 1.0), (0.0, 2.0))
     """
 
-    names: tuple[str, ...]
-    low: tuple[float, ...]
+    names: tuple[str, ...]  # Coordinates, ``("x1", "x2", "v")``.
+    low: tuple[float, ...]  # Ends of the sides; a side may be infinite.
     high: tuple[float, ...]
+    # "sampled" for a box that trajectories have visited.
     provenance: Literal["given", "sampled"] = "given"
-    how: str = "given"
+    how: str = "given"  # Where the box comes from.
 
     @classmethod
     def of(cls, **sides: tuple[float, float]) -> Box:

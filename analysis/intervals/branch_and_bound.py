@@ -18,7 +18,7 @@ import heapq
 import itertools
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +26,7 @@ from flint import arb
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
@@ -42,35 +43,20 @@ _Function = Callable[[tuple[Any, ...]], Any]
 HOPELESS = 5_000  # boxes after which a function still without bound somewhere is given up
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="enclose")
 class Range:
-    """A proved enclosure of a function's values on a box.
+    """A proved enclosure of a function's values on a box."""
 
-    Attributes
-    ----------
-    low, high : float
-        low <= f <= high on the whole box, proved; infinite where that did not succeed.
-    least, greatest : float
-        Extreme values that are attained (on boxes with an infinite side: that interval
-        arithmetic gives at a point of the finite ones).
-    boxes, undecided : int
-        Boxes examined, and those left without a finite bound.
-    seconds : float
-    arithmetic : {"balls", "floats"}
-        What proved it: python-flint's balls, or floats rounded outwards in machine code.
-
-    Examples
-    --------
-    See `enclose`.
-    """
-
-    low: float
+    low: float  # low <= f <= high on the whole box, proved; infinite where that did not succeed.
     high: float
+    # Extreme values that are attained (on boxes with an infinite side: that interval arithmetic
+    # gives at a point of the finite ones).
     least: float
     greatest: float
-    boxes: int
+    boxes: int  # Boxes examined, and those left without a finite bound.
     undecided: int
-    seconds: float
+    seconds: float  # How long it took.
+    # What proved it: python-flint's balls, or floats rounded outwards in machine code.
     arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
@@ -79,36 +65,19 @@ class Range:
         return float(np.maximum(abs(self.low), abs(self.high)))
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="prove")
 class Proof:
-    """The verdict on the claim low <= f <= high on a box.
+    """The verdict on the claim low <= f <= high on a box."""
 
-    Attributes
-    ----------
-    holds : bool or None
-        True: proved.  False: refuted, at the point `where`.  None: undecided.
-    boxes, undecided : int
-        Boxes examined, and those that stayed undecided.
-    where : dict or None
-        The point that refutes the claim, or the centre of an undecided box.
-    value : float
-        Value of the function there.
-    seconds : float
-    arithmetic : {"balls", "floats"}
-        What decided it: python-flint's balls, or floats rounded outwards in machine code; balls
-        have confirmed a point that refutes.
-
-    Examples
-    --------
-    See `prove`.
-    """
-
-    holds: bool | None
-    boxes: int
+    holds: bool | None  # True: proved. False: refuted, at the point `where`. None: undecided.
+    boxes: int  # Boxes examined, and those that stayed undecided.
     undecided: int
+    # The point that refutes the claim, or the centre of an undecided box.
     where: dict[str, float] | None
-    value: float
-    seconds: float
+    value: float  # Value of the function there.
+    seconds: float  # How long it took.
+    # What decided it: python-flint's balls, or floats rounded outwards in machine code; balls have
+    # confirmed a point that refutes.
     arithmetic: Literal["balls", "floats"] = "balls"
 
     @property
@@ -154,11 +123,6 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
         Each end of the range is at most this far from a value that is attained.
     max_boxes : int, optional
         Limit for each end; where it is reached the range is wider, and still proved.
-
-    Returns
-    -------
-    Range
-        A proved lower and upper bound, in the unit of the function.
 
     Raises
     ------
@@ -220,11 +184,6 @@ def prove(
         The claim.
     max_boxes : int, optional
         Number of boxes after which the rest counts as undecided.
-
-    Returns
-    -------
-    Proof
-        Proved, refuted at a point, or undecided.
 
     Raises
     ------
@@ -354,7 +313,7 @@ def _supremum(
         for cell in todo:
             boxes += 1
             bound, centre, gradient = _bounds(function, cell)
-            met = centre.upper() if _is_infinite(cell) else centre.lower()
+            met = centre.upper() if not np.all(np.isfinite(cell)) else centre.lower()
             best = max(best, float(met)) if met.is_finite() else best
             heapq.heappush(heap, (-upper(bound), next(order), cell, gradient))
         end, _, cell, gradient = heap[0]
@@ -386,10 +345,6 @@ def upper(ball: Any) -> float:
         return np.inf
     nearest = float(end)
     return nearest if arb(nearest) >= end else float(np.nextafter(nearest, np.inf))
-
-
-def _is_infinite(cell: Cell) -> bool:
-    return not np.all(np.isfinite(cell))
 
 
 def _centre(cell: Cell) -> tuple[float, ...]:

@@ -211,14 +211,11 @@ def least_bound(
     v: tuple[float, float],
     W: Any = None,
 ) -> float:
-    r"""Return what C_0 of (36) is at least on a box, for Q = 0.
-
-    G_max, d* and g are taken at points of the box.  Without `W` it is so for every W: by
-    \|W^T psi\| <= \|W\| \|psi\| the error at a point is at least \|g\| - \|psi\| \|W\|;
-    the least value of a convex function of \|W\| is left.
-
-    Shapes: `W` (l,).
-    """
+    r"""Return what C_0 of (36) is at least on a box, for Q = 0."""
+    # G_max, d* and g are taken at points of the box. Without `W` it is so for every W: by \|W^T
+    # psi\| <= \|W\| \|psi\| the error at a point is at least \|g\| - \|psi\| \|W\|; the least value
+    # of a convex function of \|W\| is left.
+    # Shapes: `W` (l,).
     g, psi, points = _at_points(parts, sides)
     f, d = plant_terms(parts.plant)
     corners = [x for x in points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))]

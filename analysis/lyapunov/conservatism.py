@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.functions import smooth_sign
 
 from ..metrics import over, peak
@@ -36,31 +37,15 @@ class Share:
     share: float  # of C_0^2 / 2
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="observed")
 class DirectBound:
-    """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1.
+    """A bound of |r| on [start, end] by direct comparison, without V and without Lemma 1."""
 
-    Attributes
-    ----------
-    start, end : float
-        Interval (s); infinite bounds where k G N is not negative throughout.
-    rho : float
-        Where beta rho + min delta_hat tanh(rho/tau) = sup M.
-    bound : float
-        max(|r(start)|, rho).
-    max_r : float
-        max |r| on the interval.
-
-    Examples
-    --------
-    See `observed`.
-    """
-
-    start: float
+    start: float  # Interval (s); infinite bounds where k G N is not negative throughout.
     end: float
-    rho: float
-    bound: float
-    max_r: float
+    rho: float  # Where beta rho + min delta_hat tanh(rho/tau) = sup M.
+    bound: float  # max(|r(start)|, rho).
+    max_r: float  # max |r| on the interval.
 
     @property
     def ratio(self) -> float:
@@ -68,46 +53,23 @@ class DirectBound:
         return self.bound / self.max_r
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="conservatism")
 class Conservatism:
-    """C_0 against what happens.
-
-    Attributes
-    ----------
-    C_0, max_r : float
-    ultimate, tail_max_r : float
-        sqrt(2 (alpha_0/alpha_1 + sup I)) and max |r| over the second half of the run.
-    shares : tuple of Share
-        Terms of C_0^2 / 2.
-    delta_shares : tuple of Share
-        Terms of delta*, over delta*.
-    C_0_along : float
-        C_0 with delta* = sup |G eps_u + d + eps| along the run (sampled), same W.
-    C_0_fitted : float
-        The same with the weights that make it smallest along the run.
-    sqrt_2V : float
-        max of sqrt(2 V): what is lost by bounding r by V alone.
-    comparisons : tuple of DirectBound
-        From 1 s on, and over the second half of the run.
-    e_1, tail_max_e_1 : float
-        Bound tail max |r| / lambda_{n-1} of limsup |e_1| for real stable roots, and what
-        max |e_1| is over the second half.
-
-    Examples
-    --------
-    See `conservatism`.
-    """
+    """C_0 against what happens."""
 
     C_0: float
     max_r: float
+    # sqrt(2 (alpha_0/alpha_1 + sup I)) and max |r| over the second half of the run.
     ultimate: float
     tail_max_r: float
-    shares: tuple[Share, ...]
-    delta_shares: tuple[Share, ...]
-    C_0_along: float
-    C_0_fitted: float
-    sqrt_2V: float
-    comparisons: tuple[DirectBound, ...]
+    shares: tuple[Share, ...]  # Terms of C_0^2 / 2.
+    delta_shares: tuple[Share, ...]  # Terms of delta*, over delta*.
+    C_0_along: float  # C_0 with delta* = sup |G eps_u + d + eps| along the run (sampled), same W.
+    C_0_fitted: float  # The same with the weights that make it smallest along the run.
+    sqrt_2V: float  # max of sqrt(2 V): what is lost by bounding r by V alone.
+    comparisons: tuple[DirectBound, ...]  # From 1 s on, and over the second half of the run.
+    # Bound tail max |r| / lambda_{n-1} of limsup |e_1| for real stable roots, and what max |e_1| is
+    # over the second half.
     e_1: float
     tail_max_e_1: float
 
@@ -164,11 +126,6 @@ def conservatism(
         Horizon (s), or responses of the loop; of an ensemble the first member counts.
     **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
-
-    Returns
-    -------
-    Conservatism
-        The terms of C_0, the run next to it, and bounds by direct comparison.
 
     Raises
     ------

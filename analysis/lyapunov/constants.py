@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import control as ct
@@ -11,6 +10,7 @@ import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, vector
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.functions import smooth_sign
 from nlctl.names import unknown
@@ -31,35 +31,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="literal")
 class Constants:
     """All constants of the proof for one loop and one box.
 
     ``constants["delta*"]`` is a value.  The bounds hold while the trajectory stays in the box.
-
-    Attributes
-    ----------
-    entries : tuple of Constant
-    parts : Parts
-        The records that they belong to; ``parts.gains`` are the controller's gains.
-    box : Box
-    sector : Sector
-    split : Decomposition
-        Of the actuator.
-    W : ndarray of shape (l,)
-        The ideal weights that were chosen; empty without a network.
-
-    Examples
-    --------
-    See `literal`.
     """
 
     entries: tuple[Constant, ...]
-    parts: Parts
+    parts: Parts  # The records that they belong to; ``parts.gains`` are the controller's gains.
     box: Box
     sector: Sector
-    split: Decomposition
-    W: np.ndarray
+    split: Decomposition  # Of the actuator.
+    W: np.ndarray  # (l,): The ideal weights that were chosen; empty without a network.
 
     def __getitem__(self, symbol: str) -> float:
         for entry in self.entries:
@@ -220,11 +204,6 @@ def constants(
         Initial states and parameters other than the loop's own.
     tol : float, optional
         Of every branch and bound.
-
-    Returns
-    -------
-    Constants
-        Every constant with the proof that it rests on.
 
     Raises
     ------

@@ -29,18 +29,14 @@ def at_most(A: np.ndarray, b: np.ndarray) -> ConeLimit:
 
 
 def equal(A: np.ndarray, b: np.ndarray) -> ConeLimit:
-    """Return A x = b, row by row.
-
-    Shapes: `A` (k, n), `b` (k,).
-    """
+    """Return A x = b, row by row."""
+    # Shapes: `A` (k, n), `b` (k,).
     return ConeLimit(A, b, lambda clarabel: clarabel.ZeroConeT(len(b)))
 
 
 def semidefinite(A: np.ndarray, b: np.ndarray, size: int) -> ConeLimit:
-    """Return that b - A x, a matrix as a vector with its norm, has no negative eigenvalue.
-
-    Shapes: `A` (m (m + 1)/2, n), `b` (m (m + 1)/2,), for m = `size`.
-    """
+    """Return that b - A x, a matrix as a vector with its norm, has no negative eigenvalue."""
+    # Shapes: `A` (m (m + 1)/2, n), `b` (m (m + 1)/2,), for m = `size`.
     return ConeLimit(A, b, lambda clarabel: clarabel.PSDTriangleConeT(size))
 
 

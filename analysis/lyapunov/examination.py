@@ -13,6 +13,7 @@ import numpy as np
 from nlctl import native
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, one_of
+from nlctl.attributes import described_record
 
 from ..intervals.box import Box, visited_box
 from .bounds.decomposition import Decomposition, decompose
@@ -51,20 +52,9 @@ class _Runs:
         return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="ledger")
 class Examination:
-    """What the ledger and the conservatism are made of.
-
-    Attributes
-    ----------
-    loop : control.InterconnectedSystem
-    runs : Runs
-    constants : Constants
-
-    Examples
-    --------
-    See `ledger`.
-    """
+    """What the ledger and the conservatism are made of."""
 
     loop: ct.InterconnectedSystem
     runs: _Runs

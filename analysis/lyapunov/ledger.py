@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import control as ct
 import numpy as np
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import UnknownKeywordError
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
@@ -36,41 +37,20 @@ if TYPE_CHECKING:
 _SETTINGS = ("box", "W", "k", "start", "params", "step", "max_steps")
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="ledger")
 class Ledger:
-    """Assumptions and inequalities of the proof for one loop, one line each.
+    """Assumptions and inequalities of the proof for one loop, one line each."""
 
-    Attributes
-    ----------
-    loop : str
-        Name of the diagram.
-    loop_facts : mapping
-        What the diagram consists of, see `nlctl.analysis.loop_record`.
-    lines : tuple of Line
-    constants : Constants
-    horizon : float
-        Length of the longest run (s).
-    members : int
-        Number of runs.
-    Q, max_r : float
-        sup I(t) of (33) and max |r|, over all runs.
-    slow_drift : SlowDrift or None
-        Of the first run, if it is long enough.
-
-    Examples
-    --------
-    See `ledger`.
-    """
-
-    loop: str
+    loop: str  # Name of the diagram.
+    # What the diagram consists of, see `nlctl.analysis.loop_record`.
     loop_facts: Mapping[str, Mapping[str, str]] = field(repr=False)
     lines: tuple[Line, ...]
     constants: Constants
-    horizon: float
-    members: int
-    Q: float
+    horizon: float  # Length of the longest run (s).
+    members: int  # Number of runs.
+    Q: float  # sup I(t) of (33) and max |r|, over all runs.
     max_r: float
-    slow_drift: SlowDrift | None
+    slow_drift: SlowDrift | None  # Of the first run, if it is long enough.
 
     @property
     def violated(self) -> tuple[Line, ...]:
@@ -175,11 +155,6 @@ def ledger(loop: ct.InterconnectedSystem | Examination, run: Any = 20.0, **setti
         Horizon (s), or responses of the loop.
     **settings : object
         box, W, k, start, params, step, max_steps: as for `examine`.
-
-    Returns
-    -------
-    Ledger
-        One line for each assumption and inequality, with its margin.
 
     Raises
     ------

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..intervals.box import Box
@@ -51,55 +51,27 @@ NEXT = "the steps that build on it do not follow along this run."
 LITERAL = "A2", "(10)", "(18)", "(20)", "(22)", "(30)", "(31)", "(32)", "(36)"
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="ledger")
 class Line:
-    """One line of the ledger.
+    """One line of the ledger."""
 
-    Attributes
-    ----------
-    key : str
-        Number in the paper, or name of the assumption.
-    statement : str
-    status : {"proved", "computed", "checked", "violated", "not applicable", "undecided"}
-        "proved" by interval arithmetic over the box; "computed" in closed form; "checked" at the
-        samples of the runs; "undecided" where a premise is infinite or cannot be decided.
-    least : float
-        Least margin along the runs; NaN where there is none.
-    time : float
-        Its time (s).
-    first : float
-        Time (s) of the first sample that violates it; NaN if none does.
-    state : dict
-        x, r, u, v, zeta, delta_hat there.
-    evidence, follows : str
-        How it is known, and what a violation means for the paper's conclusion.
-    reading : {"corrected", "paper"}
-        "paper": as printed, or as the paper uses it.
-    member : int
-        Number of the run.
-    replay : str
-        Options of the command line that repeat that run.
-    runs : int
-        Number of runs behind the line.
-
-    Examples
-    --------
-    See `ledger`.
-    """
-
-    key: str
-    statement: str
+    key: str  # Number in the paper, or name of the assumption.
+    statement: str  # What is claimed.
+    # "proved" by interval arithmetic over the box; "computed" in closed form; "checked" at the
+    # samples of the runs; "undecided" where a premise is infinite or cannot be decided.
     status: LineStatus
-    least: float = np.nan
-    time: float = np.nan
-    first: float = np.nan
+    least: float = np.nan  # Least margin along the runs; NaN where there is none.
+    time: float = np.nan  # Its time (s).
+    first: float = np.nan  # Time (s) of the first sample that violates it; NaN if none does.
+    # x, r, u, v, zeta, delta_hat there.
     state: dict[str, float] = dataclasses.field(default_factory=dict)
-    evidence: str = ""
+    evidence: str = ""  # How it is known, and what a violation means for the paper's conclusion.
     follows: str = ""
+    # "paper": as printed, or as the paper uses it.
     reading: Literal["corrected", "paper"] = "corrected"
-    member: int = 0
-    replay: str = ""
-    runs: int = 1
+    member: int = 0  # Number of the run.
+    replay: str = ""  # Options of the command line that repeat that run.
+    runs: int = 1  # Number of runs behind the line.
 
     def worse_of(self, other: Line | None) -> Line:
         """Return the line with the worse status, or the smaller least margin.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.params import equation_arguments
 from nlctl.plants import ForcedDuffing, duffing_forcing
 
@@ -22,41 +22,21 @@ from .constants import Constants, bound
 from .loop.integral import sharpest
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="literal")
 class Premises:
-    """What the proof supposes of a loop, as numbers.
-
-    Attributes
-    ----------
-    gains : Gains
-    lambdas : tuple of float
-        Of the filtered error (14).
-    N : callable
-        Nussbaum function.
-    W : ndarray of shape (l,)
-        Ideal weights.
-    split : Decomposition
-        Of the actuator, along trajectories.
-    G_min, G_max, d, eps, delta : float
-        Bounds of G, d* and eps*, and delta*.
-    forcing : callable
-        ``forcing(t)`` of arrays: what the reading counts to g and not to d.
-
-    Examples
-    --------
-    See `literal`.
-    """
+    """What the proof supposes of a loop, as numbers."""
 
     gains: Gains
-    lambdas: tuple[float, ...]
-    N: Callable[[Any], Any]
-    W: np.ndarray
-    split: Decomposition
-    G_min: float
+    lambdas: tuple[float, ...]  # Of the filtered error (14).
+    N: Callable[[Any], Any]  # Nussbaum function.
+    W: np.ndarray  # (l,): Ideal weights.
+    split: Decomposition  # Of the actuator, along trajectories.
+    G_min: float  # Bounds of G, d* and eps*, and delta*.
     G_max: float
     d: float
     eps: float
     delta: float
+    # ``forcing(t)`` of arrays: what the reading counts to g and not to d.
     forcing: Callable[[np.ndarray], np.ndarray] = np.zeros_like
 
     @property
@@ -101,11 +81,6 @@ def premises(
         Of a member of an ensemble; by default those of the constants.
     split : Decomposition, optional
         By default `sharpest` of the constants' split.
-
-    Returns
-    -------
-    Premises
-        The numbers that (29)-(36) are evaluated with.
 
     Examples
     --------

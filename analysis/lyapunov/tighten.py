@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from nlctl import native
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
+from nlctl.attributes import described_record
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.names import unknown
 from nlctl.plants import coordinate_names
@@ -52,37 +53,20 @@ class TrialBound:
     u: float  # max |u| along the run; infinite if it diverged
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="tighten")
 class Tightened:
-    """The gains that were found, and the constants of the proof for them.
+    """The gains that were found, and the constants of the proof for them."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name, for ``params=`` of a run.
-    examination : Examination
-        The run with these gains and the constants on its set, by branch and bound; a ledger can
-        be made of it.
-    C_0, ultimate : float
-        From those constants, with Q along the run.
-    u, u_limit, horizon : float
-        max |u| along the run, its limit, and the length of the runs (s).
-    trials : tuple of TrialBound
-        All gains that the search tried, in order.
-
-    Examples
-    --------
-    See `tighten`.
-    """
-
-    gains: dict[str, float]
+    gains: dict[str, float]  # Values by qualified name, for ``params=`` of a run.
+    # The run with these gains and the constants on its set, by branch and bound; a ledger can be
+    # made of it.
     examination: Examination
-    C_0: float
+    C_0: float  # From those constants, with Q along the run.
     ultimate: float
-    u: float
+    u: float  # max |u| along the run, its limit, and the length of the runs (s).
     u_limit: float
     horizon: float
-    trials: tuple[TrialBound, ...]
+    trials: tuple[TrialBound, ...]  # All gains that the search tried, in order.
 
     @as_annotated
     def table(self, bound: str = "C_0") -> pd.DataFrame:
@@ -153,11 +137,6 @@ def tighten(
         Number of gains that are tried.
     max_steps : int, optional
         Steps of a run beyond which gains count as too stiff.
-
-    Returns
-    -------
-    Tightened
-        The best gains with their bound, and all trials.
 
     Raises
     ------

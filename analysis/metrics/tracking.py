@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, number, text
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 
 from . import extremes, integrals, travel
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Metric:
     """A named number of one signal.
-
-    Attributes
-    ----------
-    key : str
-        Short name for tables and files.
-    signal : str
-        Signal of the response that it is computed from.
-    unit, meaning : str
-        Shown wherever the number is.
-    function : callable
-        ``function(t, y) -> float``.
-    start, end : float
-        Interval of time (s) that counts.
 
     Raises
     ------
@@ -47,12 +34,12 @@ class Metric:
     (('u',), 3.0)
     """
 
-    key: str
-    signal: str
-    unit: str
+    key: str  # Short name for tables and files.
+    signal: str  # Signal of the response that it is computed from.
+    unit: str  # Shown wherever the number is.
     meaning: str
-    function: Callable[[np.ndarray, np.ndarray], float]
-    start: float = 0.0
+    function: Callable[[np.ndarray, np.ndarray], float]  # ``function(t, y) -> float``.
+    start: float = 0.0  # Interval of time (s) that counts.
     end: float = np.inf
 
     def __post_init__(self) -> None:

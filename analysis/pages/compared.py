@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from .. import figures
@@ -40,22 +40,13 @@ _LINE = re.compile(r"^numbers\.(study\.)?(tables|running estimate)\b")  # of a t
 _TOLD_APART = ("title", "verdict", "question", "revision", "date")
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Compared:
-    """A report that is compared.
+    """A report that is compared."""
 
-    Attributes
-    ----------
-    name : str
-        As the command names it.
-    content : mapping
-        What is in its ``report.json``.
-    folder : Path, optional
-        Where its page lies, with its signals; None where it was made for this comparison.
-    """
-
-    name: str
-    content: Mapping[str, Any]
+    name: str  # As the command names it.
+    content: Mapping[str, Any]  # What is in its ``report.json``.
+    # Where its page lies, with its signals; None where it was made for this comparison.
     folder: Path | None = None
 
 
@@ -153,18 +144,16 @@ def _verdict(
 
 
 def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], list[Difference]]:
-    """Return differences of numbers, those with the largest share first, and the others.
-
-    Those of claims are in their own table; a number that a table shows as well is named once, as
-    there.
-    """
+    """Return differences of numbers, those with the largest share first, and the others."""
+    # Those of claims are in their own table; a number that a table shows as well is named once, as
+    # there.
     numbers, words = [], []
     cells = [d for d in differences if d.where.startswith("section '")]
     in_tables = {_pair(cell) for cell in cells if not _LINE.search(cell.where)}
     for one in differences:
         if one.where.startswith("claim '"):
             continue
-        if not _both_numbers(one):
+        if not (sort_key(one.first) and sort_key(one.second)):
             words.append(one)
         elif one.where.startswith("section '") or _pair(one) not in in_tables:
             numbers.append(one)
@@ -173,10 +162,6 @@ def _sorted_out(differences: Sequence[Difference]) -> tuple[list[Difference], li
 
 def _pair(one: Difference) -> tuple[str, str]:
     return sort_key(one.first), sort_key(one.second)
-
-
-def _both_numbers(one: Difference) -> bool:
-    return bool(sort_key(one.first) and sort_key(one.second))
 
 
 def _share(one: Difference) -> float:

@@ -6,15 +6,17 @@ import base64
 import gzip
 import shlex
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import control as ct
 import numpy as np
 
-from nlctl.errors import ParameterError
+from nlctl.diagrams import state_names
 from nlctl.export.web import Handle, WebProgram, check_linker, handles, web_program
 from nlctl.faults.effects import NEVER
 from nlctl.plotting.bands import quantile, upper_envelope
+from nlctl.responses.arguments import state_array
 from nlctl.responses.time_response import as_response
 
 from ..report.document import Live
@@ -23,6 +25,7 @@ from ..robustness.stl.spec import Requirement, limits_of_requirements
 from .study.histories import Histories
 
 _NODES = 240  # stretches of time of a band
+_PIECE = 12000  # bytes of a module: two pieces are closer than gzip looks back
 _LARGEST = 1e300  # instead of infinity, which JSON has not
 
 
@@ -31,14 +34,13 @@ def live_program(
 ) -> WebProgram:
     """Return the program of a page that runs a loop as a response was run."""
     check_linker()
-    if not isinstance(loop, ct.InterconnectedSystem):
-        raise ParameterError(
-            f"a page runs diagrams, and '{loop.name}' is a single block: make a diagram of it with "
-            "nlctl.interconnect"
-        )
+    diagram: Any = loop
+    if not isinstance(loop, ct.InterconnectedSystem):  # a single block
+        labels = {"inputs": loop.input_labels, "outputs": loop.output_labels}
+        diagram = ct.interconnect([loop], **labels, name=loop.name)
     u = np.atleast_2d(response.u) if loop.ninputs else 0.0
     return web_program(
-        loop, response.time, u, params=params, initial_state=np.asarray(response.x)[:, 0]
+        diagram, response.time, u, params=params, initial_state=np.asarray(response.x)[:, 0]
     )
 
 
@@ -47,16 +49,19 @@ def live_item(
     response: Any,
     names: Sequence[str],
     *,
-    signals: Sequence[str] = (),
+    signals: Sequence[str | Sequence[str]] = (),
     requirements: Sequence[Requirement] = (),
     histories: Histories | None = None,
     command: Sequence[str] = (),
     base: Mapping[str, Any] | None = None,
+    called: str = "loop",
+    origin: str = "as reported",
 ) -> Live:
     """Return the part of a page that runs a loop.
 
     `names` are what may be moved, a sensible few by default; `command` repeats the run as it
-    stands, else the call of Python with the settings `base` does.
+    stands, else the call of Python with the settings `base` does, of the loop as it is `called`;
+    `origin` says in a few words where the run of the page is from.
     """
     moved = handles(
         program.compiled, names, program.p, program.x0, program.u,
@@ -65,10 +70,11 @@ def live_item(
     known = program.signals
     limits = {k: v for k, v in limits_of_requirements(requirements).items() if k in known}
     content = {
-        "module": base64.b64encode(gzip.compress(program.module, 9, mtime=0)).decode(),
+        "module": _packed([program.module]),
         "facts": program.facts,
         "handles": [_plain(handle) for handle in moved],
         "never": NEVER,
+        "origin": origin,
         "outputs": list(program.outputs),
         "rows": _rows(response, known, signals, limits),
         "limits": {name: [[*line] for line in lines] for name, lines in limits.items()},
@@ -79,16 +85,42 @@ def live_item(
             for r in requirements if set(r.signals) <= set(known)
         ],
         "numbers": live_numbers(program)["outputs"],
-        "command": _command(command, response, base or {}),
+        "command": _command(command, program, response, base or {}, called),
     }  # fmt: skip
     what = ", ".join(handle.name for handle in moved)
     return Live(
         key="live",
         caption="This page runs the loop itself, by the integrators and equations that made it. "
-        "Grey: as reported.",
+        f"Grey: {origin}.",
         description=f"Sliders for {what}.",
         program=content,
     )
+
+
+def modules_together(items: Sequence[Live], programs: Sequence[WebProgram]) -> list[Live]:
+    """Return what runs on one page, with the modules of all in the first of them.
+
+    They have the integrators in common, which are in the page once.
+    """
+    module = _packed([program.module for program in programs])
+    data = module.pop("data")
+    where = [{"data": data}] + [{"of": items[0].key}] * (len(items) - 1)
+    return [
+        replace(item, program={**item.program, "module": {**module, **place, "place": k}})
+        for k, (item, place) in enumerate(zip(items, where, strict=True))
+    ]
+
+
+def _packed(modules: Sequence[bytes]) -> dict[str, Any]:
+    """Return modules as text: pieces of all in turn, so that what they share is near."""
+    pieces = range(0, max(map(len, modules)), _PIECE)
+    content = b"".join(module[at : at + _PIECE] for at in pieces for module in modules)
+    return {
+        "data": base64.b64encode(gzip.compress(content, 9, mtime=0)).decode(),
+        "sizes": [*map(len, modules)],
+        "piece": _PIECE,
+        "place": 0,
+    }
 
 
 def live_numbers(program: WebProgram) -> dict[str, Any]:
@@ -113,7 +145,7 @@ def _plain(handle: Handle) -> dict[str, Any]:
 def _rows(
     response: Any,
     known: Mapping[str, np.ndarray],
-    signals: Sequence[str],
+    signals: Sequence[str | Sequence[str]],
     watched: Collection[str],
 ) -> list[dict[str, Any]]:
     """Return the rows of the static figure, with the outputs that the page computes.
@@ -167,10 +199,25 @@ def _finite(value: float) -> float:
     return float(np.clip(value, -_LARGEST, _LARGEST))
 
 
-def _command(words: Sequence[str], response: Any, base: Mapping[str, Any]) -> dict[str, Any]:
+def _command(
+    words: Sequence[str], program: WebProgram, response: Any, base: Mapping[str, Any], loop: str
+) -> dict[str, Any]:
     """Return what repeats a run: words of a shell, or the settings of a call of Python."""
     if words:
         return {"shell": shlex.join(words)}
     times = np.asarray(response.time)
-    grid = f"np.linspace({times[0]:g}, {times[-1]:g}, {times.size})"
-    return {"python": grid, "params": {k: v for k, v in base.items() if isinstance(v, float | int)}}
+    ends = [repr(float(end)).removesuffix(".0") for end in (times[0], times[-1])]
+    even = np.array_equal(times, np.linspace(times[0], times[-1], times.size))
+    usual = state_array(program.compiled.system, None)
+    names = state_names(program.compiled.system)
+    return {
+        "python": loop,
+        "times": f"np.linspace({', '.join(ends)}, {times.size})" if even else "t",
+        "inputs": [None if np.ptp(row) else float(row[0]) for row in program.u],
+        "states": {
+            name: float(value)
+            for name, value, other in zip(names, program.x0, usual, strict=True)
+            if value != other
+        },
+        "params": {k: v for k, v in base.items() if isinstance(v, float | int)},
+    }

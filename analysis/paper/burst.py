@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import control as ct
@@ -25,6 +25,7 @@ import numpy as np
 
 from nlctl import native, paper
 from nlctl.actuators import Gain
+from nlctl.attributes import described_record
 from nlctl.controllers import adaptive_neural
 from nlctl.diagrams import state_names
 from nlctl.equations import equation
@@ -43,31 +44,17 @@ _FINE, _PASSES = 0.02, 6  # steps of zeta between samples, reached by so many re
 _DRAG = 1.0  # |c/eta|: c is about (lambda - a) r, a tenth of eta, while r is large
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Burst:
-    """Example 2 after its gain has lost its sign, by an averaged computation.
+    """Example 2 after its gain has lost its sign, by an averaged computation."""
 
-    Attributes
-    ----------
-    start : float
-        Time (s) at which the exact run was given up and the averaged one begins.
-    time : ndarray of shape (m,)
-        Since then (s).
-    signals : mapping
-        zeta, e, r and u over `time`, averaged.
-    bounds : Aftermath
-        From the integral of N, for all gains within their bounds.
-    late_time : ndarray of shape (k,)
-        Since the end of `time` (s), over two common periods of reference and disturbance.
-    late : mapping of float to ndarray
-        e over `late_time` by the constant K instead of \\|N\\|.
-    """
-
-    start: float
-    time: np.ndarray = field(repr=False)
-    signals: Mapping[str, np.ndarray] = field(repr=False)
-    bounds: Aftermath
+    start: float  # Time (s) at which the exact run was given up and the averaged one begins.
+    time: np.ndarray = field(repr=False)  # (m,): Since then (s).
+    signals: Mapping[str, np.ndarray] = field(repr=False)  # zeta, e, r and u over `time`, averaged.
+    bounds: Aftermath  # From the integral of N, for all gains within their bounds.
+    # (k,): Since the end of `time` (s), over two common periods of reference and disturbance.
     late_time: np.ndarray = field(repr=False)
+    # e over `late_time` by the constant K instead of \|N\|.
     late: Mapping[float, np.ndarray] = field(repr=False)
 
     @property

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from nlctl import actuators, paper
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 
 from ..metrics import Metric, final, highest, lowest, peak, rms
 
@@ -54,29 +55,17 @@ METRICS = (
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Case:
-    """One closed loop of the paper, or of a choice that the paper leaves open.
-
-    Attributes
-    ----------
-    key, title : str
-    example : int
-        1 or 2.
-    arguments : mapping
-        Keyword arguments of `nlctl.paper.example_1` or `example_2`.
-    group : str
-        ``"published"``, ``"choice"`` or ``"exchange"``.
-    rtol : float
-        Relative tolerance of the integrator.
-    """
+    """One closed loop of the paper, or of a choice that the paper leaves open."""
 
     key: str
     title: str
-    example: int
+    example: int  # 1 or 2.
+    # Keyword arguments of `nlctl.paper.example_1` or `example_2`.
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    group: str = "choice"
-    rtol: float = 1e-9
+    group: str = "choice"  # ``"published"``, ``"choice"`` or ``"exchange"``.
+    rtol: float = 1e-9  # Relative tolerance of the integrator.
 
     @property
     def diagram(self) -> Any:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
 
 from nlctl import paper
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.controllers import (
     PID,
     AdaptiveWeights,
@@ -27,27 +27,15 @@ from nlctl.names import unknown
 from nlctl.references import BandLimitedNoise
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class _Gains:
-    """What the controllers of an example are made with.
+    """What the controllers of an example are made with."""
 
-    Attributes
-    ----------
-    pid, sliding : dict
-        Found by ``campaign/baselines.py``.
-    reached : float
-        -N(zeta) of the paper's loop at 20 s.
-    r_0 : float
-        Dead zone of r in zeta', for |e| <= 0.133 (example 1) and 0.13 (example 2).
-    weights, robust, law : dict
-        Gains for which `nlctl.analysis.lyapunov.certify` proves a bound.
-    """
-
-    pid: dict[str, float]
+    pid: dict[str, float]  # Found by ``campaign/baselines.py``.
     sliding: dict[str, float]
-    reached: float
-    r_0: float
-    weights: dict[str, float]
+    reached: float  # -N(zeta) of the paper's loop at 20 s.
+    r_0: float  # Dead zone of r in zeta', for |e| <= 0.133 (example 1) and 0.13 (example 2).
+    weights: dict[str, float]  # Gains for which `nlctl.analysis.lyapunov.certify` proves a bound.
     robust: dict[str, float]
     law: dict[str, float]
 
@@ -129,12 +117,10 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
 
 
 def baselines(example: str) -> dict[str, Any]:
-    """Return a PID and a boundary-layer sliding-mode controller for an example.
-
-    Tuned by ``campaign/baselines.py``: the least IAE over 20 s of the nominal loop with measurement
-    noise, for the paper's max |u| in the same noise.  They know the sign of the input gain and have
-    gains made for this plant; the paper's controller has neither.
-    """
+    """Return a PID and a boundary-layer sliding-mode controller for an example."""
+    # Tuned by ``campaign/baselines.py``: the least IAE over 20 s of the nominal loop with
+    # measurement noise, for the paper's max |u| in the same noise. They know the sign of the input
+    # gain and have gains made for this plant; the paper's controller has neither.
     surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
         "PID": PID(**gains.pid, u_max=100.0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from threading import Event
 from typing import cast
 
@@ -13,6 +13,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native, paper
+from nlctl.attributes import described_record
 from nlctl.native import compile as compiled
 from nlctl.response import input_output_response
 
@@ -43,34 +44,19 @@ FAR_HORIZONS = {  # key of a run far beyond 20 s: what it is, and its horizon (s
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Evidence:
-    """What was found about the proof of one loop.
-
-    Attributes
-    ----------
-    ledger : Ledger
-    conservatism : Conservatism
-    slow_drift : SlowDrift
-        Told from the first 200 s.
-    certificate : KnownSignCertificate
-        Of the same plant and actuator with the law that knows the sign of the gain.
-    certified_max_r : float
-        max |r| of a run of that loop.
-    t : ndarray of shape (m,)
-    curves : mapping
-        V and its bounds over `t`, by name.
-    assumptions, margins : tuple of Margin
-        Assumptions and numbered steps of the proof over `t`.
-    """
+    """What was found about the proof of one loop."""
 
     ledger: Ledger
     conservatism: Conservatism
-    slow_drift: SlowDrift
+    slow_drift: SlowDrift  # Told from the first 200 s.
+    # Of the same plant and actuator with the law that knows the sign of the gain.
     certificate: KnownSignCertificate
-    certified_max_r: float
-    t: np.ndarray = field(repr=False)
-    curves: Mapping[str, np.ndarray] = field(repr=False)
+    certified_max_r: float  # max |r| of a run of that loop.
+    t: np.ndarray = field(repr=False)  # (m,)
+    curves: Mapping[str, np.ndarray] = field(repr=False)  # V and its bounds over `t`, by name.
+    # Assumptions and numbered steps of the proof over `t`.
     assumptions: tuple[Margin, ...] = field(repr=False)
     margins: tuple[Margin, ...] = field(repr=False)
 
@@ -121,29 +107,20 @@ def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     return paper.EXAMPLES[name](controller=compared_controllers(name)["certified"])
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class FarRuns:
-    """The loops far beyond 20 s.
+    """The loops far beyond 20 s."""
 
-    Attributes
-    ----------
-    runs : mapping
-        By key of `FAR_HORIZONS`.
-    burst : Burst or None
-        Example 2 beyond its run, if it bursts.
-    """
-
-    runs: Mapping[str, LongRun] = field(default_factory=dict)
-    burst: Burst | None = None
+    runs: Mapping[str, LongRun] = field(default_factory=dict)  # By key of `FAR_HORIZONS`.
+    burst: Burst | None = None  # Example 2 beyond its run, if it bursts.
 
 
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[FarRuns]]:
-    """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs.
-
-    Example 2 is run as far as its burst is predicted from, and continues the record of
-    `nlctl.analysis.paper.reference_run`; with `whole` it is run to its burst, which takes minutes.
-    """
+    """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs."""
+    # Example 2 is run as far as its burst is predicted from, and continues the record of
+    # `nlctl.analysis.paper.reference_run`; with `whole` it is run to its burst, which takes
+    # minutes.
     stop = Event()
     with ThreadPoolExecutor(1) as pool:
         try:

@@ -50,11 +50,9 @@ def example_2(
 
 
 def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
-    """An example with the output ``error``, y - yd of the plant itself.
-
-    The output e is what the controller makes of its measurements: with a fault on one of them it
-    is not an error of the plant.
-    """
+    """An example with the output ``error``, y - yd of the plant itself."""
+    # The output e is what the controller makes of its measurements: with a fault on one of them it
+    # is not an error of the plant.
     if example not in paper.EXAMPLES:
         raise unknown("example", example, paper.EXAMPLES)
     difference = ct.summing_junction(["y", "-yd"], "error", name="difference")
@@ -64,11 +62,9 @@ def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
 def on_a_computer(
     example: str = "example_1", *, controller: Any = "paper", waiting: int = 20
 ) -> ct.InterconnectedSystem:
-    """An example whose controller is a program, every 2 ms by Euler's method, 1 ms late.
-
-    What may be varied are ``sampling.dt``, ``sampling.delay``, ``sampling.jitter``, and, from 0 on,
-    ``sampling.input_quantum`` and ``sampling.output_quantum``.
-    """
+    """An example whose controller is a program, every 2 ms by Euler's method, 1 ms late."""
+    # What may be varied are ``sampling.dt``, ``sampling.delay``, ``sampling.jitter``, and, from 0
+    # on, ``sampling.input_quantum`` and ``sampling.output_quantum``.
     if example not in paper.EXAMPLES:
         raise unknown("example", example, paper.EXAMPLES)
     program = sampled(

@@ -155,12 +155,10 @@ def _runs(
     threads: int | None,
     watch: ProgressWatch,
 ) -> tuple[dict[str, CaseRun], list[Future[Any]]]:
-    """Run the paper's cases; return them, and what runs in the other process meanwhile.
-
-    That is the studies, lines of the record on sampling, and last the numerics.  Both processes
-    need the integrators: where nothing is compiled yet only this one compiles them, while the
-    other does what needs none.
-    """
+    """Run the paper's cases; return them, and what runs in the other process meanwhile."""
+    # That is the studies, lines of the record on sampling, and last the numerics. Both processes
+    # need the integrators: where nothing is compiled yet only this one compiles them, while the
+    # other does what needs none.
     with watch("simulating", len(CASES)) as advance:
         runs = run_all(CASES[:1], done=lambda _: advance(1))
         waiting = [

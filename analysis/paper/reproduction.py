@@ -53,14 +53,12 @@ def expectations() -> list[Expectation]:
             case=row["case"],
             metric=row["metric"],
             printed=row["value"],
-            tolerance=max(float(row["tolerance"]), _half_unit(row["value"])),
+            tolerance=max(
+                float(row["tolerance"]), 0.5 * 10.0 ** -len(row["value"].partition(".")[2])
+            ),
         )
         for row in csv.DictReader(text.splitlines())
     ]
-
-
-def _half_unit(printed: str) -> float:
-    return 0.5 * 10.0 ** -len(printed.partition(".")[2])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -75,11 +75,9 @@ def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
 
 
 def beaten_by(record: pd.DataFrame, example: str) -> dict[str, dict[str, tuple[str, ...]]]:
-    """Return who beats the paper's controller as printed, and whom it beats, by actuator.
-
-    One beats another with no more violations of the spec and a smaller RMS of e from 10 s on: the
-    exact interval of the median difference on the same samples is on one side of 0.
-    """
+    """Return who beats the paper's controller as printed, and whom it beats, by actuator."""
+    # One beats another with no more violations of the spec and a smaller RMS of e from 10 s on: the
+    # exact interval of the median difference on the same samples is on one side of 0.
     tallies = {}
     for actuator, runs in record[record["example"] == example].groupby("actuator", sort=False):
         lines: list[dict[str, Any]] = runs.to_dict("records")  # type: ignore[assignment]

@@ -8,7 +8,6 @@ checkout, makes it again.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl import paper
+from nlctl.attributes import described_record
 from nlctl.native import Compiled, ensemble_response
 from nlctl.native import compile as compiled_loop
 from nlctl.sampling import sampled
@@ -32,26 +32,15 @@ _LOOK = 1e-3  # s: nothing that is held is missed
 _EFFORT = 60_000  # steps of a run; one at 1 ms takes 20,000
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Quantity:
-    """Something of the computer that is varied.
+    """Something of the computer that is varied."""
 
-    Attributes
-    ----------
-    key : str
-        Name of the parameter, behind ``"sampling."``.
-    title, unit : str
-    factor : float
-        From the parameter's unit to `unit`.
-    low, high : float
-        Range, in the parameter's unit.
-    """
-
-    key: str
-    title: str
+    key: str  # Name of the parameter, behind ``"sampling."``.
+    title: str  # What it is called on the page.
     unit: str
-    factor: float
-    low: float
+    factor: float  # From the parameter's unit to `unit`.
+    low: float  # Range, in the parameter's unit.
     high: float
 
     @property
@@ -125,10 +114,8 @@ def meets_the_spec(table: pd.DataFrame) -> np.ndarray:
 
 
 def where_it_ends(table: pd.DataFrame) -> tuple[float, float]:
-    """Return up to which value all runs meet the spec, and the next one, which does not.
-
-    NaN where there is none: the first value violates, or all are good.
-    """
+    """Return up to which value all runs meet the spec, and the next one, which does not."""
+    # NaN where there is none: the first value violates, or all are good.
     ordered = table.sort_values("value")
     bad, values = np.flatnonzero(~meets_the_spec(ordered)), ordered["value"].to_numpy()
     if not bad.size:

@@ -218,11 +218,6 @@ def _on_figure_8() -> list[Statement]:
     ]  # fmt: skip
 
 
-def _statements() -> list[Statement]:
-    """Return what the figures show, as it was read off them."""
-    return [*_on_figure_2_and_4(), *_on_figure_3(), *_on_figure_6(), *_on_figure_8()]
-
-
 def _draw_presliding(runs: PaperRuns) -> MatplotlibFigure:
     """Friction over displacement before sliding."""
     run = runs["presliding"]
@@ -375,7 +370,9 @@ _PAPER = Paper(
     ),
     simulate=partial(simulate_cases, _CASES),
     cases=len(_CASES),
-    statements=_statements,
+    statements=lambda: [
+        *_on_figure_2_and_4(), *_on_figure_3(), *_on_figure_6(), *_on_figure_8()
+    ],
     reproduced="Figs. 2, 3, 4, 6 and 8: presliding, lag, break-away, stick-slip, hunting",
     not_reproduced=(
         "the article's own pictures, which could not be read (numbers are read off a "

@@ -141,10 +141,6 @@ def _of_the_run() -> list[Statement]:
     ]  # fmt: skip
 
 
-def _statements() -> list[Statement]:
-    return [*_of_algebra(), *_of_the_run()]
-
-
 def _states(runs: PaperRuns) -> MatplotlibFigure:
     """The states and the control input, which is held between samples."""
     run = runs["1"]
@@ -235,7 +231,7 @@ _PAPER = Paper(
     ),
     simulate=partial(simulate_cases, _CASES),
     cases=len(_CASES),
-    statements=_statements,
+    statements=lambda: [*_of_algebra(), *_of_the_run()],
     reproduced="Lyapunov equation, constants, decay, and the bound on intervals of its example",
     not_reproduced=(
         "the inequality with the quoted b = 8, which needs 8.5 (σ = 0.05 is still small enough); "

@@ -90,10 +90,8 @@ def write_pdf(page: str | os.PathLike[str], path: str | os.PathLike[str]) -> Pat
 
 
 def _run_while_busy(command: list[str], errors: Path) -> str:
-    """Run a program until it ends or hangs; return the last line of its errors.
-
-    They go to a file: a pipe would stay open as long as any process that it has started.
-    """
+    """Run a program until it ends or hangs; return the last line of its errors."""
+    # They go to a file: a pipe would stay open as long as any process that it has started.
     with errors.open("wb") as file:
         process = subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=file, start_new_session=True

@@ -70,10 +70,8 @@ class ClaimChange:
 def claim_changes(
     first: Sequence[Mapping[str, Any]], second: Sequence[Mapping[str, Any]]
 ) -> list[ClaimChange]:
-    """Return the claims of two reports, those that became worse first.
-
-    Claims belong together that say the same, or else have their evidence at the same place.
-    """
+    """Return the claims of two reports, those that became worse first."""
+    # Claims belong together that say the same, or else have their evidence at the same place.
     one, other = ([Claim(**claim) for claim in claims] for claims in (first, second))
     changes, left = [], list(other)
     alone = []

@@ -18,75 +18,44 @@ import numpy as np
 from matplotlib.figure import Figure as MatplotlibFigure
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import checked_times
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Paragraph:
-    """A paragraph of plain text, and what is to be typed below it, such as a command.
-
-    Examples
-    --------
-    See `Report`.
-    """
+    """A paragraph of plain text, and what is to be typed below it, such as a command."""
 
     text: str
     code: str = ""
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Equation:
-    """A formula in LaTeX, with the paper's number where it has one.
-
-    Examples
-    --------
-    >>> import json
-    >>> from nlctl.analysis.report import Equation, Report, Section, render_json
-    >>> law = Equation(latex=r"\\dot{x} = -\beta x", number="(1)")
-    >>> shown = Section(key="law", title="The law", items=[law])
-    >>> report = Report(title="A law", verdict="", claims=[], sections=[shown], command="")
-    >>> json.loads(render_json(report))["sections"]["law"]["items"][0]["number"]
-    '(1)'
-    """
+    """A formula in LaTeX, with the paper's number where it has one."""
 
     latex: str
     number: str = ""
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Table:
-    """A table: column titles, rows of text or numbers, and a caption.
+    """A table: column titles, rows of text or numbers, and a caption."""
 
-    Attributes
-    ----------
-    status : str or sequence of str
-        Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as badges; or of
-        several.
-    folded : bool
-        Whether the page shows the caption only until it is opened; paper shows all.
-    links : str
-        Title of a column that holds keys of sections or figures of the report, drawn as links.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.report import Report, Section, Table, render_html
-    >>> table = Table(caption="Gains", columns=["gain", "value"], rows=[["beta", 2.5]])
-    >>> shown = Section(key="gains", title="Gains", items=[table])
-    >>> report = Report(title="Gains", verdict="", claims=[], sections=[shown], command="")
-    >>> "<caption" in render_html(report)
-    True
-    """
-
-    caption: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[Any]]
+    caption: str  # What it shows, above it.
+    columns: Sequence[str]  # Titles.
+    rows: Sequence[Sequence[Any]]  # Text or numbers.
+    # Title of a column that holds ``"pass"``, ``"fail"`` and the like, drawn as badges; or of
+    # several.
     status: str | Sequence[str] = ""
+    # Whether the page shows the caption only until it is opened; paper shows all.
     folded: bool = False
+    # Title of a column that holds keys of sections or figures of the report, drawn as links.
     links: str = ""
 
 
@@ -121,28 +90,12 @@ def captioned(key: str, caption: str, values: str, figure: MatplotlibFigure) -> 
     return Figure(key=key, caption=caption, description=f"{caption} {values}", figure=figure)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class History:
     """Signals over time for a chart to zoom in and to read values from.
 
     It is on the page only if that is asked for, and only where scripts run.  Hence it shows
     nothing of its own: a figure next to it shows the same signals.
-
-    Attributes
-    ----------
-    key, caption, description : str
-        As those of a `Figure`.
-    time : array of shape (m,)
-        In s, increasing.
-    signals : mapping of str to array of shape (m,)
-        What is not finite is drawn as a gap.
-    unit : str
-        Unit of all signals.
-    shown : sequence of str
-        Signals that are drawn at first; all of them if it is empty.
-    bands : mapping of str to two arrays of shape (m,)
-        By signal the lower and the upper end of a band of an ensemble around it, which
-        comparisons of two pages draw.
 
     Raises
     ------
@@ -158,13 +111,16 @@ class History:
     nlctl.errors.ParameterError: signal 'x' of history 'x' has shape (1,), its time (2,)
     """
 
-    key: str
+    key: str  # As those of a `Figure`.
     caption: str
     description: str
-    time: Sequence[float] | np.ndarray
+    time: Sequence[float] | np.ndarray  # (m,): In s, increasing.
+    # (m,): What is not finite is drawn as a gap.
     signals: Mapping[str, Sequence[float] | np.ndarray]
-    unit: str = ""
-    shown: Sequence[str] = ()
+    unit: str = ""  # Unit of all signals.
+    shown: Sequence[str] = ()  # Signals that are drawn at first; all of them if it is empty.
+    # (m,): By signal the lower and the upper end of a band of an ensemble around it, which
+    # comparisons of two pages draw.
     bands: Mapping[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -181,76 +137,44 @@ class History:
                 raise unknown("signal", name, self.signals)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Live:
     """A loop that the page runs itself, in WebAssembly, with sliders.
 
     Where no script runs it shows nothing: figures next to it show the run as reported.
-
-    Attributes
-    ----------
-    key, caption, description : str
-        As those of a `Figure`.
-    program : mapping
-        What ``live.js`` needs, see `nlctl.analysis.pages.live`.
 
     Examples
     --------
     See `nlctl.analysis.loop_report`.
     """
 
-    key: str
+    key: str  # As those of a `Figure`.
     caption: str
     description: str
-    program: Mapping[str, Any]
+    program: Mapping[str, Any]  # What ``live.js`` needs, see `nlctl.analysis.pages.live`.
 
 
 Item = Paragraph | Equation | Table | Figure | History | Live
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Section:
-    """A headed part of a report; `key` is its anchor.
+    """A headed part of a report; `key` is its anchor."""
 
-    Attributes
-    ----------
-    folded : bool
-        Whether the page shows the heading only, until it is opened or something inside is linked
-        to; paper shows all.
-
-    Examples
-    --------
-    See `Report`.
-    """
-
-    key: str
-    title: str
+    key: str  # Its anchor.
+    title: str  # Its heading.
     items: Sequence[Item]
-    level: int = 2
+    level: int = 2  # Of the heading.
+    # Whether the page shows the heading only, until it is opened or something inside is linked to;
+    # paper shows all.
     folded: bool = False
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Claim:
     """One line of the verdict: what was asked, what was found, the limit, where the evidence is.
-
-    Attributes
-    ----------
-    evidence : str
-        Key of the section or figure that shows it.
-    margin : str
-        How far the measured value is from the limit.
-    status : str
-        What kind of statement it is, such as ``"proved"``, ``"checked"`` or ``"undecided"``;
-        where it is empty, the page says that the claim holds or fails.  A claim that does not
-        hold is drawn as failed, or as open where its status says so; never as one that holds.
-    by : str
-        Who else claims it, such as ``"the paper"``: where it does not hold, they are refuted and
-        nothing of ours has failed, which the page says in another colour.
-    ids : sequence of str
-        Ids of the requirements that it answers, such as ``["REQ-12"]``.
 
     Examples
     --------
@@ -267,109 +191,84 @@ class Claim:
     ('1 of 1 claim fails.', '1 claim of the paper is refuted.')
     """
 
-    text: str
-    measured: str
-    limit: str
+    text: str  # What was asked.
+    measured: str  # What was found.
+    limit: str  # What it must not exceed.
     holds: bool
-    evidence: str
-    margin: str = ""
+    evidence: str  # Key of the section or figure that shows it.
+    margin: str = ""  # How far the measured value is from the limit.
+    # What kind of statement it is, such as ``"proved"``, ``"checked"`` or ``"undecided"``; where it
+    # is empty, the page says that the claim holds or fails. A claim that does not hold is drawn as
+    # failed, or as open where its status says so; never as one that holds.
     status: str = ""
+    # Who else claims it, such as ``"the paper"``: where it does not hold, they are refuted and
+    # nothing of ours has failed, which the page says in another colour.
     by: str = ""
-    ids: Sequence[str] = ()
+    ids: Sequence[str] = ()  # Ids of the requirements that it answers, such as ``["REQ-12"]``.
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="Report")
 class Headline:
-    """What a report without claims is headed with.
+    """What a report without claims is headed with."""
 
-    Attributes
-    ----------
-    look : {"pass", "proved", "checked", "caution", "refuted", "fail", "neutral"}
-        Its colour and its sign.
-    text : str
-        A sentence.
-
-    Examples
-    --------
-    >>> from nlctl.analysis.report import Headline, Report, render_html
-    >>> headline = Headline(look="pass", text="3 of 3 checks hold.")
-    >>> report = Report(
-    ...     title="Arm", verdict="", claims=[], sections=[], command="", headline=headline
-    ... )
-    >>> "<strong>3 of 3 checks hold.</strong>" in render_html(report)
-    True
-    """
-
-    look: str
-    text: str
+    look: str  # Its colour and its sign.
+    text: str  # A sentence.
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Report:
     """A whole report.
 
-    Attributes
-    ----------
-    title, verdict : str
-        The verdict is what was found, in a sentence or two, and comes first.
-    claims : sequence of Claim
-    sections : sequence of Section
-    command : str
-        Command that makes the report again; empty where there is none.
-    provenance : mapping
-        Versions of what made it.
-    inputs : mapping
-        Name and text of each study file that the report is made from.
-    numbers : mapping
-        Every number of the report, for ``report.json``.
-    methods, limits, references : sequence of str
-        Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
-        (``doi 10...``) becomes a link, the only kind that leads out of the page.
-    files : mapping
-        Name and SHA-256 of each data file next to the page (`nlctl.analysis.report.file_hashes`).
-    question : str
-        The question that the report answers; it precedes the verdict.
-    lead : Figure, optional
-        The picture next to the verdict that shows the main result.
-    author, revision, date : str
-        Below the title.  They are only what is given: a report that is made twice is the same to
-        the byte.
-    headline : Headline, optional
-        What stands above the verdict where nothing is claimed.
-
     Examples
     --------
-    A page with one claim and its evidence:
+    A page with one claim and its evidence, and one that claims nothing and has a headline:
 
-    >>> from nlctl.analysis.report import Claim, Paragraph, Report, Section, render_html
-    >>> shown = Section(key="one", title="A sum", items=[Paragraph(text="Two and two are four.")])
+    >>> from nlctl.analysis.report import Claim, Equation, Headline, Paragraph, Report, Section
+    >>> from nlctl.analysis.report import Table, render_html
+    >>> words = Paragraph(text="Two and two are four.")
+    >>> law = Equation(latex="2 + 2 = 4", number="(1)")
+    >>> table = Table(caption="Sums", columns=["sum", "value"], rows=[["2 + 2", 4.0]])
+    >>> shown = Section(key="one", title="A sum", items=[words, law, table])
     >>> claim = Claim(text="2 + 2 = 4", measured="4", limit="4", holds=True, evidence="one")
     >>> report = Report(title="Sum", verdict="Known.", claims=[claim], sections=[shown], command="")
     >>> page = render_html(report)
-    >>> "Two and two are four." in page, "https://" in page
-    (True, False)
+    >>> [part in page for part in ("Two and two are four.", "(1)", "<caption", "https://")]
+    [True, True, True, False]
+    >>> headline = Headline(look="pass", text="3 of 3 checks hold.")
+    >>> other = Report(
+    ...     title="Sum", verdict="", claims=[], sections=[], command="", headline=headline
+    ... )
+    >>> "<strong>3 of 3 checks hold.</strong>" in render_html(other)
+    True
     """
 
-    title: str
+    title: str  # The verdict is what was found, in a sentence or two, and comes first.
     verdict: str
     claims: Sequence[Claim]
     sections: Sequence[Section]
-    command: str
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str  # Command that makes the report again; empty where there is none.
+    provenance: Mapping[str, str] = field(default_factory=dict)  # Versions of what made it.
+    # Name and text of each study file that the report is made from.
     inputs: Mapping[str, str] = field(default_factory=dict)
+    # Every number of the report, for ``report.json``.
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    # Paragraphs on how it was found and what it does not show, and the sources; a DOI in them
+    # (``doi 10...``) becomes a link, the only kind that leads out of the page.
     methods: Sequence[str] = ()
     limits: Sequence[str] = ()
     references: Sequence[str] = ()
+    # Name and SHA-256 of each data file next to the page (`nlctl.analysis.report.file_hashes`).
     files: Mapping[str, str] = field(default_factory=dict)
-    question: str = ""
-    lead: Figure | None = None
+    question: str = ""  # The question that the report answers; it precedes the verdict.
+    lead: Figure | None = None  # The picture next to the verdict that shows the main result.
+    # Below the title. They are only what is given: a report that is made twice is the same to the
+    # byte.
     author: str = ""
     revision: str = ""
     date: str = ""
-    headline: Headline | None = None
+    headline: Headline | None = None  # What stands above the verdict where nothing is claimed.
 
 
 PACKAGES = ("nlctl", "control", "numpy", "scipy", "pandas", "numba", "matplotlib")

@@ -15,10 +15,8 @@ _USED = re.compile(r'"#(g:\d+)"')
 
 
 def drawings(page: Path) -> dict[str, str]:
-    """Return a key of every drawing of a page by its anchor; none of a page that is not there.
-
-    Shared shapes count by what they are, words about a figure do not count.
-    """
+    """Return a key of every drawing of a page by its anchor; none of a page that is not there."""
+    # Shared shapes count by what they are, words about a figure do not count.
     try:
         text = page.read_text(encoding="utf-8", errors="replace")
     except OSError:

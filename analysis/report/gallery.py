@@ -51,11 +51,9 @@ def _unchecked(folder: Path) -> None:
 def entries(
     folder: str | os.PathLike[str], check: Callable[[Path], object] = _unchecked
 ) -> list[Entry]:
-    """Return the reports below a folder, by the names of their folders.
-
-    A ``report.json`` that cannot be read, has no page next to it, or that `check` refuses is listed
-    as such.
-    """
+    """Return the reports below a folder, by the names of their folders."""
+    # A ``report.json`` that cannot be read, has no page next to it, or that `check` refuses is
+    # listed as such.
     folder = Path(folder)
     files = sorted(p for p in folder.rglob("report.json") if p.parent != folder)
     if not files:

@@ -19,10 +19,8 @@ DIGITS = 6
 
 
 def chart(history: History, bands: bool = False) -> dict[str, Any]:
-    """Return what ``history.js`` draws a time history from, as JSON can hold it.
-
-    What is not finite becomes null, which is drawn as a gap.  Its bands are for comparisons.
-    """
+    """Return what ``history.js`` draws a time history from, as JSON can hold it."""
+    # What is not finite becomes null, which is drawn as a gap. Its bands are for comparisons.
     time = np.asarray(history.time, dtype=float)
     rows = [np.asarray(samples, dtype=float) for samples in history.signals.values()]
     signals = np.array(rows).reshape(len(rows), len(time))
@@ -48,14 +46,11 @@ def signals_json(report: Report) -> str:
 
 
 def thinned(signals: np.ndarray, count: int = _COUNT) -> np.ndarray:
-    """Choose the samples that show what long signals do.
-
-    Half of them are evenly spaced.  The others are the least and the largest value of each
-    signal in each of some stretches, and its first sample there that is not finite, so that
-    neither a peak nor a gap is lost.
-
-    Shapes: `signals` (n, m).
-    """
+    """Choose the samples that show what long signals do."""
+    # Half of them are evenly spaced. The others are the least and the largest value of each signal
+    # in each of some stretches, and its first sample there that is not finite, so that neither a
+    # peak nor a gap is lost.
+    # Shapes: `signals` (n, m).
     number, length = signals.shape
     if length <= count:
         return np.arange(length)

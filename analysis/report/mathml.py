@@ -206,10 +206,8 @@ CHARACTERS |= {"\u00a0"} | {italic(c) for c in _LATIN + _GREEK + "∂"}
 
 
 def subset(source: str | os.PathLike[str]) -> bytes:
-    """Return the subset of a math font that `CHARACTERS` need, as WOFF2.
-
-    The pieces of stretched signs and the MATH table stay; the names change, as the licence asks.
-    """
+    """Return the subset of a math font that `CHARACTERS` need, as WOFF2."""
+    # The pieces of stretched signs and the MATH table stay; the names change, as the licence asks.
     from fontTools.subset import Options, Subsetter
     from fontTools.ttLib import TTFont
 

@@ -141,10 +141,8 @@ def cells(table: Table) -> list[list[TableCell]]:
 
 
 def numeric(table: Table) -> list[bool]:
-    """Return for each column whether all its cells are numbers or empty, and not all empty.
-
-    Units are words, also where each of them is 1.
-    """
+    """Return for each column whether all its cells are numbers or empty, and not all empty."""
+    # Units are words, also where each of them is 1.
     rows = cells(table)
     if not rows:
         return [False] * len(table.columns)
@@ -223,10 +221,8 @@ def meanings(claims: Sequence[Claim]) -> Mapping[str, str]:
 
 
 def summary(claims: Sequence[Claim], headline: Headline | None = None) -> tuple[str, str]:
-    """Return the report's traffic light, and the sentence that it stands for.
-
-    Without claims that is the `headline`, if there is one.
-    """
+    """Return the report's traffic light, and the sentence that it stands for."""
+    # Without claims that is the `headline`, if there is one.
     looks = [claim_status(claim)[1] for claim in claims]
     failed, refuted, open_ = (looks.count(look) for look in ("fail", "refuted", "caution"))
     total = len(claims)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -18,6 +19,7 @@ from markupsafe import Markup
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
+from .document import Live
 from .mathml import font_face, inline, mathml
 from .outline import cells, claim_status, is_long, is_short, numeric
 from .typography import pieces, plain_text
@@ -32,15 +34,15 @@ def fill(template: str, *, interactive: bool = False, live: bool = False, **cont
     An interactive page has uPlot (MIT licence) in them, and what draws its charts; a live one what
     runs its loops, and may make code of WebAssembly.
     """
-    style, script = font_face() + _own("templates/report.css"), _own("templates/report.js")
+    style = font_face() + _own("templates/colours.css") + _own("templates/report.css")
+    script = _own("templates/make.js") + _own("templates/report.js")
     if interactive:
         style += _own(f"{UPLOT}/uPlot.min.css") + "\n" + _own("templates/history.css")
         licence = f"\n/*\n{_own(f'{UPLOT}/LICENSE')}\n*/\n"
         script += licence + _own(f"{UPLOT}/uPlot.iife.min.js") + _own("templates/history.js")
     if live:
         style += _own("templates/live.css")
-        parts = (_own(f"templates/{name}.js") for name in ("live_engine", "live"))
-        script += "\n{\n" + "\n".join(parts) + "}\n"  # with names of their own
+        script += _live_script()
     page = _environment().get_template(template)
     text = page.render(
         style=Markup(style),
@@ -50,6 +52,31 @@ def fill(template: str, *, interactive: bool = False, live: bool = False, **cont
         **content,
     )
     return text.translate(CONTROL)
+
+
+def _live_script() -> str:
+    """Return what runs loops, with names of its own."""
+    parts = (_own(f"templates/{name}.js") for name in ("live_engine", "live"))
+    return "\n{\n" + "\n".join(parts) + "}\n"
+
+
+def live_figure(item: Live) -> str:
+    """Return a loop that runs as part of another page, which needs `live_files`."""
+    macros: Any = _environment().get_template("macros.html").module
+    return str(macros.live(item, item.key))
+
+
+def live_files(dark: str) -> dict[str, str]:
+    """Return style and script of other pages with loops that run.
+
+    `dark` is how a selector begins that holds where such a page is dark.
+    """
+    light, night = _own("templates/colours.css").split("@media (prefers-color-scheme: dark) { ")
+    colours = light.replace(":root", "figure.live").replace("light dark", "light")
+    begun = f"{dark} figure.live {{ color-scheme: dark;"
+    colours += night.replace(":root {", begun).replace("} }", "}")
+    script = "{\n" + _own("templates/make.js") + _live_script() + "}\n"
+    return {"live.css": colours + _own("templates/live.css"), "live.js": script}
 
 
 def _policy(style: str, script: str, *, live: bool = False) -> str:

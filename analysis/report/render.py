@@ -14,11 +14,11 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 
 from ..json_values import as_json
@@ -260,19 +260,12 @@ def write_report(
     return folder / "index.html"
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@described_record(repr=False)
 class Framed:
-    """A page in a frame; a notebook shows it.
-
-    Attributes
-    ----------
-    title : str
-    page : str
-        HTML.
-    """
+    """A page in a frame; a notebook shows it."""
 
     title: str
-    page: str
+    page: str  # HTML.
 
     def __repr__(self) -> str:
         return f"report '{self.title}', {len(self.page) / 1000:.0f} kB"
@@ -294,11 +287,6 @@ def framed(report: Report) -> Framed:
     ----------
     report : Report
         What is shown.
-
-    Returns
-    -------
-    Framed
-        Shown by a notebook as HTML.
 
     Examples
     --------

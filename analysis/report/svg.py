@@ -53,10 +53,8 @@ NONE_DRAWN: Drawn = MappingProxyType({})
 def svg_files(
     figures: Sequence[MatplotlibFigure], pool: Executor | None = None, drawn: Drawn = NONE_DRAWN
 ) -> list[bytes]:
-    """Return figures as SVG files; this process and those of a pool share the work.
-
-    Those in `drawn`, of `draw_ahead`, are not drawn again.
-    """
+    """Return figures as SVG files; this process and those of a pool share the work."""
+    # Those in `drawn`, of `draw_ahead`, are not drawn again.
     files, left = dict(drawn), [figure for figure in figures if figure not in drawn]
     waiting = {} if pool is None else {figure: pool.submit(_svg_file, figure) for figure in left}
     for figure in reversed(left):  # a pool begins with the first one
@@ -81,13 +79,11 @@ def _svg_file(figure: MatplotlibFigure) -> bytes:
 
 
 def svg(figure: Figure, file: bytes, key: str, shapes: dict[str, str]) -> Markup:
-    """Return a figure as inline SVG, the same bytes every time.
-
-    Letters and markers are drawn from `shapes`, which all figures of a page share.  Of the other
-    ids only those that are referred to stay, with `key` in front.  Styles become attributes,
-    because the page's content policy forbids inline styles; ink, grey and fill take the page's
-    colours, so that dark pages work.
-    """
+    """Return a figure as inline SVG, the same bytes every time."""
+    # Letters and markers are drawn from `shapes`, which all figures of a page share. Of the other
+    # ids only those that are referred to stay, with `key` in front. Styles become attributes,
+    # because the page's content policy forbids inline styles; ink, grey and fill take the page's
+    # colours, so that dark pages work.
     root = ElementTree.fromstring(file)
     for element in root.iter():
         _plain(element)
@@ -294,10 +290,8 @@ def _share_mark(use: Element, shapes: dict[str, str], by_id: dict[str, str]) -> 
 
 
 def short_path(path: str) -> str:
-    """Return path data in fewer characters: curves to a hundredth of a point, lines to a tenth.
-
-    Lines are written as steps from point to point; rounding does not add up.
-    """
+    """Return path data in fewer characters: curves to a hundredth of a point, lines to a tenth."""
+    # Lines are written as steps from point to point; rounding does not add up.
     path = " ".join(path.split())
     if CURVED.search(path):
         return DECIMALS.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), path)

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from nlctl.attributes import described_record
+
 from .changes import claim_changes
 from .compare import placed_values
 from .document import Claim, Table
@@ -40,25 +42,15 @@ class Revision:
         )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Trend:
-    """Claims and main numbers of one study over its revisions.
-
-    Attributes
-    ----------
-    title : str
-    labels : sequence of str
-        The revisions, the oldest first.
-    claims : mapping of str to sequence of Claim or None
-        By id and text: the claim at each revision, None where there is none.
-    numbers : mapping of str to sequence of float
-        By name; NaN where a revision has none.
-    """
+    """Claims and main numbers of one study over its revisions."""
 
     title: str
-    labels: Sequence[str]
+    labels: Sequence[str]  # The revisions, the oldest first.
+    # By id and text: the claim at each revision, None where there is none.
     claims: Mapping[str, Sequence[Claim | None]]
-    numbers: Mapping[str, Sequence[float]]
+    numbers: Mapping[str, Sequence[float]]  # By name; NaN where a revision has none.
 
     @property
     def table(self) -> Table:

@@ -47,11 +47,9 @@ class Piece:
 
 
 def in_print(text: str) -> str:
-    """Return plain text with the signs of print; what is not a number, power or unit stays.
-
-    1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s,
-    99 %, t = 3 and Example 1 do not break.
-    """
+    """Return plain text with the signs of print; what is not a number, power or unit stays."""
+    # 1e-06 becomes 10⁻⁶, 1/s^4 becomes 1/s⁴, -0.5 has a minus sign, and the spaces of 10 s, 99 %, t
+    # = 3 and Example 1 do not break.
     text = _POWER_OF_TEN.sub(_scientific, text)
     text = _POWER.sub(lambda match: match[1].translate(RAISED), text)
     text = _MINUS.sub("−", text)

@@ -9,32 +9,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nlctl.attributes import described_record
 from nlctl.diagrams import state_names
 from nlctl.response import input_output_response
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class PaperCase:
-    """One run of one example.
-
-    Attributes
-    ----------
-    key : str
-    make : callable
-        Returns the diagram.
-    times : array of shape (m,)
-        Output times (s).
-    inputs : float or array
-        Of an open diagram.
-    start : mapping
-        Initial states by qualified name; the others start as their blocks say.
-    rtol, atol : float
-    """
+    """One run of one example."""
 
     key: str
-    make: Callable[[], Any]
-    times: np.ndarray
-    inputs: Any = 0.0
+    make: Callable[[], Any]  # Returns the diagram.
+    times: np.ndarray  # (m,): Output times (s).
+    inputs: Any = 0.0  # Of an open diagram.
+    # Initial states by qualified name; the others start as their blocks say.
     start: Mapping[str, float] = field(default_factory=dict)
     rtol: float = 1e-8
     atol: float = 1e-10

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.wording import some_of
 
@@ -33,41 +34,26 @@ def unwatched(what: str, total: float) -> AbstractContextManager[Callable[[float
     return nullcontext(lambda amount: None)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Composed:
-    """The report, before it is written.
-
-    Attributes
-    ----------
-    report : Report
-    drawn : mapping
-        Those of its figures that are drawn already, for
-        `nlctl.analysis.report.render.write_report`.
-    passed : bool
-        Whether all numbers of the reproduction are those that were to be reached; what refutes
-        the paper counts as reached.
-    """
+    """The report, before it is written."""
 
     report: Report
+    # Those of its figures that are drawn already, for `nlctl.analysis.report.render.write_report`.
     drawn: Drawn
+    # Whether all numbers of the reproduction are those that were to be reached; what refutes the
+    # paper counts as reached.
     passed: bool
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Reproduction:
-    """A paper, and what composes its page.
-
-    Attributes
-    ----------
-    paper : Paper
-    compose : callable
-        ``compose(folder, whole=, threads=, beside=, watch=, notify=) -> Composed``.
-    clear : callable
-        ``clear(folder, force=)`` removes what an earlier page has left in its folder.
-    """
+    """A paper, and what composes its page."""
 
     paper: Paper
+    # ``compose(folder, whole=, threads=, beside=, watch=, notify=) -> Composed``.
     compose: Callable[..., Composed]
+    # ``clear(folder, force=)`` removes what an earlier page has left in its folder.
     clear: Callable[..., object] = field(default=lambda folder, force=False: None)
 
 
@@ -161,10 +147,8 @@ def compose_paper(
     watch: ProgressWatch = unwatched,
     **unused: object,
 ) -> Composed:
-    """Run a paper's examples, and compose its page; nothing is written.
-
-    Threads and a second process are of no use to runs of seconds.
-    """
+    """Run a paper's examples, and compose its page; nothing is written."""
+    # Threads and a second process are of no use to runs of seconds.
     if whole:
         raise UsageError(f"{paper.key} has no runs beyond its examples: leave --far out")
     with watch("simulating", paper.cases) as advance:

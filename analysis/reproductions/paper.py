@@ -9,64 +9,36 @@ from typing import Any
 
 from matplotlib.figure import Figure as MatplotlibFigure
 
+from nlctl.attributes import described_record
+
 from ..report.document import Item
 
 PaperRuns = Mapping[str, Any]
 """Simulated cases of a paper by key."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class PaperSource:
-    """Where numbers of a paper were read.
+    """Where numbers of a paper were read."""
 
-    Attributes
-    ----------
-    key : str
-        As statements name it.
-    text : str
-        What it is, so that another reader finds it.
-    """
-
-    key: str
-    text: str
+    key: str  # As statements name it.
+    text: str  # What it is, so that another reader finds it.
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Statement:
-    """A number that is printed, and how it is computed from the runs.
+    """A number that is printed, and how it is computed from the runs."""
 
-    Attributes
-    ----------
-    claim : str
-        The question that it answers, on the page one line with others that have the same.
-    part : str
-        Key of the part of the page that has it.
-    case, quantity : str
-        What was run, and what is read off it.
-    printed : str
-        As printed.
-    value : callable
-        ``value(runs) -> float``.
-    relation : {"=", "≤", "≥"}
-        How the value relates to it.
-    tolerance : float
-        For "=", how far it may be off; of what is printed exactly, rounding.
-    read : str
-        Key of its source; empty for what was computed independently.
-    by : str
-        Who is refuted where it does not hold; empty for statements of ours.
-    """
-
-    claim: str
-    part: str
-    case: str
+    claim: str  # The question that it answers, on the page one line with others that have the same.
+    part: str  # Key of the part of the page that has it.
+    case: str  # What was run, and what is read off it.
     quantity: str
-    printed: str
-    value: Callable[[PaperRuns], float]
-    relation: str = "="
-    tolerance: float = 0.0
-    read: str = ""
-    by: str = ""
+    printed: str  # As printed.
+    value: Callable[[PaperRuns], float]  # ``value(runs) -> float``.
+    relation: str = "="  # How the value relates to it.
+    tolerance: float = 0.0  # For "=", how far it may be off; of what is printed exactly, rounding.
+    read: str = ""  # Key of its source; empty for what was computed independently.
+    by: str = ""  # Who is refuted where it does not hold; empty for statements of ours.
 
     @property
     def asked(self) -> str:
@@ -117,6 +89,35 @@ class PaperFigure:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class MovedLoop:
+    """What the reader of a page that runs may move of an example.
+
+    Attributes
+    ----------
+    make : callable
+        Returns the diagram, with faults that may be switched on.
+    call : str
+        The Python that makes it.
+    until, step : float
+        Of the run (s).
+    names : tuple of str
+        Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
+    signals : tuple of str or of lists of str
+        What is drawn, a row each; all outputs where it is empty.
+    requirements : tuple of (str, str)
+        What the page watches, as study files have it, and what it means.
+    """
+
+    make: Callable[[], Any]
+    call: str
+    until: float
+    step: float = 0.01
+    names: tuple[str, ...] = ()
+    signals: tuple[str | list[str], ...] = ()
+    requirements: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Part:
     """One example of a paper on its page.
 
@@ -139,6 +140,8 @@ class Part:
         Name, as printed, as used, remark; the third is filled in from the blocks by name.
     items : callable, optional
         ``items(runs)``, what else stands behind its figures.
+    moved : MovedLoop, optional
+        What a page that runs moves.
     """
 
     key: str
@@ -151,74 +154,41 @@ class Part:
     more: str = "More figures"
     parameters: tuple[tuple[str, str, str, str], ...] = ()
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
+    moved: MovedLoop | None = None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Paper:
-    """A paper whose examples are reproduced.
+    """A paper whose examples are reproduced."""
 
-    Attributes
-    ----------
-    key : str
-        ``author_year``, the name of its module in `nlctl.papers`.
-    title, question, citation : str
-    heading : str
-        Of the section that says what the paper has.
-    model : tuple of Item
-        Its equations, as printed or as quoted.
-    parts : tuple of Part
-    simulate : callable
-        ``simulate(done) -> runs``; ``done(amount)`` is called as cases are finished.
-    cases : int
-        How many are simulated.
-    statements : callable
-        Returns them; it is called once per page.
-    sources : tuple of PaperSource
-        What was read, next to the references.
-    open_points : tuple of str
-        What does not reproduce, what could not be read, and what is a choice of ours.
-    methods, limits, references : tuple of str
-        Paragraphs, as those of a `Report`.
-    lead : PaperFigure, optional
-        The picture at the top.
-    reproduced, not_reproduced : str
-        In a few words each, for the table of papers and the verdict.
-    numbers_title, numbers_caption, asked : str
-        Heading, caption and column title of the tables of numbers.
-    numbers_key : str
-        Anchor of these tables, behind that of their part.
-    digits : str
-        Format of the numbers found.
-    command : str
-        What makes the page again; ``nlctl report KEY`` where it is empty.
-    packages : tuple of str
-        Packages whose versions stand on the page next to those of every report.
-    """
-
-    key: str
-    title: str
-    question: str
-    citation: str
+    key: str  # ``author_year``, the name of its module in `nlctl.papers`.
+    title: str  # Of the page.
+    question: str  # What the page answers.
+    citation: str  # Where the paper appeared.
     parts: tuple[Part, ...]
+    # ``simulate(done) -> runs``; ``done(amount)`` is called as cases are finished.
     simulate: Callable[[Callable[[float], object]], PaperRuns]
-    cases: int
-    statements: Callable[[], Sequence[Statement]]
-    reproduced: str
+    cases: int  # How many are simulated.
+    statements: Callable[[], Sequence[Statement]]  # Returns them; it is called once per page.
+    reproduced: str  # In a few words each, for the table of papers and the verdict.
     not_reproduced: str
-    heading: str = "What the paper has"
-    model: tuple[Item, ...] = ()
-    sources: tuple[PaperSource, ...] = ()
+    heading: str = "What the paper has"  # Of the section that says what the paper has.
+    model: tuple[Item, ...] = ()  # Its equations, as printed or as quoted.
+    sources: tuple[PaperSource, ...] = ()  # What was read, next to the references.
+    # What does not reproduce, what could not be read, and what is a choice of ours.
     open_points: tuple[str, ...] = ()
-    methods: tuple[str, ...] = ()
+    methods: tuple[str, ...] = ()  # Paragraphs, as those of a `Report`.
     limits: tuple[str, ...] = ()
     references: tuple[str, ...] = ()
-    lead: PaperFigure | None = None
+    lead: PaperFigure | None = None  # The picture at the top.
+    # Heading and caption of the tables of numbers.
     numbers_title: str = "{count} numbers, as printed or required, and as found"
     numbers_caption: str = (
         "What was read has the key of its source; what has none is required by us, or follows."
     )
-    numbers_key: str = "numbers"
-    asked: str = "printed or required"
-    digits: str = ".6g"
-    command: str = ""
+    numbers_key: str = "numbers"  # Anchor of these tables, behind that of their part.
+    asked: str = "printed or required"  # Column title of these tables.
+    digits: str = ".6g"  # Format of the numbers found.
+    command: str = ""  # What makes the page again; ``nlctl report KEY`` where it is empty.
+    # Packages whose versions stand on the page next to those of every report.
     packages: tuple[str, ...] = field(default=())

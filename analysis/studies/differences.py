@@ -119,10 +119,8 @@ def long_table_differences(first: Path, second: Path, rtol: float = 0.0) -> list
 def _table_differences(
     first: Result, second: Result, rtol: float = 0.0, longer_than: int = -1
 ) -> list[str]:
-    """Return what differs between the tables of two results, one text for each table or column.
-
-    Of tables of findings only those count that have more lines than `longer_than`.
-    """
+    """Return what differs between the tables of two results, one text for each table or column."""
+    # Of tables of findings only those count that have more lines than `longer_than`.
     differences: list[str] = []
     if (first.rows is None) != (second.rows is None):
         differences.append(f"the main table is {'new' if first.rows is None else 'gone'}")

@@ -3,55 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import pandas as pd
 
+from nlctl.attributes import described_record
+
 from .sealed import as_json
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="finding_of")
 class Finding:
-    """What one analysis found.
+    """What one analysis found."""
 
-    Attributes
-    ----------
-    key, kind, title : str
-        Name of its folder, kind of analysis, heading.
-    sentence : str
-        What was found, with what it rests on.
-    claim : str
-        What the study claimed; empty without a claim.
-    answer : {"shown", "refuted", "not shown yet", ""}
-        What was found of the claim; empty without a claim.
-    needs : str
-        What it takes to show the claim, where it is not shown yet.
-    runs : int
-        Number of simulations that it rests on.
-    numbers : mapping
-        Bounds, margins, rows: what the sentence says, as numbers and texts.
-    tables : mapping
-        DataFrames by name.
-    is_answered : bool
-        False where rows or loop did not admit the analysis: the sentence says why, and there are
-        neither numbers nor tables.
-
-    Examples
-    --------
-    See `finding_of`.
-    """
-
-    key: str
+    key: str  # Name of its folder, kind of analysis, heading.
     kind: str
     title: str
-    sentence: str
-    claim: str = ""
-    answer: str = ""
-    needs: str = ""
-    runs: int = 0
+    sentence: str  # What was found, with what it rests on.
+    claim: str = ""  # What the study claimed; empty without a claim.
+    answer: str = ""  # What was found of the claim; empty without a claim.
+    needs: str = ""  # What it takes to show the claim, where it is not shown yet.
+    runs: int = 0  # Number of simulations that it rests on.
+    # Bounds, margins, rows: what the sentence says, as numbers and texts.
     numbers: Mapping[str, Any] = field(default_factory=dict)
-    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    tables: Mapping[str, pd.DataFrame] = field(default_factory=dict)  # DataFrames by name.
+    # False where rows or loop did not admit the analysis: the sentence says why, and there are
+    # neither numbers nor tables.
     is_answered: bool = True
 
     @property

@@ -63,10 +63,8 @@ METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
 def save_finding(folder: Path, finding: Finding, origin: str) -> None:
-    """Write a finding into ``folder / key``, its tables first: the file completes it.
-
-    `origin` is the key of what it was computed from.
-    """
+    """Write a finding into ``folder / key``, its tables first: the file completes it."""
+    # `origin` is the key of what it was computed from.
     here = folder / finding.key
     here.mkdir(parents=True, exist_ok=True)
     keys = {}
@@ -185,11 +183,6 @@ def load_result(folder: str | Path, *, trust: bool = False) -> Result:
     trust : bool, optional
         As in `read_study`.
 
-    Returns
-    -------
-    Result
-        Rows, and the analyses that are finished.
-
     Raises
     ------
     RunFolderError
@@ -302,10 +295,8 @@ def _own_kinds(folder: Path, trust: bool) -> tuple[dict[str, Kind], list[str]]:
 
 
 def _space(study: Study, quantities: pd.DataFrame) -> Space:
-    """Return the space of a study with the names, nominal values and units of its run.
-
-    The options of choices are not made: their labels are enough for the rows.
-    """
+    """Return the space of a study with the names, nominal values and units of its run."""
+    # The options of choices are not made: their labels are enough for the rows.
     full = quantities.to_dict("index")
     names = zip(quantities.index, study.space.items(), strict=False)
     return Space(

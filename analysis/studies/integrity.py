@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.wording import counted
 
@@ -15,41 +15,19 @@ from .intact.contents import CONTENTS, is_part, problems_in, sealed_record
 from .intact.page import PAGE_FILES, page_problems
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="verify")
 class Integrity:
-    """What `verify` found of a run folder.
-
-    Attributes
-    ----------
-    folder : Path
-    files : int
-        Number of files that are as they were written.
-    rows : dict
-        Number of rows by part, ``"rows"`` for the main table.
-    analyses : tuple of str
-        Keys of the analyses that the study asks for.
-    done : tuple of str
-        Those that are done.
-    problems : tuple of str
-        What is missing, edited or too much, one sentence each; empty if the folder is intact.
-    others : tuple of str
-        Files that the run has not written, its page aside.
-    has_page : bool
-        Whether the record has a page that was made of the run.
-
-    Examples
-    --------
-    See `verify`.
-    """
+    """What `verify` found of a run folder."""
 
     folder: Path
-    files: int
-    rows: dict[str, int]
-    analyses: tuple[str, ...]
-    done: tuple[str, ...]
+    files: int  # Number of files that are as they were written.
+    rows: dict[str, int]  # Number of rows by part, ``"rows"`` for the main table.
+    analyses: tuple[str, ...]  # Keys of the analyses that the study asks for.
+    done: tuple[str, ...]  # Those that are done.
+    # What is missing, edited or too much, one sentence each; empty if the folder is intact.
     problems: tuple[str, ...]
-    others: tuple[str, ...]
-    has_page: bool = False
+    others: tuple[str, ...]  # Files that the run has not written, its page aside.
+    has_page: bool = False  # Whether the record has a page that was made of the run.
 
     @property
     def is_intact(self) -> bool:
@@ -77,11 +55,6 @@ def verify(folder: str | Path) -> Integrity:
     ----------
     folder : str or Path
         Where `run` has kept its results.
-
-    Returns
-    -------
-    Integrity
-        With every difference, in words.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -26,6 +26,7 @@ import pandas as pd
 from pydantic import create_model
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
 from ..robustness import Design, Experiment, Prepared, Space
@@ -48,17 +49,9 @@ class RunDesign(Protocol):
     def __call__(self, design: Design, of: Prepared | None = None) -> Sweep: ...
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Setup:
     """What is known before anything runs.
-
-    Attributes
-    ----------
-    study : Study
-    folder : Path
-        What paths in the study are relative to.
-    experiment : Experiment
-        What is simulated for each row.
 
     Examples
     --------
@@ -75,37 +68,20 @@ class Setup:
     """
 
     study: Study
-    folder: Path
-    experiment: Experiment
+    folder: Path  # What paths in the study are relative to.
+    experiment: Experiment  # What is simulated for each row.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="Kind")
 class Ground:
-    """What an analysis uses while it runs.
-
-    Attributes
-    ----------
-    study : Study
-    folder : Path
-        What paths in the study are relative to.
-    prepared : Prepared
-        The study's experiment.
-    rows : Sweep or None
-        The main table, with its design.
-    simulate : callable
-        Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
-        leaves out is nominal.
-    run_design : RunDesign
-
-    Examples
-    --------
-    See `Kind`.
-    """
+    """What an analysis uses while it runs."""
 
     study: Study
-    folder: Path
-    prepared: Prepared
-    rows: Sweep | None
+    folder: Path  # What paths in the study are relative to.
+    prepared: Prepared  # The study's experiment.
+    rows: Sweep | None  # The main table, with its design.
+    # Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
+    # leaves out is nominal.
     simulate: Callable[[pd.DataFrame], pd.DataFrame]
     run_design: RunDesign
 
@@ -154,68 +130,12 @@ def _no_items(finding: Finding, result: Result, asked: Any, key: str) -> Iterato
     yield from ()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Kind:
     """A kind of analysis.
 
     The first argument ``asked`` of its functions is an instance of `schema`.  What they refuse they
     refuse with a `nlctl.errors.UsageError`, which costs this analysis and no other one.
-
-    Attributes
-    ----------
-    name : str
-        As in a study file: lower-case words.
-    schema : type of Asked
-        The keys of its table, each with a description, as a pydantic model; its property ``claim``
-        is what the study claims with them.
-    run : callable
-        ``run(asked, ground)`` returns a `Finding` (`finding_of`); None if its rows are incomplete.
-    title : str
-        Its heading in the report.
-    answers, claims : str
-        What it answers, and what it claims under which keys, in Markdown, for the guide.
-    method : str
-        How it is done, for the report; with sources by author and year.
-    sources : tuple of str
-        These sources in full.
-    needs_rows : bool
-        Whether it looks at the main table.
-    is_statement : bool
-        Whether it bounds a probability from the main table, which needs independent draws; its
-        numbers have ``runs`` and ``confidence``.
-    stop : callable, optional
-        ``stop(asked, design)`` returns what ends the main table early, where no other analysis
-        needs it; see `nlctl.analysis.robustness.runs.sweep`.
-    columns, quantities, keywords : tuple of str
-        Keys of its table that name a column of its rows, quantities of the space, a keyword of the
-        loop: they are checked before anything runs.
-    check : callable, optional
-        ``check(asked, setup)`` raises what else does not fit the loop.
-    design : callable, optional
-        ``design(asked, space, seed)`` returns the rows that it runs itself, where they are known.
-    runs : callable, optional
-        ``runs(asked, setup)`` returns how many simulations it makes itself, at most; with `design`
-        that is the number of its rows.
-    ends_early : bool
-        Whether it may make fewer.
-    keeps_rows : bool
-        Whether they stay on the disk.
-    largest : callable, optional
-        ``largest(asked, quantities)`` returns the largest number that it asks for, from the table
-        alone: what no machine can do is refused.
-    experiment : callable, optional
-        ``experiment(asked, setup)`` returns what its rows are run with, where that is not the
-        study's own experiment.
-    measured : callable, optional
-        ``measured(finding, asked)`` returns ``measured``, ``limit`` and ``margin`` of the table of
-        claims as texts; by default what was found, in a sentence.
-    items : callable, optional
-        ``items(finding, result, asked, key)`` yields figures and tables; keys of figures begin with
-        `key`.
-    in_brief : bool
-        Whether these are also shown where a study is only a part of a report.
-    witness : callable, optional
-        ``witness(finding)`` returns the row with the lowest margin that it found, and that margin.
 
     Raises
     ------
@@ -265,30 +185,53 @@ class Kind:
     ('1 of 2 rows fail.', {'failing': 1})
     """
 
-    name: str
+    name: str  # As in a study file: lower-case words.
+    # The keys of its table, each with a description, as a pydantic model; its property ``claim`` is
+    # what the study claims with them.
     schema: type[Asked]
+    # ``run(asked, ground)`` returns a `Finding` (`finding_of`); None if its rows are incomplete.
     run: Callable[[Any, Ground], Finding | None]
-    title: str
+    title: str  # Its heading in the report.
+    # What it answers, and what it claims under which keys, in Markdown, for the guide.
     answers: str = ""
     claims: str = ""
-    method: str = ""
-    sources: tuple[str, ...] = ()
-    needs_rows: bool = False
+    method: str = ""  # How it is done, for the report; with sources by author and year.
+    sources: tuple[str, ...] = ()  # These sources in full.
+    needs_rows: bool = False  # Whether it looks at the main table.
+    # Whether it bounds a probability from the main table, which needs independent draws; its
+    # numbers have ``runs`` and ``confidence``.
     is_statement: bool = False
+    # ``stop(asked, design)`` returns what ends the main table early, where no other analysis needs
+    # it; see `nlctl.analysis.robustness.runs.sweep`.
     stop: Callable[[Any, Design], Callable[[Progress], Any]] | None = None
+    # Keys of its table that name a column of its rows, quantities of the space, a keyword of the
+    # loop: they are checked before anything runs.
     columns: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
     keywords: tuple[str, ...] = ()
+    # ``check(asked, setup)`` raises what else does not fit the loop.
     check: Callable[[Any, Setup], object] | None = None
+    # ``design(asked, space, seed)`` returns the rows that it runs itself, where they are known.
     design: Callable[[Any, Space, int], Design] | None = None
+    # ``runs(asked, setup)`` returns how many simulations it makes itself, at most; with `design`
+    # that is the number of its rows.
     runs: Callable[[Any, Setup], int] = _nothing
-    ends_early: bool = False
-    keeps_rows: bool = True
+    ends_early: bool = False  # Whether it may make fewer.
+    keeps_rows: bool = True  # Whether they stay on the disk.
+    # ``largest(asked, quantities)`` returns the largest number that it asks for, from the table
+    # alone: what no machine can do is refused.
     largest: Callable[[Any, int], int] | None = None
+    # ``experiment(asked, setup)`` returns what its rows are run with, where that is not the study's
+    # own experiment.
     experiment: Callable[[Any, Setup], Experiment] | None = None
+    # ``measured(finding, asked)`` returns ``measured``, ``limit`` and ``margin`` of the table of
+    # claims as texts; by default what was found, in a sentence.
     measured: Callable[[Finding, Any], Mapping[str, str]] | None = None
+    # ``items(finding, result, asked, key)`` yields figures and tables; keys of figures begin with
+    # `key`.
     items: Callable[[Finding, Result, Any, str], Iterator[Item]] = _no_items
-    in_brief: bool = False
+    in_brief: bool = False  # Whether these are also shown where a study is only a part of a report.
+    # ``witness(finding)`` returns the row with the lowest margin that it found, and that margin.
     witness: Callable[[Finding], tuple[Mapping[str, Any], float]] | None = None
 
     def __post_init__(self) -> None:
@@ -391,10 +334,8 @@ def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
 
 
 def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
-    """Return what replaces an analysis that its `runs` or the loop do not admit.
-
-    What the study claims of it is neither shown nor refuted.
-    """
+    """Return what replaces an analysis that its `runs` or the loop do not admit."""
+    # What the study claims of it is neither shown nor refuted.
     finding = finding_of(
         asked,
         f"Not answered: {error}.",

@@ -64,10 +64,8 @@ def _compared_name(key: str, labels: Mapping[str, str]) -> str:
 
 
 def compared_differences(origin: Mapping[str, Any], key: str, prepared: Prepared) -> str:
-    """Return in words how the loops of a comparison differ from those of a record.
-
-    They are made again when the comparison begins, hours later: what they read may have changed.
-    """
+    """Return in words how the loops of a comparison differ from those of a record."""
+    # They are made again when the comparison begins, hours later: what they read may have changed.
     end = float(prepared.experiment.timepts[-1])
     names = {_compared_name(key, labels): loop.system for labels, loop in prepared.loops}
     before = {part: {n: origin[part].get(n) for n in names} for part in ("diagrams", "values")}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import pandas as pd
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 
 from ..robustness import Prepared, evaluate, independent, prepare
 from ..robustness.runs.experiment import columns_of
@@ -22,30 +22,15 @@ _NUMBER = 8
 """Bytes of one number on disk; compression makes it less."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="plan")
 class Plan:
-    """What a study will take.
+    """What a study will take."""
 
-    Attributes
-    ----------
-    runs : dict
-        Number of simulations by analysis, ``"rows"`` for the main table.
-    at_most : tuple of str
-        Those that may end earlier.
-    seconds : float
-        Time of all of them on this machine, from the time of a few rows of the study's laws.
-    size : float
-        Bytes on disk.
-
-    Examples
-    --------
-    See `plan`.
-    """
-
-    runs: dict[str, int]
-    at_most: tuple[str, ...]
+    runs: dict[str, int]  # Number of simulations by analysis, ``"rows"`` for the main table.
+    at_most: tuple[str, ...]  # Those that may end earlier.
+    # Time of all of them on this machine, from the time of a few rows of the study's laws.
     seconds: float
-    size: float
+    size: float  # Bytes on disk.
 
     @property
     def total(self) -> int:
@@ -63,11 +48,6 @@ def plan(file: StudyFile, threads: int | None = None) -> Plan:
         As `read_study` returns it.
     threads : int, optional
         On which it would run; all cores by default.
-
-    Returns
-    -------
-    Plan
-        Numbers of runs, and the expected time (s) and disk (bytes).
 
     Raises
     ------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.plotting.axes import BLUE, ORANGE, TIME, stacked_axes
 from nlctl.wording import counted
@@ -28,37 +28,19 @@ from .sealed import RunFolderError, as_json, origin_key
 _MOST = 8  # panels of a figure
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="replay")
 class Replay:
-    """A row that was run again.
-
-    Attributes
-    ----------
-    row : int
-    stored, again : dict
-        The row of the folder, and what came out now.
-    differences : tuple of str
-        Columns in which a bit differs.
-    experiment : Experiment
-    time : ndarray of shape (m,)
-    signals : dict of ndarray of shape (m,)
-        All outputs; NaN after the end of a run that diverged.
-    versions : str
-        Which versions differ from those of the run, in words.
-
-    Examples
-    --------
-    See `replay`.
-    """
+    """A row that was run again."""
 
     row: int
-    stored: Mapping[str, Any]
+    stored: Mapping[str, Any]  # The row of the folder, and what came out now.
     again: Mapping[str, Any]
-    differences: tuple[str, ...]
+    differences: tuple[str, ...]  # Columns in which a bit differs.
     experiment: Experiment
-    time: np.ndarray
+    time: np.ndarray  # (m,)
+    # (m,): All outputs; NaN after the end of a run that diverged.
     signals: Mapping[str, np.ndarray]
-    versions: str = ""
+    versions: str = ""  # Which versions differ from those of the run, in words.
 
     def plain(self) -> dict[str, Any]:
         """Return the two rows and whether they are the same, as JSON can hold them.
@@ -102,11 +84,6 @@ def replay(folder: str | Path, row: int, part: str = "", *, trust: bool = False)
         Key of an analysis that keeps rows of its own; by default the main table.
     trust : bool, optional
         As in `read_study`.
-
-    Returns
-    -------
-    Replay
-        What came out now next to the row of the folder, and what differs.
 
     Raises
     ------

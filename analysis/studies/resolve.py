@@ -97,7 +97,9 @@ def _from_module(name: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name is None or not f"{name}.".startswith(f"{error.name}."):
             raise  # it exists, and imports something that does not
-        raise ParameterError(f"there is no module '{name}' ({error})") from None
+        file = Path(f"{name.replace('.', '/')}.py")
+        near = f"; there is a file: {file.as_posix()}:NAME" if file.is_file() else ""
+        raise ParameterError(f"there is no module '{name}' ({error}){near}") from None
 
 
 def option(value: object, folder: Path) -> Any:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from nlctl.attributes import described_record
 from nlctl.host.notebook import table_html
 from nlctl.names import unknown
 from nlctl.wording import counted, some_of
@@ -22,49 +23,24 @@ LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="run")
 class Result:
-    """A study and what it has found; nothing is run to read it.
-
-    Attributes
-    ----------
-    folder : Path
-    study : Study
-        The study file, with the settings of the command line.
-    quantities : DataFrame
-        One row per uncertain quantity or choice: law, box (low, high), nominal, unit.
-    requirements : DataFrame
-        One row per requirement: formula, until (s), meaning.
-    metrics : DataFrame
-        One row per metric: signal, unit, meaning.
-    rows : Sweep or None
-        The main table; None if the study has none.  ``rows.table`` reads it from the disk.
-    findings : tuple of Finding
-        In the order of the file.
-    complete : bool
-        Whether all analyses are done.
-    interrupted : bool
-        Whether Ctrl-C was pressed in the run that returned this; not kept in the folder.
-    notes : tuple of str
-        What the user has to know, such as lost workers.
-    origin : mapping
-        What all of it was computed from, see `origin.origin_of`.
-
-    Examples
-    --------
-    See `run`.
-    """
+    """A study and what it has found; nothing is run to read it."""
 
     folder: Path
-    study: Study
+    study: Study  # The study file, with the settings of the command line.
+    # One row per uncertain quantity or choice: law, box (low, high), nominal, unit.
     quantities: pd.DataFrame
-    requirements: pd.DataFrame
-    metrics: pd.DataFrame
+    requirements: pd.DataFrame  # One row per requirement: formula, until (s), meaning.
+    metrics: pd.DataFrame  # One row per metric: signal, unit, meaning.
+    # The main table; None if the study has none. ``rows.table`` reads it from the disk.
     rows: Sweep | None
-    findings: tuple[Finding, ...]
-    complete: bool
+    findings: tuple[Finding, ...]  # In the order of the file.
+    complete: bool  # Whether all analyses are done.
+    # Whether Ctrl-C was pressed in the run that returned this; not kept in the folder.
     interrupted: bool = False
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # What the user has to know, such as lost workers.
+    # What all of it was computed from, see `origin.origin_of`.
     origin: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property

@@ -12,7 +12,9 @@ addEventListener("load", () => {
     const link = summary.closest("li")?.querySelector("a");
     if (link) summary.setAttribute("aria-label", `below ${link.textContent.trim()}`);
   }
-  // its own words are its name
-  for (const button of document.querySelectorAll(".search-button__button")) button.removeAttribute("aria-label");
+  // where its own words are seen, they are its name
+  for (const button of document.querySelectorAll(".search-button__button")) {
+    if (button.innerText.trim()) button.removeAttribute("aria-label");
+  }
 });
 addEventListener("resize", reachable);

@@ -102,8 +102,21 @@ axes.legend()
 assert abs(np.mean(angles[-20:]) - 0.3) < 0.1
 
 # %%
-# Many environments are many steppers: those of one ``Compiled`` share its machine code. ``benchmarks/stepping.py``
-# compares a step with runs of one step, in nlctl and in python-control.
-many = [nlctl.stepper(compiled, dt) for _ in range(4)]
-observed = np.array([each.step(u) for each, u in zip(many, [-1.0, 0.0, 1.0, 2.0], strict=True)])
-print(observed.round(4))
+# Many environments at once
+# -------------------------
+#
+# ``nlctl.vector_stepper`` makes the steps of many runs, as vector environments of Gymnasium's do: inputs of shape
+# (members, inputs), outputs and states by members, parameters and initial states of each, and ``reset`` of those that are
+# over. Each is a stepper of its own, bit for bit, and costs a few microseconds a step; ``benchmarks/stepping.py`` measures
+# it, and compares a step with runs of one step in nlctl and in python-control.
+many = nlctl.vector_stepper(compiled, dt, size=8)
+rng = np.random.default_rng(0)
+angles = rng.uniform(-0.1, 0.1, 8)
+y = many.reset({"pendulum.angle": angles}, {"actuator.c_r": np.linspace(0.1, 0.5, 8)})
+for _ in range(100):
+    y = many.step(5 * np.sign(y[:, 1]))  # one input: a number for each member
+    over = np.abs(y[:, 0]) > np.pi
+    if over.any():
+        y = many.reset({"pendulum.angle": rng.uniform(-0.1, 0.1, 8)}, members=over)
+print(y.round(3), many.time.round(2))
+assert many.success.all()

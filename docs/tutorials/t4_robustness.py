@@ -12,6 +12,9 @@ import numpy as np
 import nlctl
 from nlctl.analysis import robustness as rb
 
+# sphinx_gallery_live = ["actuator.b_r=0.3:0.7", "actuator.b_l=-0.5:-0.1", "plant.x1(0)=0.2:0.8"]
+# sphinx_gallery_live_run = "nlctl.input_output_response(nlctl.paper.example_1(), np.linspace(0, 20, 2001))"
+
 space = rb.Space(
     quantities=(
         rb.Uncertain(name="actuator.b_r", bounds=(0.3, 0.7)),

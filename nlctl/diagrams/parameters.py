@@ -117,7 +117,8 @@ def samplings(system: Any) -> list[tuple[Any, Any]]:
     by_identity: dict[int, Any] = {
         id(sampling): sampling for sampling in every if sampling is not None
     }
-    owners = system.params.owners if isinstance(system.params, Parameters) else {}
+    known = getattr(system, "params", None)  # transfer functions have none
+    owners = known.owners if isinstance(known, Parameters) else {}
     paths = {id(owner): name.rpartition(".")[0] for name, owner in owners.items()}
     return [(paths.get(key, sampling.name), sampling) for key, sampling in by_identity.items()]
 

@@ -203,7 +203,7 @@ def draw(
     panels = list(_panels(diagram, title or "", "", expand))
     width = max([_WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])
     height = sum(panel.height for panel in panels)
-    figure = Drawing(figsize=(width / 72, height / 72), facecolor="white")
+    figure = Drawing(figsize=(width / 72, height / 72), facecolor="white", layout="none")
     bottom = height
     for panel in panels:
         bottom -= panel.height

@@ -73,6 +73,16 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
     return _at_integers(graph, counted, _OF_INTEGERS.get(op, 0.0))
 
 
+def factors(function: Expr) -> tuple[Expr, ...]:
+    """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
+    if function.op == "neg":
+        return factors(function.args[0])
+    if function.op != "mul" or function.args[0] is function.args[1]:
+        return (function,)
+    parts = [part for arg in function.args if arg.varies for part in factors(arg)]
+    return tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
+
+
 def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
     # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that

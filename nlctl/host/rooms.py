@@ -8,9 +8,11 @@ The top once had all blocks, errors and results: ``nlctl.BoucWen`` still is
 from __future__ import annotations
 
 import ast
+import difflib
 import functools
 import os
 import warnings
+from collections.abc import Iterable
 from importlib import import_module
 
 from .checkout import NLCTL_FOLDER
@@ -61,3 +63,12 @@ def found_in_room(name: str) -> object:
     thing = getattr(import_module(place), name)
     setattr(import_module("nlctl"), name, thing)
     return thing
+
+
+def with_nearest(name: str, listed: Iterable[str]) -> str:
+    """Return what is said of a name that the top does not have."""
+    places = {n: f"nlctl.{r}" for n, r in _places().items()} | dict.fromkeys(listed, "nlctl")
+    by_small = {known.lower(): known for known in places}
+    near = difflib.get_close_matches(name.lower(), by_small, n=1)
+    hint = [f"; nearest: {places[by_small[n]]}.{by_small[n]}" for n in near]
+    return f"module 'nlctl' has no attribute '{name}'{''.join(hint)}"

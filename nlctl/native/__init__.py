@@ -28,7 +28,7 @@ from .operating_points import (
 from .response import Response, uninterrupted
 from .results import Statistics
 from .settings import Settings
-from .stepping import Stepper, StepperState, stepper
+from .stepping import Stepper, StepperState, VectorStepper, stepper, vector_stepper
 from .typesetting import BlockEquations, typeset
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Stepper",
     "StepperState",
     "Tableau",
+    "VectorStepper",
     "compile",
     "compile_ahead",
     "ensemble_response",
@@ -53,4 +54,5 @@ __all__ = [
     "stepper",
     "typeset",
     "uninterrupted",
+    "vector_stepper",
 ]

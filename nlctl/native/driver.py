@@ -40,6 +40,7 @@ from .taylor.turns import turned, with_turns
 from .timed.ahead import ahead
 
 _NOTED = 1000  # events of a run for which there is room from the beginning
+_PLACES = 1024  # of a run: as many the reference looks at where a loop is at rest
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
@@ -192,7 +193,7 @@ def prepared(
         timed=with_table(
             Timed,
             **ahead(code.lowered.timed, p, times, settings.max_step),
-            opaque=int(bool(code.lowered.calls)),
+            opaque=float(np.ptp(times)) / _PLACES if code.lowered.calls else 0.0,
         ),
         clocks=_clocks(compiled, code, due),
         resets=of_program.resets,

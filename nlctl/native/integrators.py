@@ -12,7 +12,7 @@ import functools
 import hashlib
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -71,14 +71,25 @@ def _callable(address: int, arguments: Any, owner: object) -> Callable[..., None
     call = ctypes.CFUNCTYPE(ctypes.c_int32, *[ctypes.c_void_p] * 2, *kinds)(address)
     nothing = (ctypes.c_void_p * 2)()  # places for a result and an exception, never read
 
-    def function(*given: Any) -> None:
-        values = (g if isinstance(g, int) else data_address(g.table) for g in given)
-        status = call(nothing, ctypes.byref(nothing, 8), *values)
-        if status not in _RETURNED:
-            raise MemoryError(f"the integrators have failed for want of memory (status {status})")
+    exception = ctypes.byref(nothing, 8)
 
+    def each(every: Iterable[tuple[int, ...]]) -> None:
+        for values in every:
+            status = call(nothing, exception, *values)
+            if status not in _RETURNED:
+                raise MemoryError(f"the integrators have failed for want of memory ({status})")
+
+    def function(*given: Any) -> None:
+        each([tuple(g if isinstance(g, int) else data_address(g.table) for g in given)])
+
+    function.each = each  # type: ignore[attr-defined]
     function.owner = owner  # type: ignore[attr-defined]
     return function
+
+
+def handle(record: Any) -> Any:
+    """Return what the integrators take for a record, for many calls: it must outlive them."""
+    return record if is_jit_disabled() else data_address(record.table)
 
 
 def shipped_bitcode() -> bytes | None:

@@ -25,6 +25,7 @@ from ..params import as_numbers, declared_params, equation_arguments, with_overr
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
+from ..upstream.control_internals import state_space
 from ..upstream.systems import System
 from ..wording import counted
 from .codegen.solver import searched
@@ -214,11 +215,6 @@ def linear_system(
         x0, u0 = x0.states, x0.inputs if u0 is None else u0
     system = reading.system
     n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
-    if n == 1 and m == 0:
-        raise UsageError(
-            f"a control.StateSpace cannot have one state and no input, as '{system.name}' has: "
-            "give the diagram an input"
-        )
     tell_of_differences(reading)
     directions = np.eye(n + given + length(reading.program.layout), n + m)
     found = jacobian(reading, x0, u0, t, params, directions)
@@ -231,10 +227,8 @@ def linear_system(
         "outputs": system.output_labels,
         "states": system.state_labels,
     }
-    return ct.StateSpace(
-        rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:], dt,
-        remove_useless_states=False, **(own if copy_names else {}) | dict(names),
-    )  # fmt: skip
+    matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
+    return state_space(matrices, dt, (own if copy_names else {}) | dict(names))
 
 
 def tell_of_differences(reading: Reading) -> None:

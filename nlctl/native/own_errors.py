@@ -5,6 +5,7 @@ Machine code has NaN where Python raises.  Who reads the message wants the error
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Mapping
 from typing import Any
 
@@ -36,6 +37,7 @@ def own_error(
         return None
     system = overridden(reading.schedule.system, params)
     k, left = finite[-1], [_CALLS]
+    start, x0 = float(made.time[k]), made.states[:, k]
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         left[0] -= 1
@@ -46,10 +48,11 @@ def own_error(
         return rates_now(system, t, x, u)
 
     span = float(made.time[-1] - made.time[0]) or 1.0
-    end = max(float(made.statistics.time), float(made.time[k])) + _FURTHER * span
+    end = max(float(made.statistics.time), start) + _FURTHER * span
     try:
         with np.errstate(all="ignore"):
-            solve_ivp(rates, (float(made.time[k]), end), made.states[:, k], max_step=span / 100)
+            if np.isfinite(rates(start, x0)).all():  # else every shorter step ends the same
+                solve_ivp(rates, (start, end), x0, max_step=span / 100)
     except _Enough:
         return None
     except Exception as error:  # whatever somebody's function raises
@@ -59,8 +62,5 @@ def own_error(
 
 def _is_of_the_library(error: Exception) -> bool:
     """Whether it is python-control that raises, of values that are not finite, say."""
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    module = "" if place is None else str(place.tb_frame.f_globals.get("__name__"))
-    return module.partition(".")[0] in ("control", "nlctl", "scipy")
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    return str(frame.f_globals.get("__name__")).partition(".")[0] in ("control", "nlctl", "scipy")

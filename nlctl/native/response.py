@@ -8,7 +8,9 @@ from typing import Any
 import control as ct
 import numpy as np
 
+from ..accumulation import limit_of
 from ..annotations import as_annotated
+from ..diagrams import state_names
 from ..errors import ChatteringError, DivergedError, ParameterError, ZenoError
 from ..responses.arguments import evaluation_array, input_array, interpolated, state_array
 from ..responses.time_response import Response, response_of
@@ -20,8 +22,10 @@ from .compiled import Compiled, with_watched
 from .driver import trajectory
 from .integrate.state import Status
 from .own_errors import own_error
-from .results import Statistics, Trajectory
+from .results import Trajectory
 from .settings import Settings
+
+_LARGE = 1e6  # a state that a message names, in its unit
 
 
 def respond(
@@ -57,7 +61,7 @@ def respond(
     run = made.statistics
     if run.status is Status.STOPPED and not ignore_errors:
         # whoever takes it for an error continues
-        raise KeyboardInterrupt(_message(compiled, run, p, params))
+        raise KeyboardInterrupt(_message(compiled, made, p, params))
     ended = run.status is Status.ENDED
     failed = failure(compiled, made, p, params)
     if failed is not None and not ignore_errors:
@@ -83,12 +87,12 @@ def failure(
     if made.culprit >= 0 and run.status in (Status.ZENO, Status.DIVERGED):
         block = compiled.schedule.nodes[guards[made.culprit]].path
         if run.status is Status.ZENO:
-            return ZenoError.of(block, _falls(compiled, made), made.since)
+            return ZenoError.of(block, limit_of(_falls(compiled, made), made.since))
         if not np.isfinite(made.guard):
             why = f"block '{block}' has a guard that is NaN at t = {run.time:.6g} s"
             return DivergedError(why, run.time)
     kind = ChatteringError if run.status is Status.CHATTERING else DivergedError
-    return kind(_message(compiled, run, p, params), run.time)
+    return kind(_message(compiled, made, p, params), run.time)
 
 
 def _falls(compiled: Compiled, made: Trajectory) -> list[float]:
@@ -141,8 +145,9 @@ def uninterrupted(response: Any) -> Any:
 
 
 def _message(
-    compiled: Compiled, run: Statistics, p: np.ndarray, params: Mapping[str, Any] | None
+    compiled: Compiled, made: Trajectory, p: np.ndarray, params: Mapping[str, Any] | None
 ) -> str:
+    run = made.statistics
     what = {
         Status.DIVERGED: "diverged: no finite state after",
         Status.STEP_LIMIT: "stopped at the limit of steps at",
@@ -152,9 +157,24 @@ def _message(
         Status.STEP_TOO_SMALL: "diverged or jumps: no step is small enough after",
     }
     told = f"'{compiled.system.name}' {what[run.status]} t = {run.time:.6g} s"
+    if run.status in (Status.DIVERGED, Status.STEP_TOO_SMALL):
+        return told + _grown(compiled, made)
     if run.jump is None:
         return told
     return f"{told}: {chattering_words(compiled, p, params, run.jump)}"
+
+
+def _grown(compiled: Compiled, made: Trajectory) -> str:
+    """Say which state was large at the last time at which all of them were finite."""
+    finite = np.flatnonzero(np.isfinite(made.states).all(axis=0))
+    if not finite.size or not made.states.size:
+        return ""
+    k = int(finite[-1])
+    i = int(np.argmax(np.abs(made.states[:, k])))
+    if not abs(made.states[i, k]) > _LARGE:
+        return ""
+    name = state_names(compiled.system)[i]
+    return f"; state '{name}' is {made.states[i, k]:.3g} at t = {made.time[k]:.6g} s"
 
 
 def _response(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -53,9 +54,9 @@ def _imported(path: Path) -> Iterator[str]:
             files = [inner / f"{each.name}.py" for each in node.names]
             files += [inner.with_suffix(".py")] if node.module else []
             yield from (
-                file.relative_to(HERE).as_posix()
+                Path(os.path.relpath(file, HERE)).as_posix()
                 for file in files
-                if file.is_relative_to(HERE) and file.exists()
+                if file.exists() and (file.is_relative_to(HERE) or file.name == "accumulation.py")
             )
 
 

@@ -30,7 +30,7 @@ class LuenbergerObserver:
     ----------
     known, measured : tuple of str, optional
         Names of the plant's inputs and outputs, in the order of the columns of B and the rows of
-        C.
+        C; () for a plant without inputs, whose B and D have no columns.
 
     Examples
     --------
@@ -44,9 +44,11 @@ class LuenbergerObserver:
     known: tuple[str, ...] = ("u",)
     measured: tuple[str, ...] = ("y",)
     A: Matrix = param(((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant")
-    B: Matrix = param(((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant")
+    B: Matrix = param(
+        ((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant", may_be_empty=True
+    )
     C: Matrix = param(((1.0, 0.0),), unit="1", meaning="matrix C of the plant")
-    D: Matrix = param(((0.0,),), unit="1", meaning="matrix D of the plant")
+    D: Matrix = param(((0.0,),), unit="1", meaning="matrix D of the plant", may_be_empty=True)
     L: Matrix = param(((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer")
 
     feedthrough = False
@@ -65,7 +67,7 @@ class LuenbergerObserver:
                     f"{counted(n, 'state')}, {counted(m, 'input')} and {counted(k, 'output')}, got "
                     f"{shape[0]} x {shape[1]}"
                 )
-        set_names(self, "known", m)
+        set_names(self, "known", m, at_least=0)
         set_names(self, "measured", k)
 
     inputs = property(lambda self: (*self.known, *self.measured))
@@ -90,7 +92,7 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     Parameters
     ----------
     plant : control.StateSpace
-        In continuous time, with an input; the observer takes its signals by their names.
+        In continuous time; the observer takes its signals by their names.
     poles : array_like of shape (n,), optional
         Eigenvalues of A - L C (1/s), complex ones with their conjugates.
     L : array_like of shape (n, k), optional
@@ -104,8 +106,9 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     Raises
     ------
     ParameterError
-        If the plant is not one in continuous time with an input, there are not as many poles as
-        states, both or neither of `poles` and `L` are given, or the plant is not observable.
+        If the plant is not one in continuous time with a state and an output, there are not as
+        many poles as states, both or neither of `poles` and `L` are given, or the plant is not
+        observable.
 
     Examples
     --------
@@ -116,14 +119,18 @@ def luenberger(plant: ct.StateSpace, poles: Any = None, *, L: Any = None) -> Lue
     ('v', 'y') [5. 5.]
     """
     of_type("luenberger", "plant", plant, ct.StateSpace)
-    if not plant.isctime() or not plant.ninputs or not plant.nstates:
+    if not plant.isctime() or not plant.noutputs or not plant.nstates:
         raise ParameterError(
-            f"luenberger needs a plant in continuous time with a state and an input, got "
-            f"'{plant.name}' with dt = {plant.dt}, {plant.nstates} and {plant.ninputs} of them"
+            f"luenberger needs a plant in continuous time with a state and an output, got "
+            f"'{plant.name}' with dt = {plant.dt}, {plant.nstates} and {plant.noutputs} of them"
         )
     if (poles is None) == (L is None):
         raise ParameterError("luenberger needs either poles or L, got both or neither")
-    matrices: dict[str, Any] = {key: getattr(plant, key) for key in "ABCD"}
+    n, m, k = plant.nstates, plant.ninputs, plant.noutputs
+    shapes = {"A": (n, n), "B": (n, m), "C": (k, n), "D": (k, m)}  # 0 x 0 where there is no input
+    matrices: dict[str, Any] = {
+        key: np.reshape(getattr(plant, key), shape) for key, shape in shapes.items()
+    }
     matrices["L"] = (
         _placed(plant, poles) if L is None else np.reshape(L, (plant.nstates, plant.noutputs))
     )

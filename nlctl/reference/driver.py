@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import bisect
 import math
+import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
+from scipy.integrate import RK45
 
 from ..errors import DivergedError
 from ..sampling.system import happening
@@ -26,6 +28,7 @@ _ASIDE = 1e-3  # part of a run: how far behind its end what leaves a delay there
 _PLACES = 1024  # of a run: a loop at rest is looked at in as many
 _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
+_FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
 _ROUNDED = 1.0 + 1e-9
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
@@ -92,12 +95,15 @@ class Driver:
     def run(self, begin: float, end: float, x: np.ndarray) -> None:
         """Go from the first time to the last; `rows` grow on the way."""
         self.reached, self._span = begin, end - begin
+        self.jumps.span = self._span
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
         t, sides, what, is_break = begin, None, self.stops.due.get(begin, frozenset()), True
         with ExitStack() as stack:
             stack.enter_context(supplying(self.known.lines))
             stack.enter_context(happening())
+            stack.enter_context(warnings.catch_warnings())
+            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)  # a step says so as well
             while True:
                 self.known.reach(t, is_break)
                 stop = (
@@ -141,9 +147,9 @@ class Driver:
         self.jumps.check_watched(t, seen)
         pieces: list[Any] = []
         while True:
-            message = solver.step()
-            if solver.status == "failed":
-                raise RuntimeError(f"solve_ivp failed: {message}")
+            if (message := solver.step()) is not None:
+                solver = self._begun_again(solver, stop, bounded, message)
+                continue
             state = self._solution(solver)
             allowed = self._allowed(solver, state, bound, stop)
             if allowed:
@@ -170,6 +176,18 @@ class Driver:
                 own = self.jumps.switching
                 self._came[own] = 0.0 if event else np.sign(seen[own])
                 return until, x, sides, pieces, event
+
+    def _begun_again(self, solver: Any, stop: float, bounded: Any, message: str) -> Any:
+        """Return an integrator that begins where one has failed, explicit where that fails too."""
+        t, failed = float(solver.t), self._failed
+        if isinstance(solver, RK45) or not np.all(np.isfinite(self._rates(t, self._held))):
+            raise RuntimeError(f"solve_ivp failed: {message}")
+        self._failed = t
+        if t != failed:
+            return self.method(self._rates, t, self._held, stop, **bounded)
+        own = {name: bounded[name] for name in ("rtol", "atol", "max_step")}
+        first = min(_FIRST * self._span, own["max_step"], stop - t)
+        return RK45(self._rates, t, self._held, stop, first_step=first, **own)
 
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
@@ -263,7 +281,8 @@ class Driver:
     def _note(self, event: Event, seen: np.ndarray, state: Any) -> None:
         """Note what happens, and all switching functions and conditions that change their signs."""
         x = state(event.time)
-        self._switches.note(event.number, event.time)
+        if event.number >= self.jumps.kinds[0]:  # jumps of guards have a test of their own
+            self._switches.note(event.number, event.time)
         after = self._looked(event.time, x)
         self.jumps.check_watched(event.time, after)
         came, sides, own = self._came, self._signs(after), self.jumps.switching
@@ -328,7 +347,7 @@ class Driver:
         if self.progress is not None:
             self.progress(self.reached)
 
-    _repeated, _longest, _ended = 0, 0.0, False
+    _repeated, _longest, _ended, _failed = 0, 0.0, False, np.nan
     _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..accumulation import PACE, jumps_end, limit_of
 from ..blocks import Block, equation_now, memory_states
 from ..diagrams import leaves
 from ..errors import BlockError, DivergedError, ZenoError
@@ -18,7 +19,6 @@ from .known import Known
 
 _MOST = 100  # jumps without progress of time
 _STILL = 1e-11  # of a time: less is no progress
-_ALIKE, _SHRUNK, _FEW = 0.02, 1e-4, 4  # a geometric sequence: of what ratios, how far, how long
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
 _NOTHING = np.zeros(0)
 
@@ -82,11 +82,13 @@ class Jumps:
         self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
         self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
         self.kinds: tuple[int, int] = (0, 0)
+        self.span = 0.0  # of the run
         self.switching = slice(0, 0)  # rows that blocks declare, of what `look` returns
         self.labels: list[tuple[str, str]] | None = None
         self._own = any(self._blocks.values())
         self.any = self._own or bool(self.watched or self.crossings)
         self._taken: dict[int, list[float]] = {}
+        self._paces: dict[int, np.ndarray] = {}
         self._rising: dict[int, float] = {}
 
     def look(self, t: float, x: np.ndarray) -> np.ndarray:
@@ -241,23 +243,17 @@ class Jumps:
                 raise self._zeno(i, t)
 
     def _check_progress(self, i: int, t: float) -> None:
-        """End a run whose jumps accumulate: without progress of time, or geometrically."""
+        """End a run whose jumps accumulate, or are without progress of time."""
         times = self._taken[i]
-        if len(times) > _MOST and t - times[-_MOST - 1] <= _STILL * max(abs(t), 1e-300):
+        still = _STILL * max(abs(t), self.span)
+        if len(times) > _MOST and t - times[-_MOST - 1] <= still:
             raise self._zeno(i, t)
-        apart = np.diff(times[-2000:])
-        if apart.size <= _FEW or not np.all(apart > 0.0):
-            return
-        ratios = apart[1:] / apart[:-1]
-        steady = np.abs(ratios[::-1] - ratios[-1]) < _ALIKE * ratios[-1]
-        length = int(np.argmin(steady)) if not steady.all() else steady.size
-        shrunk = ratios[-1] ** length
-        if ratios[-1] < 1.0 and length >= _FEW - 1 and shrunk < _SHRUNK:
+        if jumps_end(self._paces.setdefault(i, np.zeros(PACE)), t):
             raise self._zeno(i, t)
 
     def _zeno(self, i: int, t: float) -> ZenoError:
         """Return the error of jumps that accumulate, with the time at which they do."""
-        return ZenoError.of(self.label(i)[0], self._taken.get(i, [t]), t)
+        return ZenoError.of(self.label(i)[0], limit_of(self._taken.get(i, [t]), t))
 
 
 def _memory_rows(one: _Part) -> np.ndarray:

@@ -253,3 +253,18 @@ def takes_a_dict(system: Any) -> bool:
     """Whether a system's equations get its parameters as python-control has them, in a dict."""
     usual = type(system)._update_params is ct.NonlinearIOSystem._update_params
     return usual or (isinstance(system, OwnParameters) and type(system).reads_a_dict)
+
+
+def state_space(
+    matrices: tuple[np.ndarray, ...], dt: Any, names: Mapping[str, Any]
+) -> ct.StateSpace:
+    """Return the linear system of A, B, C and D; control.StateSpace refuses most without inputs."""
+    A, B, C, D = matrices
+    if B.shape[1]:
+        return ct.StateSpace(A, B, C, D, dt, remove_useless_states=False, **names)
+    given = {name: value for name, value in names.items() if name != "inputs"}
+    one = np.zeros((len(A), 1)), C, np.zeros((len(C), 1))
+    linear = ct.StateSpace(A, *one, dt, remove_useless_states=False, **given)
+    linear.B, linear.D = B, D
+    linear.set_inputs([])
+    return linear

@@ -1,6 +1,7 @@
 """Friction: steady states, paths, and the published behaviour of LuGre."""
 
 import functools
+import re
 
 import control as ct
 import numpy as np
@@ -117,6 +118,20 @@ class TestBoucWen:
         y = 0.01
         exact = spec.alpha / 300 * np.expm1(300 * y)
         assert travel(spec, [y])[-1] == pytest.approx(exact, rel=1e-8)
+
+    def test_a_run_that_it_ends_names_it(self):
+        """Behind a law that holds 2 m/s for 70 ms the force is alpha / 300 (exp(42) - 1)."""
+        law = ct.ss([], [], [], [[2.0]], 0.07, inputs="r", outputs="velocity", name="law")
+        spring = nlctl.block(nlctl.actuators.BoucWen(), "spring")
+        mass = ct.ss([[0.0]], [[1.0]], [[1.0]], 0, inputs="force", outputs="y", name="mass")
+        back = ct.summing_junction(["w", "-y"], "r", name="back")
+        loop = nlctl.interconnect(
+            [nlctl.sampled(law), spring, mass, back], inputs=["w"], outputs=["y"]
+        )
+        force = 5e4 / 300 * np.expm1(42)
+        end = f"state 'spring.z' is {force:.3g} at t = 0.07 s"
+        with pytest.raises(nlctl.errors.DivergedError, match=re.escape(end)):
+            nlctl.input_output_response(loop, np.linspace(0, 1, 101), 1.0)
 
 
 OF_THE_PATH = {

@@ -36,6 +36,25 @@ def with_observer(observer, plant, x0, times, engine="native", u=0.0):
 
 class TestLuenberger:
     @every_engine
+    def test_a_plant_needs_no_input(self, engine):
+        """Of x'' = -4 x alone the error is exp(-2 t) (1 + 2 t) of that at t = 0."""
+        plant = ct.nlsys(
+            lambda t, x, u, params: [x[1], -4 * x[0]], lambda t, x, u, params: x[0],
+            inputs=0, outputs=["y"], states=["p", "q"], name="plant",
+        )  # fmt: skip
+        linear = nlctl.linearize(plant, [0.0, 0.0])
+        assert linear.ninputs == 0
+        np.testing.assert_array_equal(linear.A, [[0, 1], [-4, 0]])
+        record = nlctl.observers.luenberger(linear, [-2.0, -2.0])
+        assert record.inputs == ("y",)
+        parts = {"plant": plant, "observer": record}
+        loop = nlctl.interconnect(parts, inputs=[], outputs=["y", "x1_hat"])
+        t = np.linspace(0, 3, 31)
+        run = nlctl.input_output_response(loop, t, 0, {"plant.p": 1.0}, engine=engine, **TIGHT)
+        error = run.outputs[0] - run.outputs[1]
+        np.testing.assert_allclose(error, np.exp(-2 * t) * (1 - 2 * t), atol=1e-8)
+
+    @every_engine
     @each_row("poles", [(-3.0, -4.0, -5.0), (-2.0, -2.0, -2.0), (-3.0, -2 + 2j, -2 - 2j)])
     def test_the_error_is_that_of_its_poles(self, poles, engine):
         """exp((A - L C) t) (x(0) - x_hat(0)), whatever u is; its eigenvalues are the poles."""

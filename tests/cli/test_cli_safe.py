@@ -44,7 +44,9 @@ def ordered(done, folder, text):
     return folder
 
 
-@pytest.mark.parametrize("text", ORDERS)
+@pytest.mark.parametrize(
+    "text", ["".join(ORDERS), *(pytest.param(one, marks=pytest.mark.weekly) for one in ORDERS)]
+)
 def test_received_folders_give_no_orders_to_a_terminal(done, tmp_path, text):
     """Whatever reads them: report, compare, verify, in words and in JSON."""
     folder = ordered(done, tmp_path / "out", text)

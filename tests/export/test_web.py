@@ -94,6 +94,20 @@ def test_example_1_has_the_same_numbers_to_the_bit(in_node):
     assert found["ends"] == ""
 
 
+def pulses(t, x, u, params):
+    return [np.where(t % 0.5 < 0.2, 1.0, 0.0) - x[0]]
+
+
+@pytest.mark.ci
+def test_a_loop_without_parameters_switches_when_it_must(in_node):
+    """Its conditions of time alone are solved on the page, too."""
+    lag = ct.nlsys(pulses, None, inputs=0, outputs=["x"], states=["x"], name="lag")
+    program = web_program(ct.interconnect([lag], outputs=["x"]), TIMES)
+    assert not program.parameters
+    (found,) = in_node(program)
+    np.testing.assert_allclose(samples(found, program), here(program), rtol=0, atol=1e-9)
+
+
 @pytest.mark.ci
 def test_it_is_the_run_of_the_engine_within_its_tolerance():
     needed("ziglang", "export")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -72,7 +73,7 @@ EXPONENTS = {"sqrt": 0.5, "power 0.5": 0.5, "power 1.5": 1.5, "power 1/3": 1 / 3
 @pytest.mark.parametrize("inner", NOT_NEGATIVE)
 @pytest.mark.parametrize("root", ROOTS)
 @given(a=ENDS, b=ENDS, share=st.floats(0, 1))
-@settings(max_examples=20)
+@settings(max_examples=many(20, part=4))
 def test_roots_of_what_is_not_negative_are_finite_around_zero(root, inner, a, b, share):
     """As a ball, the radius of which is rounded up, begins below 0 there."""
     low, high = min(a, b, 0.0), max(a, b, 0.0)
@@ -86,7 +87,7 @@ def test_roots_of_what_is_not_negative_are_finite_around_zero(root, inner, a, b,
 
 @pytest.mark.parametrize("root", ROOTS)
 @given(low=st.floats(1e-12, 4), high=st.floats(0, 4))
-@settings(max_examples=10)
+@settings(max_examples=many(10, part=2))
 def test_roots_of_what_is_negative_somewhere_have_no_bound(root, low, high):
     """However little that is, and whatever was known of what it is made of."""
     boxes = Box.of(x=(-low, high))

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from examples import many
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -40,7 +41,7 @@ def at(found, x, y):
     return as_ball(found.on({"x": Ball(arb(x)), "y": Ball(arb(y))})).value
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=many(150), deadline=None)
 @given(tree=trees(), x=NUMBERS, y=NUMBERS)
 def test_it_is_the_equation(tree, x, y):
     """At points, against floating point; the difference to itself has no terms."""

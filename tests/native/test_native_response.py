@@ -191,7 +191,7 @@ class TestStatus:
         assert part.time[-1] <= 1
 
     def test_overflow_of_the_nussbaum_gain(self):
-        """A start at zeta = 30 has no finite right-hand side."""
+        """exp(zeta^2) overflows at 26.64: at zeta = 30 there is no finite right-hand side."""
         with pytest.raises(nlctl.errors.DivergedError, match="no finite state after t = 0 s"):
             nlctl.input_output_response(
                 nlctl.compile(nlctl.paper.example_1()), [0, 1], 0, {"law.zeta": 30.0}

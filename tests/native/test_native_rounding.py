@@ -88,7 +88,13 @@ def test_what_cancels_is_no_difference(name):
 
 
 @needs_jit
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        n if n != "a distance by a loop" else pytest.param(n, marks=pytest.mark.weekly)
+        for n in CASES
+    ],
+)
 @pytest.mark.filterwarnings("ignore::nlctl.errors.EngineWarning")
 def test_a_formula_that_differs_by_one_operation_is_found(name, monkeypatch):
     """Also where its terms cancel: by a sign, an index, or the twelfth digit of a constant."""

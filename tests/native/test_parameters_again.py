@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -56,7 +57,7 @@ STEPS = st.lists(
 
 
 @given(STEPS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=many(60, part=4), deadline=None)
 def test_whatever_is_changed_the_vector_is_that_of_the_diagram_as_it_stands(steps):
     loop = diagram()
     compiled = nlctl.compile(loop)

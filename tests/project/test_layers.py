@@ -3,15 +3,16 @@
 import ast
 import subprocess
 import sys
+from collections.abc import Mapping
 from graphlib import TopologicalSorter
 
 import pytest
 from places import ROOT
 
 LAYERS = [  # from the bottom; a module belongs to the longest name that it begins with
-    ["nlctl._version", "nlctl.host", "nlctl.upstream"],
+    ["nlctl._version", "nlctl.host", "nlctl.upstream", "nlctl.attributes"],
     ["nlctl.errors", "nlctl.wording", "nlctl.names", "nlctl.arguments", "nlctl.params"]
-    + ["nlctl.equations", "nlctl.annotations"],
+    + ["nlctl.equations", "nlctl.annotations", "nlctl.probing", "nlctl.pickles"],
     [
         "nlctl.supplied",
         "nlctl.blocks",
@@ -129,7 +130,28 @@ def module_name(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {module_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
+class Trees(Mapping):
+    """The syntax trees of modules by name, each read when it is first asked for."""
+
+    def __init__(self, paths):
+        self.paths, self.trees = paths, {}
+
+    def __getitem__(self, name):
+        if name not in self.trees:
+            self.trees[name] = ast.parse(self.paths[name].read_text(encoding="utf-8"))
+        return self.trees[name]
+
+    def __iter__(self):
+        return iter(self.paths)
+
+    def __len__(self):
+        return len(self.paths)
+
+    def __contains__(self, name):
+        return name in self.paths
+
+
+MODULES = Trees({module_name(path): path for path in FILES})
 PACKAGES = {module_name(path) for path in FILES if path.name == "__init__.py"}
 ROOTS = ("nlctl", "nlctl.analysis")  # these only re-export
 MEMBERS = [name for name in MODULES if name not in ROOTS]

@@ -6,6 +6,7 @@ from typing import Any
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -95,7 +96,7 @@ def test_twelve_bounces(method):
     rtol=st.sampled_from((1e-6, 1e-8, 1e-10)),
 )  # fmt: skip
 @example(kind=Landed, e=0.8, rtol=1e-8)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=many(10, part=3), deadline=None)
 def test_bounces_accumulate_at_a_time(engine, kind, e, rtol):
     """The flights are a geometric sequence: no run goes beyond its sum, or through the floor."""
     v0 = np.sqrt(2 * G)
@@ -298,7 +299,7 @@ waves = st.tuples(st.floats(0.5, 2), st.floats(0.3, 3), st.floats(0, 1), st.floa
 
 @pytest.mark.slow
 @given(wave=waves)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=many(10, part=3), deadline=None)
 def test_a_play_is_exact(wave):
     """Against clipping at all turning points of u, and behind a corner of an input."""
     a, w, b, f = wave
@@ -404,3 +405,12 @@ def test_wrong_resets_and_guards_are_refused_by_name():
     clocked = made(**common, guard=lambda t, x, u, p: x, reset=lambda t, x, u, p: x).spec
     with pytest.raises(nlctl.errors.UsageError, match="block 'one' has a guard, which falls in"):
         nlctl.sampled(nlctl.block(clocked(), "one"), 0.1, method="euler")
+
+
+@pytest.mark.parametrize("how", [{"engine": "python-control"}, {"method": "tsit5"}])
+def test_a_ball_that_lies_on_the_ground_has_no_end_of_bounces(how):
+    """It hops as far as rounding lets it, and no time passes."""
+    ball = nlctl.block(Landed(), "ball")
+    with pytest.raises(nlctl.errors.ZenoError) as caught:
+        nlctl.input_output_response(ball, [0, 10], 0, [0.0, 0.0], **how)
+    assert abs(caught.value.time) < 1e-9

@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import parted
 
 import nlctl
 
@@ -206,7 +207,7 @@ def outputs(pair, engine):
     return found.outputs[0, 1:], exact(T)
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", parted(PAIRS))
 def test_in_the_reference(pair):
     np.testing.assert_allclose(*outputs(pair, "python-control"), rtol=0, atol=1e-8)
 

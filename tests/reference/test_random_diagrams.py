@@ -9,6 +9,7 @@ clocks, at crossings or after each step.
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -146,7 +147,7 @@ def both(seed, parts):
     seed=st.integers(0, 2**32 - 1),
     parts=st.lists(st.sampled_from(PARTS), min_size=2, max_size=4, unique=True),
 )
-@settings(max_examples=8)
+@settings(max_examples=many(8, part=2))
 def test_both_engines_agree_on_random_hybrid_diagrams(seed, parts):
     machine, reference = both(seed, parts)
     if isinstance(machine, type):

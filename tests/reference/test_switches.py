@@ -37,7 +37,7 @@ def diagram(*lags):
     ("system", "block", "start"),
     [
         (lagged(1e-3), "own", [1.0, 0.0]),
-        pytest.param(lagged(0.05), "own", [1.0, 0.0], marks=pytest.mark.slow),
+        pytest.param(lagged(0.05), "own", [1.0, 0.0], marks=pytest.mark.weekly),
         pytest.param(diagram(0.05), "sign", {"plant.x[0]": 1.0}, marks=pytest.mark.slow),
     ],
 )

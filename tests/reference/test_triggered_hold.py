@@ -79,7 +79,7 @@ def test_the_example_is_that_of_the_theorem():
 
 @engines
 @pytest.mark.slow
-@pytest.mark.parametrize("angle", [0.0, 1.0])
+@pytest.mark.parametrize("angle", [1.0, pytest.param(0.0, marks=pytest.mark.weekly)])
 def test_the_bound_on_the_intervals_is_never_undercut(angle, engine):
     """Tabuada (2007): and the state decays, since sigma is below the bound of the theorem."""
     sigma = 0.05
@@ -125,3 +125,36 @@ def test_samples_of_the_example_are_taken_as_computed_by_hand(engine):
         engine=engine, **TIGHT,
     )  # fmt: skip
     np.testing.assert_allclose(samples(made)[:8], wanted, rtol=0, atol=1e-7)
+
+
+def with_threshold(threshold):
+    """x = t, held where it is further from what is held than a function of time."""
+    plant = ct.nlsys(lambda t, x, u, p: [1.0], inputs=0, states=1, outputs=["u1"], name="plant")
+    rule = ct.nlsys(
+        None, lambda t, x, u, p: [threshold(t) - abs(u[1] - u[0])], inputs=["u1", "w1"],
+        outputs=["trigger"], name="rule",
+    )  # fmt: skip
+    blocks = {"plant": plant, "hold": nlctl.TriggeredHold(n=1), "rule": rule}
+    return nlctl.interconnect(blocks, outputs=["u1"])
+
+
+@pytest.mark.parametrize("how", [{"engine": "python-control"}, {}, {"method": "taylor"}])
+def test_a_threshold_that_falls_to_0_has_no_end_of_samples(how):
+    """t_k+1 - t_k = (1 - t_k+1) / 2: 1 - (2 / 3)^k, and none from t = 1 on."""
+    system = with_threshold(lambda t: 0.5 * (1 - t))
+    made = nlctl.input_output_response(system, [0, 1.5], 0, ignore_errors=True, **how, **TIGHT)
+    np.testing.assert_allclose(samples(made)[:20], 1 - (2 / 3) ** np.arange(1, 21), atol=1e-9)
+    with pytest.raises(nlctl.errors.ZenoError, match="before t = 1 s") as caught:
+        nlctl.input_output_response(system, [0, 1.5], 0, **how)
+    assert abs(caught.value.time - 1) < 1e-9
+
+
+@engines
+def test_a_threshold_that_decays_has_an_end_of_samples(engine):
+    """exp(-3 t) is never 0: samples are as far apart as 1 / n, and the run comes to its end."""
+    made = nlctl.input_output_response(
+        with_threshold(lambda t: 0.3 * np.exp(-3 * t)), [0, 1], 0, engine=engine, **TIGHT
+    )
+    taken = np.r_[0.0, samples(made)]
+    np.testing.assert_allclose(np.diff(taken), 0.3 * np.exp(-3 * taken[1:]), atol=1e-9)
+    assert taken.size > 20

@@ -6,7 +6,7 @@ import json
 import matplotlib.figure
 import numpy as np
 import pytest
-from command_line import nlctl
+from command_line import nlctl_here
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -177,8 +177,8 @@ def test_the_page_leaves_output_and_exit_codes_as_they_are(tmp_path):
     """With --out stdout is what it is without; the page is whole, and names its command."""
     one = write_report(report([claim("a", "shown")], a=1.0), tmp_path / "one").parent
     two = write_report(report([claim("a", "refuted")], a=2.0), tmp_path / "two").parent
-    plain = nlctl("compare", one, two)
-    made = nlctl("compare", one, two, "--out", tmp_path / "page")
+    plain = nlctl_here("compare", one, two)
+    made = nlctl_here("compare", one, two, "--out", tmp_path / "page")
     assert (made.returncode, made.stdout) == (plain.returncode, plain.stdout)
     assert plain.returncode == 1
     text = (tmp_path / "page/index.html").read_text(encoding="utf-8")
@@ -186,8 +186,8 @@ def test_the_page_leaves_output_and_exit_codes_as_they_are(tmp_path):
     assert "overlaid-run-history" in text
     content = json.loads((tmp_path / "page/report.json").read_text(encoding="utf-8"))
     assert content["headline"] == {"look": "fail", "text": "1 claim: shown → refuted."}
-    assert nlctl("compare", one, one, "--out", tmp_path / "same").returncode == 0
-    assert nlctl("compare", one, two, "--pdf").returncode == 2
+    assert nlctl_here("compare", one, one, "--out", tmp_path / "same").returncode == 0
+    assert nlctl_here("compare", one, two, "--pdf").returncode == 2
     (one / "signals.json").write_text("[", encoding="utf-8")
     assert curves_of(one) == {}
 

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from command_line import nlctl_here
 from extras import needed, needed_program
+from matplotlib.figure import Figure as MatplotlibFigure
 
 import nlctl
 from nlctl.analysis.loop_report import loop_report
-from nlctl.analysis.report import render_html, write_report
+from nlctl.analysis.pages.live import live_item, live_program
+from nlctl.analysis.paper.page.record import LV_2017
+from nlctl.analysis.report import Figure, Report, Section, render_html, write_report
 from nlctl.analysis.report.browser import BROWSERS
+from nlctl.analysis.reproductions.live import with_parts_live
 from nlctl.analysis.robustness import Requirement
 from nlctl.analysis.robustness.stl.text import parse_formula
 from nlctl.analysis.robustness.stl.violation_time import violation_time
@@ -256,7 +260,8 @@ def test_the_command_line_writes_a_page_that_runs(tmp_path):
             "unknown parameter, initial state",
         ),
         (("loop.py:make", "--live", "--require", "v < 1"), "needs '<=' or '>='"),
-        (("lv_2017", "--live"), "--live and --move are of a loop or a study"),
+        (("lv_2017", "--move", "plant.x1(0)"), "--move is of a loop or a study"),
+        (("tabuada_2007", "--live"), "the page of tabuada_2007 has no loop to be moved"),
     ],
 )
 def test_what_a_page_cannot_do_is_refused_before_a_file_is_written(tmp_path, words, why):
@@ -283,6 +288,67 @@ def test_the_page_of_a_study_moves_within_its_box(tmp_path):
     assert content["bands"].keys() == content["limits"].keys() == {"v"}
     assert content["requirements"][0]["key"] == "low"
     assert content["command"]["shell"].startswith("nlctl simulate loop.py:make --until 2")
+
+
+@pytest.fixture(scope="module")
+def of_paper(tmp_path_factory):
+    """Pages with both examples, without and with what runs, and the latter's report."""
+    needed("ziglang", "export")
+    figures = [
+        Figure(key=f"{part.key}-figure", caption="A", description="A", figure=plain_figure())
+        for part in LV_2017.parts
+    ]
+    sections = [
+        Section(key=part.key, title=part.title, items=[figure])
+        for part, figure in zip(LV_2017.parts, figures, strict=True)
+    ]
+    still = Report(title="Both", verdict="", claims=[], sections=sections, command="")
+    live = with_parts_live(LV_2017, still)
+    folder = tmp_path_factory.mktemp("paper")
+    return write_report(still, folder / "still"), write_report(live, folder / "live"), live
+
+
+def plain_figure():
+    figure = MatplotlibFigure()
+    figure.add_subplot()
+    return figure
+
+
+def test_the_page_of_the_paper_runs_both_examples(browser, of_paper):
+    """It begins with the numbers of report.json; a fault ends one of two requirements."""
+    still, page, report = of_paper
+    assert page.stat().st_size - still.stat().st_size <= MOST
+    shown = browser.new_page(offline=True)
+    shown.goto(page.as_uri())
+    for key in ("example-1-live", "example-2-live"):
+        part = shown.locator(f"#{key}")
+        part.locator(".said", has_text=" steps, ").wait_for()
+        found = numbers(part)
+        for name, values in report.numbers[key]["outputs"].items():
+            np.testing.assert_allclose(found[name], values, rtol=0, atol=1e-9)
+        assert part.locator(".verdicts b.fail").count() == 0
+        part.get_by_label("fault_actuator_v begins at").check()
+        part.locator(".verdicts li:nth-child(2) b.fail").wait_for()
+        assert part.locator(".verdicts b.pass").count() == 1
+    run = eval(part.locator("code").text_content(), {"np": np, "nlctl": nlctl})
+    r = dict(zip(run.output_labels, run.outputs, strict=True))
+    assert numbers(part)["u"][0] == pytest.approx(r["u"].min(), abs=1e-4)
+    shown.close()
+
+
+def test_a_single_block_runs_and_its_command_repeats_the_run():
+    """With its input, its initial state and its parameters."""
+    needed("ziglang", "export")
+    lag, t = nlctl.block(nlctl.Lag(T=0.5), "lag"), np.linspace(0.0, np.pi, 11)
+    run = nlctl.input_output_response(lag, t, 2.0, {"lag.v": 0.5}, params={"lag.T": 0.3})
+    program = live_program(lag, run, {"lag.T": 0.3})
+    np.testing.assert_allclose(program.signals["v"], run.outputs, atol=1e-6)
+    command = live_item(program, run, (), base={"lag.T": 0.3}).program["command"]
+    times = eval(command["times"], {"np": np})
+    again = nlctl.input_output_response(
+        lag, times, command["inputs"][0], command["states"], params=command["params"]
+    )
+    np.testing.assert_array_equal(again.outputs, run.outputs)
 
 
 STUDY = """

@@ -3,7 +3,7 @@
 import matplotlib.figure
 import numpy as np
 import pytest
-from command_line import nlctl
+from command_line import nlctl_here
 
 from nlctl.analysis import figures
 from nlctl.analysis.pages.trend import trend_figure
@@ -93,7 +93,7 @@ def test_the_gallery_has_the_trend_ids_and_headlines(tmp_path):
     lone = report([], title="Lone")
     checked = Headline(look="pass", text="All 3 checks of the loop hold.")
     write_report(Report(**{**vars(lone), "headline": checked}), tmp_path / "lone")
-    assert nlctl("gallery", tmp_path).returncode == 0
+    assert nlctl_here("gallery", tmp_path).returncode == 0
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert page.count('<figure id="trend-') == 1
     assert "Arm, over 2 revisions" in page

@@ -7,6 +7,7 @@ import shutil
 import pandas as pd
 import pytest
 from command_line import nlctl_here
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from studies_example import HEAD, write
@@ -314,7 +315,7 @@ def nonsense_ends_in_a_sentence(done, folder, data):
         assert "Traceback" not in told.stderr
 
 
-@settings(max_examples=25)
+@settings(max_examples=many(25))
 @given(data=st.data())
 def test_resealed_nonsense_ends_in_a_sentence(done, tmp_path_factory, data):
     """Any value of any file dropped, exchanged or added, every key right: no trace, no exit 3."""

@@ -1,5 +1,7 @@
 """A compiled diagram's plan in plain Python, and what its blocks' own functions make of it."""
 
+import functools
+
 import control as ct
 import numpy as np
 
@@ -14,11 +16,16 @@ from nlctl.upstream.control_internals import outputs_now, rates_now
 def interpreted(compiled):
     """Return ``rhs(t, x, u, p, dx, g, m)`` and ``out(t, x, u, p, y)``, without machine code."""
 
-    def prepared(p):
+    @functools.cache
+    def functions(parameters):
+        p = np.frombuffer(parameters)
         found = equations(compiled.schedule, compiled.program.layout, p)
         lowered = lower(compiled.schedule, compiled.program, 1, found)
-        prepare, rhs, out = plain_functions(lowered)
-        c = np.full((lowered.size, 1), np.nan)
+        return lowered.size, *plain_functions(lowered)
+
+    def prepared(p):
+        size, prepare, rhs, out = functions(p.tobytes())
+        c = np.full((size, 1), np.nan)
         prepare(p[:, None], c)
         return c, rhs, out
 
@@ -80,6 +87,7 @@ def compare(system, *, native=False, params=None, points=3, seed=0):
     compiled = compile_diagram(system, params=params)
     rng = np.random.default_rng(seed)
     given = None if isinstance(system, ct.StateSpace) else params  # all linear: it has none
+    rhs, out = compiled.native if native else interpreted(compiled)
     for _ in range(points):
         t, x, u = (
             rng.uniform(0, 5),
@@ -87,7 +95,6 @@ def compare(system, *, native=False, params=None, points=3, seed=0):
             rng.normal(size=system.ninputs),
         )
         p = compiled.parameter_vector(params)
-        rhs, out = compiled.native if native else interpreted(compiled)
         close = {"rtol": 1e-13, "atol": 1e-13}
         g, m = (np.empty(compiled.lowered.rows[name]) for name in "gm")
         for function, size, reference, more in (

@@ -74,9 +74,10 @@ def methods():
     """The public methods of classes of the reference.
 
     What `nlctl.Spec` describes is left out, what a block's own equations call, without types, and
-    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.  A `Stepper` is no
-    block, and its `reset` is its own.
+    `Sampled`, which `nlctl.sampled` makes: only the engine calls its methods.  Steppers are not
+    blocks, and their `reset` is their own.
     """
+    steppers = (nlctl.native.Stepper, nlctl.native.VectorStepper)
     heads = [head.partition(" : ")[0] for head, _ in entries(nlctl.Spec, "Attributes")]
     contract = {name for head in heads for name in head.split(", ")}
     for home, name in documented_names():
@@ -87,7 +88,7 @@ def methods():
             method = getattr(method, "__func__", method)  # of a class method, say
             if (
                 key.startswith("_")
-                or (key in contract and made is not nlctl.native.Stepper)
+                or (key in contract and made not in steppers)
                 or getattr(method, "__name__", "") != key
             ):
                 continue

@@ -13,6 +13,7 @@ import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
@@ -39,37 +40,20 @@ _ADDED = 40  # of these in a round
 _StateFunction = Callable[[Any], Any]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="barrier")
 class Barrier(ProofResult):
     """A polynomial B with B <= 0 at all starts, B > 0 in all that is unsafe, B' < 0 where B = 0.
 
     No trajectory from a start comes to what is unsafe, or leaves the box, at any time.
-
-    Attributes
-    ----------
-    names : tuple of str
-        States.
-    middle, half : ndarray of shape (n,)
-        B is a polynomial in z = (x - middle) / half.
-    terms : tuple of tuple of int
-        Powers of z in each term.
-    coefficients : ndarray
-        Of the terms.
-    box : Box
-        Where was looked.
-
-    Examples
-    --------
-    See `barrier`.
     """
 
-    names: tuple[str, ...]
-    middle: np.ndarray
+    names: tuple[str, ...]  # States.
+    middle: np.ndarray  # (n,): B is a polynomial in z = (x - middle) / half.
     half: np.ndarray
-    terms: tuple[Term, ...]
-    coefficients: np.ndarray
-    box: Box
-    arithmetic: str = "floats rounded outwards"
+    terms: tuple[Term, ...]  # Powers of z in each term.
+    coefficients: np.ndarray  # Of the terms.
+    box: Box  # Where was looked.
+    arithmetic: str = "floats rounded outwards"  # What proved it.
 
     @property
     def claim(self) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.expressions.graph import Untraceable
 from nlctl.native.tubes.series import SeriesCode, series_code
@@ -27,58 +28,27 @@ _CELLS = 200  # parts of the time for which there are bounds
 _Status = Literal["proved", "refuted", "undecided"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="reachable_set")
 class ReachableSet:
-    """Boxes that hold all solutions from `start`, over each part of the time.
+    """Boxes that hold all solutions from `start`, over each part of the time."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        States.
-    start : Box
-        Initial states.
-    within : Box or None
-        Where the states shall stay.
-    status : {"proved", "refuted", "undecided"}
-        Whether all solutions exist up to the horizon, and stay in `within`.
-    reason : str
-        What is missing, or where a solution leaves.
-    times : ndarray of shape (parts + 1,)
-        Ends of the parts (s).
-    low, high : ndarray of shape (parts, n)
-        Bounds of the states over each part; infinite where nothing is known.
-    end_low, end_high : ndarray of shape (n,)
-        Bounds at the horizon.
-    refuted : dict or None
-        Initial states from which the solution surely leaves `within`.
-    pieces : int
-        Into which the initial states were divided, all that were tried.
-    steps : int
-        Of all pieces.
-    seconds : float
-    arithmetic : str
-        What proved it.
-
-    Examples
-    --------
-    See `reachable_set`.
-    """
-
-    names: tuple[str, ...]
-    start: Box
-    within: Box | None
-    status: _Status
-    reason: str
-    times: np.ndarray = field(repr=False)
+    names: tuple[str, ...]  # States.
+    start: Box  # Initial states.
+    within: Box | None  # Where the states shall stay.
+    status: _Status  # Whether all solutions exist up to the horizon, and stay in `within`.
+    reason: str  # What is missing, or where a solution leaves.
+    times: np.ndarray = field(repr=False)  # (parts + 1,): Ends of the parts (s).
+    # (parts, n): Bounds of the states over each part; infinite where nothing is known.
     low: np.ndarray = field(repr=False)
     high: np.ndarray = field(repr=False)
-    end_low: np.ndarray = field(repr=False)
+    end_low: np.ndarray = field(repr=False)  # (n,): Bounds at the horizon.
     end_high: np.ndarray = field(repr=False)
+    # Initial states from which the solution surely leaves `within`.
     refuted: dict[str, float] | None
-    pieces: int
-    steps: int
+    pieces: int  # Into which the initial states were divided, all that were tried.
+    steps: int  # Of all pieces.
     seconds: float
-    arithmetic: str = "floats rounded outwards"
+    arithmetic: str = "floats rounded outwards"  # What proved it.
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Return proved bounds of a state over the whole time.

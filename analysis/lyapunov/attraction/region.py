@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
@@ -27,41 +27,20 @@ _AT_REST = 1e-9  # of the rates at an equilibrium
 _ROUNDS = 3  # of proposals that grow
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="region_of_attraction")
 class AttractionRegion(ProofResult):
-    """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`.
+    """A set {(x - at)^T P (x - at) <= level} from which everything goes to `at`."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        States.
-    at : ndarray of shape (n,)
-        The equilibrium, where |f| <= 1e-9: what is proved takes it for one.
-    P : ndarray of shape (n, n)
-    level : float
-        Proved; 0 where nothing is.
-    above : float
-        The least level that was tried and is not proved.
-    refuted : dict or None
-        A point with V <= `above` where V does not fall.
-    floor : float
-        Down to it V' <= -1e-9 is proved by enclosures, below it by those of the Jacobian.
-    box : Box
-        Where was looked.
-
-    Examples
-    --------
-    See `region_of_attraction`.
-    """
-
-    names: tuple[str, ...]
-    at: np.ndarray
-    P: np.ndarray
-    level: float
-    above: float
-    refuted: dict[str, float] | None
+    names: tuple[str, ...]  # States.
+    at: np.ndarray  # (n,): The equilibrium, where |f| <= 1e-9: what is proved takes it for one.
+    P: np.ndarray  # (n, n)
+    level: float  # Proved; 0 where nothing is.
+    above: float  # The least level that was tried and is not proved.
+    refuted: dict[str, float] | None  # A point with V <= `above` where V does not fall.
+    # Down to it V' <= -1e-9 is proved by enclosures, below it by those of the Jacobian.
     floor: float
-    box: Box
+    box: Box  # Where was looked.
+    # What proved it.
     arithmetic: str = "floats rounded outwards, balls for the linear part"
 
     @property

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -17,6 +16,7 @@ from nlctl import actuators
 from nlctl.actuators import Backlash, DeadZone
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, vector
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 from nlctl.params import equation_arguments
 from nlctl.wording import counted
@@ -41,40 +41,22 @@ class DecompositionError(UsageError):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="decompose")
 class Decomposition:
-    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3).
+    """A split v = k(u, v) u + eps_u of an actuator, (2) and (3)."""
 
-    Attributes
-    ----------
-    k_1, k_2 : float
-        0 < k_1 <= k <= k_2.
-    eps_low, eps_high : float
-        Bounds of eps_u.
-    part : callable
-        ``part(u, v)`` is k u; floats and arrays.  `gain` and `eps_u` follow from it.
-    provenance : {"computed", "proved", "given"}
-        "computed" in closed form, "proved" by branch and bound, "given" by the record alone:
-        samples do not refute it, and nothing proves it.
-    how, over : str
-        How the bounds were obtained, and for which inputs they hold.
-    largest_u : float
-        They hold for |u| up to this.
-
-    Examples
-    --------
-    See `decompose`.
-    """
-
-    k_1: float
+    k_1: float  # 0 < k_1 <= k <= k_2.
     k_2: float
-    eps_low: float
+    eps_low: float  # Bounds of eps_u.
     eps_high: float
+    # ``part(u, v)`` is k u; floats and arrays. `gain` and `eps_u` follow from it.
     part: Callable[[Any, Any], Any]
+    # "computed" in closed form, "proved" by branch and bound, "given" by the record alone: samples
+    # do not refute it, and nothing proves it.
     provenance: Literal["proved", "computed", "given"]
-    how: str
+    how: str  # How the bounds were obtained, and for which inputs they hold.
     over: str
-    largest_u: float = np.inf
+    largest_u: float = np.inf  # They hold for |u| up to this.
 
     def __post_init__(self) -> None:
         if not 0 < self.k_1 <= self.k_2 < np.inf:
@@ -160,11 +142,6 @@ def decompose(
     -----
     The bounds hold for all t >= 0: time is a side of the boxes.  What a record declares itself is
     "proved" where branch and bound confirms it, and "given" otherwise, whatever the record says.
-
-    Returns
-    -------
-    Decomposition
-        The split with bounds of k and eps_u, and how they are known.
 
     Raises
     ------

@@ -24,10 +24,8 @@ _ROUNDING = 1e-12  # added to what double precision has summed up
 
 
 def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
-    """Return p_1, ..., p_{n-1} > 0 of s^(n-1) + lambda_1 s^(n-2) + ... = prod_j (s + p_j).
-
-    As balls, from the exact values of the lambdas.
-    """
+    """Return p_1, ..., p_{n-1} > 0 of s^(n-1) + lambda_1 s^(n-2) + ... = prod_j (s + p_j)."""
+    # As balls, from the exact values of the lambdas.
     coefficients = [Fraction(c) for c in (*reversed(lambdas), 1.0)]
     common = math.lcm(*(c.denominator for c in coefficients))
     polynomial = fmpz_poly([int(c * common) for c in coefficients])

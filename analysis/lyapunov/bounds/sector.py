@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import of_type
+from nlctl.attributes import described_record
 from nlctl.errors import DiagramError, ParameterError
 from nlctl.expressions.arrays import Tracer
 from nlctl.expressions.graph import Expr, Graph, Untraceable
@@ -24,25 +24,16 @@ from ...intervals.machine import Readable
 from ...intervals.quotient import slope_in
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="sector")
 class Sector:
     """Sector constants of Assumption 3 over a box.
 
     The paper prints m1 v <= F <= m2 v for v >= 0 and m3 v <= F <= m4 v for v < 0; dividing by
     v < 0 turns the second pair round, so m4 <= F/v <= m3 there.
-
-    Attributes
-    ----------
-    positive, negative : Range or None
-        Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv.  None
-        where the box has no such v.
-    box : Box
-
-    Examples
-    --------
-    See `sector`.
     """
 
+    # Proved range of F/v over the box with v >= 0 and with v < 0; at v = 0 it is dF/dv. None where
+    # the box has no such v.
     positive: Range | None
     negative: Range | None
     box: Box
@@ -123,11 +114,6 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     max_boxes : int, optional
         Limit for each constant.
 
-    Returns
-    -------
-    Sector
-        The constants, each as a proved range.
-
     Raises
     ------
     UnknownNameError
@@ -151,14 +137,8 @@ def sector(plant: Any, box: Box, *, tol: float = 1e-3, max_boxes: int = 50_000) 
     if not tol > 0:
         raise ParameterError(f"sector needs tol > 0, got {tol}")
     box = box.only(*coordinate_names(len(plant.states)), "v")
-    return quotient_range(lambda x, v: f(tuple(x), v), box, tol=tol, max_boxes=max_boxes)
-
-
-def quotient_range(
-    function: Callable[[tuple[Any, ...], Any], Any], box: Box, *, tol: float, max_boxes: int
-) -> Sector:
-    """Prove the range of (q(x, v) - q(x, 0)) / v over a box whose last side is v."""
-    return range_of_quotient(quotient_function(function), box, tol=tol, max_boxes=max_boxes)
+    quotient = quotient_function(lambda x, v: f(tuple(x), v))
+    return range_of_quotient(quotient, box, tol=tol, max_boxes=max_boxes)
 
 
 def quotient_function(
@@ -180,7 +160,7 @@ def quotient_function(
 
 
 def range_of_quotient(gain: Readable, box: Box, *, tol: float, max_boxes: int) -> Sector:
-    """Prove the range of a quotient over a box whose last side is v, see `quotient_range`."""
+    """Prove the range of a quotient over a box whose last side is v."""
     (low, high), rest = box["v"], box.only(*box.names[:-1])
     halves: list[Range | None] = []
     for a, b in ((max(low, 0.0), high), (low, min(high, 0.0))):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from nlctl.attributes import described_record
 from nlctl.diagrams import initial_state, state_names
 from nlctl.errors import ParameterError
 from nlctl.names import find_name
@@ -23,21 +23,9 @@ _INDEX = re.compile(r"\[\d+\]$")
 Sides = tuple[tuple[float, float], ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Starts:
     """A set of initial states of a loop, at t = 0.
-
-    Attributes
-    ----------
-    names : tuple of str
-        All states of the loop, by path.
-    low, high : tuple of float
-        Ends of each; equal where a state starts at one value.
-    level : float or None
-        If it is a number: only states with V(0) <= level belong to the set.
-    kept : tuple of str
-        States of a memory that every run makes consistent with its first input; no bound depends
-        on them.
 
     Examples
     --------
@@ -46,10 +34,13 @@ class Starts:
     plant.x1(0) in [-1, 1], all other states 0, at t = 0
     """
 
-    names: tuple[str, ...]
-    low: tuple[float, ...]
+    names: tuple[str, ...]  # All states of the loop, by path.
+    low: tuple[float, ...]  # Ends of each; equal where a state starts at one value.
     high: tuple[float, ...]
+    # If it is a number: only states with V(0) <= level belong to the set.
     level: float | None = None
+    # States of a memory that every run makes consistent with its first input; no bound depends on
+    # them.
     kept: tuple[str, ...] = ()
 
     @property

@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
+from nlctl.attributes import described_record
 from nlctl.errors import DivergedError, ParameterError
 from nlctl.native import compile as compiled_loop
 from nlctl.response import input_output_response
@@ -35,34 +36,16 @@ class GainCandidate:
     u: float  # max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="design")
 class GainDesign:
-    """The gains that were found, and the proof for them.
+    """The gains that were found, and the proof for them."""
 
-    Attributes
-    ----------
-    gains : dict
-        Values by qualified name, for ``params=`` of a run.
-    certificate : Certificate
-        Proved for these gains.
-    u : float
-        max |u| along the simulation; sampled, not proved.
-    u_limit, horizon : float
-        The limit that was asked for, and the length of the simulation (s).
-    trials : tuple of GainCandidate
-        All gains that the search tried, in order.
-
-    Examples
-    --------
-    See `design`.
-    """
-
-    gains: dict[str, float]
-    certificate: Certificate
-    u: float
-    u_limit: float
+    gains: dict[str, float]  # Values by qualified name, for ``params=`` of a run.
+    certificate: Certificate  # Proved for these gains.
+    u: float  # max |u| along the simulation; sampled, not proved.
+    u_limit: float  # The limit that was asked for, and the length of the simulation (s).
     horizon: float
-    trials: tuple[GainCandidate, ...]
+    trials: tuple[GainCandidate, ...]  # All gains that the search tried, in order.
 
     @property
     def tradeoff(self) -> tuple[GainCandidate, ...]:
@@ -121,11 +104,6 @@ def design(
     max_steps : int, optional
         Steps of the simulation beyond which gains are refused as too stiff.  Without a limit
         the bound could be made as small as one likes: tau and b to 0, gamma to infinity.
-
-    Returns
-    -------
-    GainDesign
-        The gains, their proved bound, and what the run with them shows.
 
     Raises
     ------

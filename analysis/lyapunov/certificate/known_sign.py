@@ -20,6 +20,7 @@ from typing import Any
 
 from flint import arb
 
+from nlctl.attributes import described_record
 from nlctl.controllers import (
     AdaptiveWeights,
     FilteredError,
@@ -80,21 +81,11 @@ class KnownSignLoop(FilteredLoop):
         return len(self.parts.gains.W_hat_0)
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="certify")
 class KnownSignCertificate(FilteredCertificate):
-    """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time.
+    """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time."""
 
-    Attributes
-    ----------
-    alpha_0, alpha_1, V_0 : float
-        The constants of V' <= -alpha_1 V + alpha_0, and V(0).
-
-    Examples
-    --------
-    See `certify`.
-    """
-
-    alpha_0: float
+    alpha_0: float  # The constants of V' <= -alpha_1 V + alpha_0, and V(0).
     alpha_1: float
     V_0: float
 

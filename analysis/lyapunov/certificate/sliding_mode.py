@@ -19,6 +19,7 @@ from typing import Any
 
 from flint import arb
 
+from nlctl.attributes import described_record
 from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
@@ -53,18 +54,9 @@ _PROVED_FOR = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class SlidingModeCertificate(FilteredCertificate):
     """What `certify` proved of sliding mode with a boundary layer: |r| <= C_0, in the end less.
-
-    Attributes
-    ----------
-    errors : tuple of n floats
-        Bounds of |e_1|, ..., |e_n| for all time.
-    ultimate_e : float
-        Bound of limsup |e|.
-    M : float
-        Proved bound of all that K has to dominate.
 
     Examples
     --------
@@ -79,9 +71,9 @@ class SlidingModeCertificate(FilteredCertificate):
     True True 20.0
     """
 
-    errors: tuple[float, ...]
-    ultimate_e: float
-    M: float
+    errors: tuple[float, ...]  # Bounds of |e_1|, ..., |e_n| for all time.
+    ultimate_e: float  # Bound of limsup |e|.
+    M: float  # Proved bound of all that K has to dominate.
 
     def _rows(self) -> Iterator[Row]:
         n, over, sure = len(self.loop.e0), str(self.region.box), self._sure

@@ -16,6 +16,7 @@ import control as ct
 import numpy as np
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.blocks import Block
 from nlctl.controllers import AdaptiveWeights, KnownSignLaw, MonotoneNussbaumLaw
 from nlctl.diagrams import Place, initial_state, interconnect, leaves, overridden
@@ -84,10 +85,8 @@ def declared(place: Place, kind: str) -> list[str]:
 
 
 def read_roles(loop: Any, pieces: Pieces = PIECES, content: str = "") -> Roles:
-    """Find the blocks of a closed loop and check every wire between them.
-
-    `content` is a key of its functions: which ones were read before is remembered.
-    """
+    """Find the blocks of a closed loop and check every wire between them."""
+    # `content` is a key of its functions: which ones were read before is remembered.
     diagram = isinstance(loop, ct.InterconnectedSystem)
     if not diagram or (pieces is PIECES and "r" not in loop.output_labels):
         raise DiagramError("the proof needs a closed loop, a diagram with the output r")
@@ -321,35 +320,19 @@ def check_kind(place: Place, kinds: tuple[type, ...]) -> None:
 DAMPED = (KnownSignLaw, MonotoneNussbaumLaw)  # laws with eta = beta r + s tanh(r s / b)
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="read_parts")
 class Parts:
-    """The records of a loop, by the part that they play in the proof.
+    """The records of a loop, by the part that they play in the proof."""
 
-    Attributes
-    ----------
-    plant, actuator, filtered_error, robust, law : record
-        With the parameters of the run.
-    basis, weights : record or None
-        None where `nlctl.controllers.Zero` replaces the network.
-    roles : Roles
-        Places of the blocks in the diagram.
-    gains : Gains
-        Gains and initial values of the controller.
-
-    Examples
-    --------
-    See `read_parts`.
-    """
-
-    plant: Any
+    plant: Any  # With the parameters of the run.
     actuator: Any
     filtered_error: Any
     robust: Any
     law: Any
-    basis: Any
+    basis: Any  # None where `nlctl.controllers.Zero` replaces the network.
     weights: Any
-    roles: Roles
-    gains: Gains
+    roles: Roles  # Places of the blocks in the diagram.
+    gains: Gains  # Gains and initial values of the controller.
 
     @property
     def paths(self) -> dict[str, str]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -17,23 +18,12 @@ POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="signals_of")
 class Signals:
-    """Signals of `nlctl.analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``.
+    """Signals of `nlctl.analysis.lyapunov.loop.instrumented` over time, ``signals["r"]``."""
 
-    Attributes
-    ----------
-    t : ndarray of shape (m,)
-    values : mapping
-        Arrays of shape (m,) by output name.
-
-    Examples
-    --------
-    See `signals_of`.
-    """
-
-    t: np.ndarray
-    values: Mapping[str, np.ndarray] = field(repr=False)
+    t: np.ndarray  # (m,)
+    values: Mapping[str, np.ndarray] = field(repr=False)  # Arrays of shape (m,) by output name.
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.values:
@@ -76,11 +66,6 @@ def signals_of(response: Any) -> Signals:
     response : control.TimeResponseData
         With several outputs.
 
-    Returns
-    -------
-    Signals
-        Times (s), and samples of shape (m,) by name.
-
     Raises
     ------
     ParameterError
@@ -107,13 +92,10 @@ def signals_of(response: Any) -> Signals:
 
 
 def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
-    r"""Return max \|y\| of a signal whose derivative is known at the samples.
-
-    Between two samples it is the cubic with their values and derivatives, which needs no sign that
-    the signal is smooth: r of (14) bends where the actuator does, and never jumps.
-
-    Shapes: `t, y, rate` (m,).
-    """
+    r"""Return max \|y\| of a signal whose derivative is known at the samples."""
+    # Between two samples it is the cubic with their values and derivatives, which needs no sign
+    # that the signal is smooth: r of (14) bends where the actuator does, and never jumps.
+    # Shapes: `t, y, rate` (m,).
     if not np.all(np.isfinite(y) & np.isfinite(rate)):
         return float(np.max(np.abs(y)))
     if t.size < 2:
@@ -124,37 +106,19 @@ def peak_by_rates(t: np.ndarray, y: np.ndarray, rate: np.ndarray) -> float:
     return float(max(np.max(np.abs(y)), np.max(inside, initial=0.0)))
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="observed")
 class Margin:
-    """Margin of one statement over time; it holds where it is not below -tolerance * scale.
+    """Margin of one statement over time; it holds where it is not below -tolerance * scale."""
 
-    Attributes
-    ----------
-    equation : str
-        Number in the paper, ``"(31)"``.
-    statement : str
-        In corrected form.
-    kind : {"inequality", "equality"}
-        The margin is the larger side less the smaller one; of an equality it is minus the
-        distance between the sides.
-    t, margin : ndarray of shape (m,)
-    scale : float
-        Size of the terms that the statement is made of.
-    tolerance : float
-        Relative to `scale`.
-
-    Examples
-    --------
-    See `observed`.
-    """
-
-    equation: str
-    statement: str
+    equation: str  # Number in the paper, ``"(31)"``.
+    statement: str  # In corrected form.
+    # The margin is the larger side less the smaller one; of an equality it is minus the distance
+    # between the sides.
     kind: Literal["inequality", "equality"]
-    t: np.ndarray = field(repr=False)
+    t: np.ndarray = field(repr=False)  # (m,)
     margin: np.ndarray = field(repr=False)
-    scale: float
-    tolerance: float
+    scale: float  # Size of the terms that the statement is made of.
+    tolerance: float  # Relative to `scale`.
 
     @property
     def least(self) -> float:

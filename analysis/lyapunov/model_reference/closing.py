@@ -192,7 +192,10 @@ def _both(
         place = places[part]
         return values[place.state_offset :][: place.system.nstates or 0]
 
-    P, Q = (_floats(M) for M in (loop.form.P, loop.form.Q))
+    P, Q = (
+        np.array([[float(arb(v)) for v in row] for row in M.tolist()])
+        for M in (loop.form.P, loop.form.Q)
+    )
     W, lam, weights = np.array(match.W, dtype=float), float(match.lam), loop.spec("weights")
     E, E_rate = (of("plant", values) - of("model", values) for values in (x, rates))
     W_hat, W_rate = of("weights", x), of("weights", rates)
@@ -218,7 +221,3 @@ def _delta(match: Matching, t: float, signals: Mapping[str, float]) -> float:
     balls = {name: Ball(arb(float(value))) for name, value in values.items()}
     rest = float(as_ball(match.rest.on(balls)).value.mid())
     return rest + float(match.beta) * (signals["v"] - float(match.k) * signals["u"])
-
-
-def _floats(M: Any) -> np.ndarray:
-    return np.array([[float(arb(v)) for v in row] for row in M.tolist()])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from flint import arb
 
+from nlctl.attributes import described_record
 from nlctl.controllers import AdaptiveWeights, ProjectedWeights
 from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.plants import coordinate_names
@@ -28,57 +29,30 @@ from .region import region
 _ALPHA_0 = "q D^2/(1 - alpha_1/mu) + lambda sigma |W|^2/(2 - alpha_1/(Gamma sigma))"
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="certify")
 class ModelReferenceCertificate(Certificate):
     """What `certify` proved of model reference adaptive control, with every constant.
 
     The function is V = E^T P E + lambda |W_hat - W|^2 / Gamma, E = x - xm.  The bounds hold from
     every initial state of `starts`: of the plant, the model, and the weights.
-
-    Attributes
-    ----------
-    e : float
-        Bound of |e| = |E_1| for all time, from all `starts`.
-    errors : tuple of n floats
-        Bounds of |E_1|, ..., |E_n| for all time.
-    W_error : float
-        Bound of |W_hat - W| for all time.
-    ultimate : float
-        Bound of limsup |e|.
-    ultimate_W_error : float
-        Bound of limsup |W_hat - W|.
-    rms : float
-        Bound of the limit superior of the root mean square of e over [0, t]; it does not depend on
-        Gamma.
-    u_max : float
-        Bound of |u| for all time.
-    V_max, V_0 : float
-        Bound of V for all time, and the largest V(0) of the starts.
-    alpha_0, alpha_1 : float
-        V' <= -alpha_1 V + alpha_0; NaN where the modification gives no such inequality.
-    matching : Matching
-        What the weights are to learn, and what is left.
-    how, end : str
-        How V is bounded, and what is known of it in the end.
-
-    Examples
-    --------
-    See `certify`.
     """
 
-    e: float
-    errors: tuple[float, ...]
-    W_error: float
-    ultimate: float
-    ultimate_W_error: float
+    e: float  # Bound of |e| = |E_1| for all time, from all `starts`.
+    errors: tuple[float, ...]  # Bounds of |E_1|, ..., |E_n| for all time.
+    W_error: float  # Bound of |W_hat - W| for all time.
+    ultimate: float  # Bound of limsup |e|.
+    ultimate_W_error: float  # Bound of limsup |W_hat - W|.
+    # Bound of the limit superior of the root mean square of e over [0, t]; it does not depend on
+    # Gamma.
     rms: float
-    u_max: float
-    V_max: float
+    u_max: float  # Bound of |u| for all time.
+    V_max: float  # Bound of V for all time, and the largest V(0) of the starts.
     V_0: float
+    # V' <= -alpha_1 V + alpha_0; NaN where the modification gives no such inequality.
     alpha_0: float
     alpha_1: float
-    matching: Matching = field(repr=False)
-    how: str
+    matching: Matching = field(repr=False)  # What the weights are to learn, and what is left.
+    how: str  # How V is bounded, and what is known of it in the end.
     end: str
 
     @property

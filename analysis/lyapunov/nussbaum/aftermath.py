@@ -15,7 +15,6 @@ value.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,33 +22,22 @@ import numpy as np
 from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.params import as_numbers
 
 from .property import Antiderivative, GainFunction, Lobe, antiderivative, lobe_around, root
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="aftermath")
 class Aftermath:
-    """Bounds of a burst through one lobe of the wrong sign, and of where zeta rests after it.
+    """Bounds of a burst through one lobe of the wrong sign, and of where zeta rests after it."""
 
-    Attributes
-    ----------
-    wrong, right : Lobe
-        Lobe that feeds r, and the one after it, which stops it.
-    peak : (float, float)
-        Bounds of max \\|r\\|; the upper one is infinite if zeta may cross the second lobe as well.
-    rest : (float, float)
-        Bounds of the zeta at which r^2/2 is spent; infinite as the upper one of `peak`.
-
-    Examples
-    --------
-    See `aftermath`.
-    """
-
-    wrong: Lobe
+    wrong: Lobe  # Lobe that feeds r, and the one after it, which stops it.
     right: Lobe
+    # Bounds of max \|r\|; the upper one is infinite if zeta may cross the second lobe as well.
     peak: tuple[float, float]
+    # Bounds of the zeta at which r^2/2 is spent; infinite as the upper one of `peak`.
     rest: tuple[float, float]
 
     def __str__(self) -> str:

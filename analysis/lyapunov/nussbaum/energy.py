@@ -14,7 +14,6 @@ lasts from below.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,39 +22,28 @@ from scipy.integrate import cumulative_trapezoid
 from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
 from .property import GainFunction, antiderivative, lobes
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="drift")
 class Drift:
-    """Energies that the Nussbaum term moves along a response.
+    """Energies that the Nussbaum term moves along a response."""
 
-    Attributes
-    ----------
-    time, zeta, r : ndarray of shape (m,)
-    phi : ndarray of shape (m,)
-        Integral of N from zeta(0) to zeta(t), which equals the integral of r u over time.
-    gained, lost : ndarray of shape (m,)
-        E_+ and E_-, from the turning points among the samples: an oscillation of zeta between
-        two samples is not seen.
-    mismatch : float
-        Largest distance between `phi` and the integral of r u (trapezoidal rule), over the
-        largest |phi|: how well the samples obey N(zeta) zeta' = r u.
-
-    Examples
-    --------
-    See `drift`.
-    """
-
-    time: np.ndarray
+    time: np.ndarray  # (m,)
     zeta: np.ndarray
     r: np.ndarray
+    # (m,): Integral of N from zeta(0) to zeta(t), which equals the integral of r u over time.
     phi: np.ndarray
+    # (m,): E_+ and E_-, from the turning points among the samples: an oscillation of zeta between
+    # two samples is not seen.
     gained: np.ndarray
     lost: np.ndarray
+    # Largest distance between `phi` and the integral of r u (trapezoidal rule), over the largest
+    # |phi|: how well the samples obey N(zeta) zeta' = r u.
     mismatch: float
 
 
@@ -82,11 +70,6 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
         see zeta turn (10 ms in the paper's examples).
     N : callable, optional
         The Nussbaum function of the law.
-
-    Returns
-    -------
-    Drift
-        zeta, r and the energies E_+ and E_- over time.
 
     Raises
     ------
@@ -125,20 +108,14 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class DriftMargin:
-    """Margin of the inequality at the top of this module; it holds where it is >= 0.
+    """Margin of the inequality at the top of this module; it holds where it is >= 0."""
 
-    Attributes
-    ----------
-    time, values : ndarray of shape (m,)
-    monotone : bool
-        Whether zeta never falls by more than rounding: then V >= 0 alone makes the inequality a
-        bound on the time that a lobe lasts.
-    """
-
-    time: np.ndarray
+    time: np.ndarray  # (m,)
     values: np.ndarray
+    # Whether zeta never falls by more than rounding: then V >= 0 alone makes the inequality a bound
+    # on the time that a lobe lasts.
     monotone: bool
 
     @property
@@ -200,20 +177,12 @@ def drift_margin(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class SafeHorizon:
-    """Time before which zeta cannot have left its lobe.
+    """Time before which zeta cannot have left its lobe."""
 
-    Attributes
-    ----------
-    time : float
-        Seconds; 0 if the inequality excludes nothing.
-    zeta : float
-        End of the lobe, which zeta does not reach before.
-    """
-
-    time: float
-    zeta: float
+    time: float  # Seconds; 0 if the inequality excludes nothing.
+    zeta: float  # End of the lobe, which zeta does not reach before.
 
 
 @as_annotated
@@ -244,11 +213,6 @@ def safe_horizon(
         zeta(0).
     N : callable, optional
         Nussbaum function.
-
-    Returns
-    -------
-    SafeHorizon
-        The time (s), and the end of the lobe.
 
     Raises
     ------

@@ -10,6 +10,7 @@ import control as ct
 import numpy as np
 
 from nlctl import native
+from nlctl.attributes import described_record
 from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
@@ -59,42 +60,24 @@ _STANDSTILL = 1e-5  # s; a burst has no end: a run that gets no further in 2000 
 LONG_RUN_SIGNALS = ("zeta", "e", "r", "u")
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class LongRun:
-    """How a loop behaved over a long time.
+    """How a loop behaved over a long time."""
 
-    Attributes
-    ----------
-    loop : str
-        Name of the diagram.
-    horizon, rtol : float
-        What was asked for (s), and the relative tolerance of the integrator.
-    time : ndarray of shape (m,)
-        In s, up to the time that the run reached; not evenly spaced.
-    signals : mapping
-        zeta, e, r and u over `time`.
-    lobe : Lobe
-        The lobe of the Nussbaum function that zeta starts in.
-    predictions : tuple of SlowDrift
-        Each made from the beginning of the run alone.
-    lost : float or None
-        Time (s) at which the run was given up, because its steps shrank to nothing.
-    again : tuple of two floats or None
-        Relative tolerance and `burst` (s) of a second run, if there was one: what errors that add
-        up over hours make of it.
-    last : tuple of float
-        State of the loop at the end of `time`.
-    """
-
-    loop: str
-    horizon: float
+    loop: str  # Name of the diagram.
+    horizon: float  # What was asked for (s), and the relative tolerance of the integrator.
     rtol: float
+    # (m,): In s, up to the time that the run reached; not evenly spaced.
     time: np.ndarray = field(repr=False)
-    signals: Mapping[str, np.ndarray] = field(repr=False)
-    lobe: Lobe
-    predictions: tuple[SlowDrift, ...]
+    signals: Mapping[str, np.ndarray] = field(repr=False)  # zeta, e, r and u over `time`.
+    lobe: Lobe  # The lobe of the Nussbaum function that zeta starts in.
+    predictions: tuple[SlowDrift, ...]  # Each made from the beginning of the run alone.
+    # Time (s) at which the run was given up, because its steps shrank to nothing.
     lost: float | None
+    # Relative tolerance and `burst` (s) of a second run, if there was one: what errors that add up
+    # over hours make of it.
     again: tuple[float, float] | None = None
+    # State of the loop at the end of `time`.
     last: tuple[float, ...] = field(default=(), repr=False)
 
     @property

@@ -20,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from nlctl import functions
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 
 GainFunction = Callable[[float], float]
@@ -52,33 +53,19 @@ class Lobe:
         return float(np.sign(self.extremum))
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class NussbaumProperty:
-    """What a finite range shows of property (12).
+    """What a finite range shows of property (12)."""
 
-    Attributes
-    ----------
-    end : float
-        The range is [0, end].
-    lobes : tuple of Lobe
-        In order from 0; the last one is cut off by `end`.
-    means : tuple of float
-        (1/s) int_0^s N at the end s of every whole lobe, where the mean is extreme or nearly so.
-    ratios : tuple of float
-        Budget of each whole lobe over that of the one before.
-    type_a : bool
-        Checked: the means of both signs grow, as (12) wants.
-    type_b : bool
-        Checked: so do the integrals of max(N, 0) and max(-N, 0), and at the end of each lobe the
-        integral of its sign over that of the other one.  Gains that vary with time need this
-        stronger type (Z. Chen, Automatica 2019).
-    """
-
-    end: float
-    lobes: tuple[Lobe, ...]
+    end: float  # The range is [0, end].
+    lobes: tuple[Lobe, ...]  # In order from 0; the last one is cut off by `end`.
+    # (1/s) int_0^s N at the end s of every whole lobe, where the mean is extreme or nearly so.
     means: tuple[float, ...]
-    ratios: tuple[float, ...]
-    type_a: bool
+    ratios: tuple[float, ...]  # Budget of each whole lobe over that of the one before.
+    type_a: bool  # Checked: the means of both signs grow, as (12) wants.
+    # Checked: so do the integrals of max(N, 0) and max(-N, 0), and at the end of each lobe the
+    # integral of its sign over that of the other one. Gains that vary with time need this stronger
+    # type (Z. Chen, Automatica 2019).
     type_b: bool
 
     def __str__(self) -> str:
@@ -208,11 +195,6 @@ def nussbaum_property(
         End of the range; it must hold four lobes at least.  By default [0, 9], and twice as long
         again and again until it holds four lobes or N is no longer finite, 1152 at most.  A
         function that has fewer zeros up to there has neither property on it.
-
-    Returns
-    -------
-    NussbaumProperty
-        Means at the ends of the lobes, and whether those of both signs grow.
 
     Raises
     ------

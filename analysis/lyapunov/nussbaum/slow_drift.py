@@ -28,6 +28,7 @@ from scipy.integrate import quad, trapezoid
 from nlctl import functions
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
+from nlctl.attributes import described_record
 from nlctl.diagrams import known_system, state_names
 from nlctl.diagrams.points import OF_RESPONSES, agree, rates_and_outputs
 from nlctl.errors import DiagramError, ParameterError
@@ -88,57 +89,40 @@ class Balance:
         return f"A' = {self.p:.4g} / |N| {'+' if self.q < 0 else '-'} {abs(self.q):.4g}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="slow_drift")
 class SlowDrift:
-    """Where zeta stands in its lobe at the end of a response, and where it drifts.
+    """Where zeta stands in its lobe at the end of a response, and where it drifts."""
 
-    Attributes
-    ----------
-    time, zeta : float
-        End of the response (s), and zeta there.
-    lobe : Lobe
-        The lobe that zeta lies in.
-    spent : float
-        A = int |N| dzeta from the lobe's lower end.
-    window : float
-        Length of a window (s).
-    rates : tuple of float
-        Mean of A' over each window (1/s), the first windows left out.
-    burst, burst_range : float, tuple of float
-        Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
-        reverses before; and the earliest and the latest time when mean rate and dependence on
-        1/|N| are moved by two standard errors each, and the time that is left by 5 % more.  It
-        is meant to hold the burst in nine of ten loops at least, and has done so in simulated ones
-        (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue
-        as they were.
-    balance : Balance
-        The law fitted to all windows.
-    rest, rest_range : float or None, tuple of float or None
-        zeta at which the balance stops the drift, and its range over fits with a part of the
-        windows left out; None if it does not stop in this lobe.
-    peak : float
-        max |r| of the burst, sqrt(2 k G |int N|) over the next lobe.
-    mismatch : float
-        Largest distance between int |N| dzeta and -int r u dt over the response, over the largest
-        of them: how well the samples obey N zeta' = r u.
-
-    Examples
-    --------
-    See `slow_drift`.
-    """
-
-    time: float
+    time: float  # End of the response (s), and zeta there.
     zeta: float
-    lobe: Lobe
-    spent: float
-    window: float
-    rates: tuple[float, ...]
+    lobe: Lobe  # The lobe that zeta lies in.
+    spent: float  # A = int |N| dzeta from the lobe's lower end.
+    window: float  # Length of a window (s).
+    rates: tuple[float, ...]  # Mean of A' over each window (1/s), the first windows left out.
+    # Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
+    # reverses before; and the earliest and the latest time when mean rate and dependence on 1/|N|
+    # are moved by two standard errors each, and the time that is left by 5 % more. It is meant to
+    # hold the burst in nine of ten loops at least, and has done so in simulated ones
+    # (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue as
+    # they were.
     burst: float
+    # Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
+    # reverses before; and the earliest and the latest time when mean rate and dependence on 1/|N|
+    # are moved by two standard errors each, and the time that is left by 5 % more. It is meant to
+    # hold the burst in nine of ten loops at least, and has done so in simulated ones
+    # (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue as
+    # they were.
     burst_range: tuple[float, float]
-    balance: Balance
+    balance: Balance  # The law fitted to all windows.
+    # zeta at which the balance stops the drift, and its range over fits with a part of the windows
+    # left out; None if it does not stop in this lobe.
     rest: float | None
+    # zeta at which the balance stops the drift, and its range over fits with a part of the windows
+    # left out; None if it does not stop in this lobe.
     rest_range: tuple[float, float] | None
-    peak: float
+    peak: float  # max |r| of the burst, sqrt(2 k G |int N|) over the next lobe.
+    # Largest distance between int |N| dzeta and -int r u dt over the response, over the largest of
+    # them: how well the samples obey N zeta' = r u.
     mismatch: float
 
     @property
@@ -257,11 +241,6 @@ def slow_drift(
         Windows at the beginning that are left out, since the loop still settles.
     kG : float, optional
         Input gain for the peak of a burst.
-
-    Returns
-    -------
-    SlowDrift
-        Rates per window, and what they predict.
 
     Raises
     ------

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.host.notebook import table_html
 
@@ -22,24 +23,9 @@ Provenance = Literal["proved", "computed", "sampled", "given", "undecided"]
 Row = tuple[str, Any, str, Any, str, str]  # the fields of a Constant in their order
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Constant:
     """A constant of the proof.
-
-    Attributes
-    ----------
-    symbol : str
-        As in the paper, ``"delta*"``.
-    value : float
-    unit : str
-    provenance : {"proved", "computed", "sampled", "given", "undecided"}
-        "proved": by interval branch and bound.  "computed": in closed form, from constants that
-        are themselves in the table.  "sampled": from trajectories or a grid.  "given": a choice.
-        "undecided": branch and bound found no bound, and the value is infinite.
-    how : str
-        Method, or formula.
-    over : str
-        Set for which it holds.
 
     Examples
     --------
@@ -49,12 +35,15 @@ class Constant:
     tau 0.2 given
     """
 
-    symbol: str
+    symbol: str  # As in the paper, ``"delta*"``.
     value: float
     unit: str
+    # "proved": by interval branch and bound. "computed": in closed form, from constants that are
+    # themselves in the table. "sampled": from trajectories or a grid. "given": a choice.
+    # "undecided": branch and bound found no bound, and the value is infinite.
     provenance: Provenance
-    how: str
-    over: str
+    how: str  # Method, or formula.
+    over: str  # Set for which it holds.
 
 
 def constants_of_rows(rows: Iterable[Row]) -> tuple[Constant, ...]:
@@ -76,31 +65,14 @@ def per_second(power: int) -> str:
     return "1" if power == 0 else "1/s" if power == 1 else f"1/s^{power}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="certify")
 class ProofResult:
-    """What every proof finds.
+    """What every proof finds."""
 
-    Attributes
-    ----------
-    holds : bool
-        Whether it is proved; a statement that is not is not refuted by that.
-    reason : str
-        Why it holds, or what is missing.
-    boxes : int
-        Boxes that were examined.
-    arithmetic : str
-        What proved it.
-    seconds : float
-
-    Examples
-    --------
-    See `certify`.
-    """
-
-    holds: bool
-    reason: str
-    boxes: int
-    arithmetic: str
+    holds: bool  # Whether it is proved; a statement that is not is not refuted by that.
+    reason: str  # Why it holds, or what is missing.
+    boxes: int  # Boxes that were examined.
+    arithmetic: str  # What proved it.
     seconds: float = field(repr=False, compare=False)
 
     @property
@@ -124,47 +96,25 @@ class ProofResult:
         return f"{self.claim}: {self.reason}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="certify")
 class Certificate(ProofResult):
     """What `certify` proved: bounds of a loop for all time, from a set of starts.
 
     Each kind of proof adds its own constants and bounds; these are infinite if nothing is proved.
-
-    Attributes
-    ----------
-    kind : str
-        The kind of proof, as its file and the recheck call it.
-    name : str
-        Of the loop.
-    starts : Starts
-        The initial states that the bounds hold for.
-    disturbance : float
-        Bound of what external inputs add to the plant's v.
-    split : Decomposition
-        Of the actuator.
-    region : Demand or Region
-        The box of the last step, and what was proved on it.
-    iterations : tuple of float
-        Bounds, each of what the box of the one before implies: the iteration that closed or was
-        given up.
-    params : mapping
-        Parameters of the proof that differ from those of the loop.
-    loop_facts : mapping
-        What the loop consists of, see `nlctl.analysis.loop_record`.
-
-    Examples
-    --------
-    See `certify`.
     """
 
-    kind: str
-    name: str
-    starts: Starts = field(repr=False)
-    disturbance: float
-    split: Decomposition = field(repr=False)
-    region: Any = field(repr=False)
+    kind: str  # The kind of proof, as its file and the recheck call it.
+    name: str  # Of the loop.
+    starts: Starts = field(repr=False)  # The initial states that the bounds hold for.
+    disturbance: float  # Bound of what external inputs add to the plant's v.
+    split: Decomposition = field(repr=False)  # Of the actuator.
+    region: Any = field(repr=False)  # The box of the last step, and what was proved on it.
+    # Bounds, each of what the box of the one before implies: the iteration that closed or was given
+    # up.
     iterations: tuple[float, ...]
+    # Parameters of the proof that differ from those of the loop.
     params: Mapping[str, Any] = field(repr=False)
+    # What the loop consists of, see `nlctl.analysis.loop_record`.
     loop_facts: Mapping[str, Mapping[str, str]] = field(repr=False)
 
     def _bound(self) -> str:

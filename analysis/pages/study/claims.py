@@ -51,10 +51,8 @@ def refusal(result: Result) -> str:
 
 
 def claims(result: Result, prefix: str = "") -> list[Claim]:
-    """Return what the study claims, with what was found.
-
-    What is shown was sampled, never proved.
-    """
+    """Return what the study claims, with what was found."""
+    # What is shown was sampled, never proved.
     asked = result.asked
     return [
         Claim(

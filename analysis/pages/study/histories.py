@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nlctl.attributes import described_record
 from nlctl.native import Status
 
 from ... import metrics
@@ -24,38 +25,23 @@ IN_UNIT = (  # metrics whose unit is that of their signal
 )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Histories:
-    """Signals of some rows.
+    """Signals of some rows."""
 
-    Attributes
-    ----------
-    time : ndarray of shape (m,)
-        In s.
-    signals : dict of ndarray of shape (rows, m)
-        What the spec looks at, NaN after the end of a run.
-    nominal, worst : dict of ndarray of shape (m,)
-        The same of the nominal values, and of the row with the lowest margin that is known.
-    margin : float
-        That margin.
-    ended : int
-        How many of the rows did not reach their end.
-    limits : mapping
-        By signal what the spec always requires: value, and from when to when (s).
-    units : mapping
-        By signal, as far as a metric of the study has a unit.
-    groups : tuple of str
-        Options of each row, where the study chooses between some; else empty.
-    """
-
-    time: np.ndarray
+    time: np.ndarray  # (m,): In s.
+    # (rows, m): What the spec looks at, NaN after the end of a run.
     signals: Mapping[str, np.ndarray]
+    # (m,): The same of the nominal values, and of the row with the lowest margin that is known.
     nominal: Mapping[str, np.ndarray]
     worst: Mapping[str, np.ndarray]
-    margin: float
-    ended: int
+    margin: float  # That margin.
+    ended: int  # How many of the rows did not reach their end.
+    # By signal what the spec always requires: value, and from when to when (s).
     limits: Mapping[str, Sequence[Limit]] = field(default_factory=dict)
+    # By signal, as far as a metric of the study has a unit.
     units: Mapping[str, str] = field(default_factory=dict)
+    # Options of each row, where the study chooses between some; else empty.
     groups: tuple[str, ...] = ()
 
 

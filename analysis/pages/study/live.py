@@ -27,11 +27,9 @@ def with_study_live(
     kept: Histories | None,
     names: Sequence[str] = (),
 ) -> Report:
-    """Return the report of a study with its nominal loop, which the page runs.
-
-    Its sliders are what the study varies, within its box; its limits, bands and requirements those
-    of the study.
-    """
+    """Return the report of a study with its nominal loop, which the page runs."""
+    # Its sliders are what the study varies, within its box; its limits, bands and requirements
+    # those of the study.
     experiment = prepared.experiment
     space = experiment.space
     diagram: Any = loop_of(prepared).diagram

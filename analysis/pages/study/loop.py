@@ -6,11 +6,12 @@ import functools
 import hashlib
 import inspect
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import control as ct
+
+from nlctl.attributes import described_record
 
 from ...report.document import Item, Paragraph, Section
 from ...robustness.runs.experiment import Prepared
@@ -19,47 +20,24 @@ from ..diagram import diagram_sections
 from . import text as text
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class StudyLoop:
-    """The loop of a study, with nominal values.
-
-    Attributes
-    ----------
-    diagram : control.InputOutputSystem
-    maker : str
-        The function that makes it, as ``module:name``.
-    file : str
-        Name of the file that the function stands in; empty if there is none.
-    source : str
-        What is in that file; empty for a loop that comes with nlctl.
-    sha256 : str
-        Of the file.
-    """
+    """The loop of a study, with nominal values."""
 
     diagram: ct.InputOutputSystem
-    maker: str
-    file: str = ""
-    source: str = ""
-    sha256: str = ""
+    maker: str  # The function that makes it, as ``module:name``.
+    file: str = ""  # Name of the file that the function stands in; empty if there is none.
+    source: str = ""  # What is in that file; empty for a loop that comes with nlctl.
+    sha256: str = ""  # Of the file.
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Published:
-    """Where a loop was published, and what its authors print of it.
+    """Where a loop was published, and what its authors print of it."""
 
-    Attributes
-    ----------
-    title : str
-        In a line, with authors and year.
-    citation : str
-        For the list of references.
-    items : tuple of Item
-        Equations as printed.
-    """
-
-    title: str
-    citation: str
-    items: tuple[Item, ...] = ()
+    title: str  # In a line, with authors and year.
+    citation: str  # For the list of references.
+    items: tuple[Item, ...] = ()  # Equations as printed.
 
 
 def loop_of(prepared: Prepared) -> StudyLoop:

@@ -232,10 +232,8 @@ def _title(finding: Finding, result: Result) -> str:
 
 
 def _findings(result: Result, prefix: str) -> list[Section]:
-    """Return a section for every other analysis, in the order of `KINDS`, then one's own.
-
-    Those without an answer come last, with the sentence that says why.
-    """
+    """Return a section for every other analysis, in the order of `KINDS`, then one's own."""
+    # Those without an answer come last, with the sentence that says why.
     asked = result.asked
     places = {kind: place for place, kind in enumerate(KINDS)}
     others = [f for f in _answered(result) if not asked[f.key].definition.is_statement]
@@ -284,10 +282,8 @@ def numbers(result: Result) -> dict[str, Any]:
 
 
 def data_files(folder: Path) -> dict[str, str]:
-    """Return the files of a run that are the same whenever it is run, with their SHA-256.
-
-    The chunks of the rows hold wall times: their hash without them is in the provenance.
-    """
+    """Return the files of a run that are the same whenever it is run, with their SHA-256."""
+    # The chunks of the rows hold wall times: their hash without them is in the provenance.
     paths = [folder / "study.toml", folder / "results.json", *sorted(folder.glob("*/*.parquet"))]
     return {
         path.relative_to(folder).as_posix(): file_hashes([path])[path.name]

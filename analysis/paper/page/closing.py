@@ -107,14 +107,10 @@ def _limits(runs: _Runs) -> Section:
             Paragraph(
                 text="The tracking error does not tend to zero in these runs: it stays at about "
                 f"{runs['1'].metrics['tail_max_e']:.2g} and {runs['2'].metrics['tail_max_e']:.2g} "
-                f"for a reference that reaches {_reach(runs['1']):.2g}."
+                f"for a reference that reaches {np.max(np.abs(runs['1'].signals['yd'])):.2g}."
             ),
         ],
     )
-
-
-def _reach(run: CaseRun) -> float:
-    return float(np.max(np.abs(run.signals["yd"])))
 
 
 def _drift(run: CaseRun) -> float:

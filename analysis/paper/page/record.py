@@ -6,10 +6,30 @@ import math
 from collections.abc import Callable
 
 from nlctl import paper
+from nlctl.faults import NEVER, Fault, with_faults
 
 from ...report.document import History, Paragraph
-from ...reproductions.paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part, Statement
-from .. import CASES, HORIZON, METRICS, TAIL, CaseRun, Check, Expectation, expectations, run_all
+from ...reproductions.paper import (
+    FoundNumber,
+    MovedLoop,
+    Paper,
+    PaperFigure,
+    PaperRuns,
+    Part,
+    Statement,
+)
+from .. import (
+    BOUND,
+    CASES,
+    HORIZON,
+    METRICS,
+    TAIL,
+    CaseRun,
+    Check,
+    Expectation,
+    expectations,
+    run_all,
+)
 from .. import figures as histories
 from . import text as text
 
@@ -42,6 +62,10 @@ _PLOTS = (
         r"Norm of the weights \(\hat W\), and estimate \(\hat\delta\) of the robust term.",
     ),
 )
+_MOVED = {  # what |u| stays below without a fault, and sliders of the actuator
+    1: (15.0, ("actuator.b_r", "actuator.b_l", "plant.p1=-1:1")),
+    2: (5.0, ("actuator.c_r", "actuator.c_l", "plant.a")),
+}
 _SHOWN = ("tracking", "input")  # the other figures are folded
 
 
@@ -80,6 +104,24 @@ def _part(number: int) -> Part:
         more="The other signals over time, and the actuator's characteristic",
         parameters=text.PRINTED[number],
         items=lambda runs: [_interactive(number, runs[str(number)])],
+        moved=_moved(number),
+    )
+
+
+def _moved(number: int) -> MovedLoop:
+    """Return an example whose actuator may lose nine tenths of its gain."""
+    (most, sliders), make = _MOVED[number], paper.EXAMPLES[f"example_{number}"]
+    return MovedLoop(
+        make=lambda: with_faults(make(), Fault("actuator.v", "gain", 0.1, at=NEVER)),
+        call=f"nlctl.with_faults(nlctl.paper.example_{number}(), "
+        'nlctl.Fault("actuator.v", "gain", 0.1, at=nlctl.faults.NEVER))',
+        until=HORIZON,
+        signals=(["yd", "y"], "e", "u", "zeta"),
+        names=("fault_actuator_v", "plant.x1(0)", "controller.law.beta", *sliders),
+        requirements=(
+            (f"always from {TAIL:g} s on |e| <= {BOUND:g}", "the claim"),
+            (f"always |u| <= {most:g}", "ours: the paper bounds no input"),
+        ),
     )
 
 

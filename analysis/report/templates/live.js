@@ -37,6 +37,13 @@ const ticksOf = ([low, high]) => {
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, k) => (first + k) * step);
 };
 
+// The level of the heading under which an element stands.
+const levelAbove = (element) => {
+  const before = [...document.querySelectorAll("h1, h2, h3, h4, h5")]
+    .filter((each) => each.compareDocumentPosition(element) & Node.DOCUMENT_POSITION_FOLLOWING);
+  return Number(before.at(-1)?.tagName[1] ?? 1);
+};
+
 // Margins of requirements over time; positive where they hold.
 const least = (t, values, start, end, until) => {
   const found = new Float64Array(t.length).fill(Infinity);
@@ -120,6 +127,21 @@ const rangeOf = (curves, reported, limits, bands) => {
   return [low - pad, high + pad];
 };
 
+// One of the modules of a page, which are packed in turn, piece by piece.
+const moduleOf = async ({ data, of, sizes, piece, place }) => {
+  const other = of && JSON.parse(document.querySelector(`#${CSS.escape(of)} > script`).textContent);
+  const content = await unpacked(data ?? other.module.data);
+  const module = new Uint8Array(sizes[place]);
+  for (let at = 0, from = 0; at < Math.max(...sizes); at += piece) {
+    sizes.forEach((size, k) => {
+      const count = Math.min(Math.max(size - at, 0), piece);
+      if (k === place) module.set(content.subarray(from, from + count), at);
+      from += count;
+    });
+  }
+  return module;
+};
+
 class LivePart {
   constructor(figure) {
     this.figure = figure;
@@ -131,7 +153,7 @@ class LivePart {
 
   async begin() {
     const { module, facts } = this.content;
-    this.engine = await engineOf(await unpacked(module), facts);
+    this.engine = await engineOf(await moduleOf(module), facts);
     this.figure.hidden = false;
     this.build();
     await this.run();
@@ -146,14 +168,14 @@ class LivePart {
     const caption = figure.querySelector("figcaption");
     const body = put("div", "", null);
     caption.before(body);
-    const heading = put("h3", "", body, "Move it");
+    const heading = put(`h${levelAbove(figure) + 1}`, "heading", body, "Move it");
     heading.id = `${figure.id}-heading`;
     figure.setAttribute("aria-labelledby", heading.id);
     const knobs = put("form", "knobs", body);
     knobs.addEventListener("submit", (event) => event.preventDefault());
     this.knobs = content.handles.map((handle, k) => this.knob(handle, k, knobs));
     const tools = put("div", "tools", body);
-    this.reset = put("button", "", tools, "As reported");
+    this.reset = put("button", "", tools, content.origin[0].toUpperCase() + content.origin.slice(1));
     this.reset.addEventListener("click", () => {
       this.values = content.handles.map((handle) => handle.value);
       this.on = content.handles.map((handle) => Boolean(handle.is_on));
@@ -261,12 +283,17 @@ class LivePart {
       const inputs = u.map(([, value, name]) => ` --input ${quoted(`${name}=${value}`)}`);
       return command.shell + set.join("") + inputs.join("");
     }
-    const pairs = (list) => list.map(([, value, name]) => `"${name.replace(/\(0\)$/, "")}": ${value}`).join(", ");
-    const base = Object.entries(command.params).filter(([name]) => !p.some(([, , other]) => other === name));
-    const params = pairs([...base.map(([name, value]) => [0, value, name]), ...p]);
-    const parts = [`loop, ${command.python}`];
-    if (u.length) parts.push(`inputs=[...]  # ${pairs(u)}\n`);
-    if (x.length) parts.push(`initial_state={${pairs(x)}}`);
+    const pairs = (base, moved) => {
+      const all = { ...base };
+      for (const [, value, name] of moved) all[name.replace(/\(0\)$/, "")] = value;
+      return Object.entries(all).map(([name, value]) => `"${name}": ${value}`).join(", ");
+    };
+    const inputs = command.inputs.map((value, k) => value ?? (command.inputs.length > 1 ? `u[${k}]` : "u"));
+    for (const [place, value] of u) inputs[place] = value;
+    const parts = [command.python, command.times];
+    const [params, states] = [pairs(command.params, p), pairs(command.states, x)];
+    if (inputs.some((value) => value !== 0)) parts.push(inputs.length > 1 ? `[${inputs.join(", ")}]` : inputs[0]);
+    if (states) parts.push(`initial_state={${states}}`);
     if (params) parts.push(`params={${params}}`);
     return `nlctl.input_output_response(${parts.join(", ")})`;
   }

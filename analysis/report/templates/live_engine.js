@@ -48,7 +48,7 @@ const engineOf = async (bytes, facts) => {
     new DataView(memory, at("task")).setFloat64(facts.table[name], value, true);
 
   // Functions of time alone: when their conditions switch, and how far a step may lead.
-  const known = { key: "", jumps: null, reach: null, longest: 0 };
+  const known = { key: null, jumps: null, reach: null, longest: 0 };
   const s = numbers("live.s", facts.values);
   const atTime = (t) => {
     numbers("live.t", 1)[0] = t;

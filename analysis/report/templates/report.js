@@ -1,12 +1,4 @@
-"use strict";
 // Without this script everything is readable; with it tables sort and filter, figures enlarge.
-const make = (tag, text, parent) => {
-  const element = document.createElement(tag);
-  element.textContent = text;
-  parent?.append(element);
-  return element;
-};
-
 // A cell's number if it has one, else its text; numbers first, NaN and empty cells last.
 const keyOf = (row, column) => {
   const cell = row.cells[column];

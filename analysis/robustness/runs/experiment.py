@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,6 +14,7 @@ import pandas as pd
 from nlctl import native
 from nlctl.annotations import as_annotated
 from nlctl.arguments import ATOL, RTOL, a_function, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
@@ -30,29 +31,9 @@ from ..uncertainty.space import Space, arguments, checked_rows
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="prepare")
 class Experiment:
     """A loop, what is uncertain in it, and what is asked of it.
-
-    Attributes
-    ----------
-    space : Space
-    build : callable
-        Returns the diagram, with one keyword per choice of the space, such as
-        `nlctl.paper.example_1`.
-    spec : Spec
-    timepts : ndarray of shape (m,)
-        Times in s at which signals are sampled, from 0; requirements and metrics see these
-        samples.
-    metrics : tuple of Metric
-    inputs : array_like or float
-        Inputs of the diagram, the same for all rows.
-    rtol, atol : float
-        Tolerances of the integrator.
-    max_steps : int
-        A run that needs more steps has failed.
-    method : str
-        As in `nlctl.input_output_response`.
 
     Raises
     ------
@@ -61,22 +42,22 @@ class Experiment:
         quantities have the same name, or a tolerance or a number of steps is not positive.
     UnknownNameError
         If there is no such method.
-
-    Examples
-    --------
-    See `prepare`.
     """
 
     space: Space
+    # Returns the diagram, with one keyword per choice of the space, such as
+    # `nlctl.paper.example_1`.
     build: Callable[..., ct.InputOutputSystem]
     spec: Spec
+    # (m,): Times in s at which signals are sampled, from 0; requirements and metrics see these
+    # samples.
     timepts: np.ndarray
     metrics: tuple[Metric, ...] = ()
-    inputs: Any = 0.0
-    rtol: float = RTOL
+    inputs: Any = 0.0  # Inputs of the diagram, the same for all rows.
+    rtol: float = RTOL  # Tolerances of the integrator.
     atol: float = ATOL
-    max_steps: int = 1_000_000
-    method: str = "auto"
+    max_steps: int = 1_000_000  # A run that needs more steps has failed.
+    method: str = "auto"  # As in `nlctl.input_output_response`.
 
     def __post_init__(self) -> None:
         who = "an experiment"
@@ -114,23 +95,13 @@ class Experiment:
         return ["status", "time", "steps", *keys, "spec"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="prepare")
 class Prepared:
-    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes.
+    """An experiment whose diagrams are machine code; made by `prepare`, travels to processes."""
 
-    Attributes
-    ----------
-    experiment : Experiment
-        Its space has full names, and units and nominal values from the nominal diagram.
-    loops : tuple of (labels, Compiled)
-        One for each combination of the choices.
-
-    Examples
-    --------
-    See `prepare`.
-    """
-
+    # Its space has full names, and units and nominal values from the nominal diagram.
     experiment: Experiment
+    # One for each combination of the choices.
     loops: tuple[tuple[Mapping[str, str], Compiled], ...]
 
 
@@ -142,11 +113,6 @@ def prepare(experiment: Experiment) -> Prepared:
     ----------
     experiment : Experiment
         A space, what builds the loop, times, inputs and a spec.
-
-    Returns
-    -------
-    Prepared
-        With every diagram as machine code.
 
     Raises
     ------

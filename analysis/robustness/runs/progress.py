@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from bisect import insort
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
+from nlctl.attributes import described_record
 
 from ..statistics.guarantee import check_iid, checked_confidence
 from ..statistics.sequential import SequentialTest, decision, sequence_bounds
@@ -18,22 +18,9 @@ from ..stl.spec import violates
 from ..uncertainty.design import Design
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Progress:
     """How far a sweep is.
-
-    Attributes
-    ----------
-    done, total : int
-        Rows that are finished, and all rows of the design.
-    runs, violations : int
-        Rows from the first one on without a gap whose margins are known, and how many of them
-        violate the spec.  (Which rows end first may depend on whether they violate, so that rows
-        beyond a gap do not count yet.)
-    rate : float
-        Rows per second since the sweep was started or resumed.
-    is_iid : bool
-        Whether the rows are independent draws.
 
     Examples
     --------
@@ -48,12 +35,15 @@ class Progress:
     (0.0, True)
     """
 
-    done: int
+    done: int  # Rows that are finished, and all rows of the design.
     total: int
+    # Rows from the first one on without a gap whose margins are known, and how many of them violate
+    # the spec. (Which rows end first may depend on whether they violate, so that rows beyond a gap
+    # do not count yet.)
     runs: int
     violations: int
-    rate: float
-    is_iid: bool
+    rate: float  # Rows per second since the sweep was started or resumed.
+    is_iid: bool  # Whether the rows are independent draws.
 
     @property
     def remaining(self) -> float:

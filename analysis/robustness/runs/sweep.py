@@ -18,6 +18,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -39,39 +40,20 @@ def _check_columns(names: Iterable[str], columns: list[str]) -> None:
             raise unknown("column", name, columns, "of the sweep")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="sweep")
 class Sweep:
-    """Rows of a design that were run.
+    """Rows of a design that were run."""
 
-    Attributes
-    ----------
-    design : Design or None
-        None where a folder was read without it.
-    folder : Path or None
-        Where the rows are kept.
-    done : int
-        Number of rows that are finished.
-    complete : bool
-        Whether these are all rows of the design.
-    decided : object
-        What ended the sweep early, see `sweep`; None if nothing did.
-    interrupted : bool
-        Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
-    notes : tuple of str
-        What the user has to know: damaged chunks that were run again, lost workers.
-
-    Examples
-    --------
-    See `sweep`.
-    """
-
-    design: Design | None = field(repr=False)
-    folder: Path | None
-    done: int
-    complete: bool
-    decided: Any = None
+    design: Design | None = field(repr=False)  # None where a folder was read without it.
+    folder: Path | None  # Where the rows are kept.
+    done: int  # Number of rows that are finished.
+    complete: bool  # Whether these are all rows of the design.
+    decided: Any = None  # What ended the sweep early, see `sweep`; None if nothing did.
+    # Whether Ctrl-C was pressed; in the last chunk that leaves it complete.
     interrupted: bool = False
+    # What the user has to know: damaged chunks that were run again, lost workers.
     notes: tuple[str, ...] = ()
+    # The rows of a sweep that is kept in no folder.
     held: pd.DataFrame | None = field(default=None, repr=False)
 
     @property
@@ -119,11 +101,6 @@ def load(folder: str | os.PathLike[str], design: Design | None = None) -> Sweep:
         Of a sweep.
     design : Design, optional
         Of the sweep, for what asks for it.
-
-    Returns
-    -------
-    Sweep
-        With the rows that are finished.
 
     Raises
     ------
@@ -236,7 +213,8 @@ def sweep(
     below True False
     """
     _check(prepared, design, executor, threads, resume and folder is None)
-    chunk = _chunk_size(design) if chunk is None else integer("a sweep", "chunk", chunk, 1)
+    fitting = min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
+    chunk = fitting if chunk is None else integer("a sweep", "chunk", chunk, 1)
     tally, frames, notes = Tally(design), [], []
     keep: Callable[[pd.DataFrame], object] = frames.append
     with ExitStack() as stack:
@@ -293,10 +271,6 @@ def _check(
             raise unknown("quantity", name, names, "in the design: take prepared.experiment.space")
     if names != given:
         raise ParameterError(f"the experiment's space has {names}, the design's has {given}")
-
-
-def _chunk_size(design: Design) -> int:
-    return min(_LARGEST, _STEP * math.ceil(design.size / (FEWEST * _STEP)))
 
 
 def _continued(store: ChunkStore, tally: Tally) -> list[str]:

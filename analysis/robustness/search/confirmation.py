@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,6 +12,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
@@ -30,27 +31,15 @@ _BURST = (Status.DIVERGED.name, Status.STEP_TOO_SMALL.name)
 _SAME = 0.01  # bursts are the same if their times differ by at most this part of the later one
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="confirm")
 class Confirmation:
-    """Whether a violation stays one in other integrations; printed, it is a sentence.
-
-    Attributes
-    ----------
-    row : dict
-    replays : pandas.DataFrame
-        One row per replay: engine, method, rtol, atol, status, time (s) reached and margin.  The
-        first is as in the study.
-    reason : str
-        Why it is not confirmed; empty if it is.
-
-    Examples
-    --------
-    See `confirm`.
-    """
+    """Whether a violation stays one in other integrations; printed, it is a sentence."""
 
     row: Mapping[str, Any]
+    # One row per replay: engine, method, rtol, atol, status, time (s) reached and margin. The first
+    # is as in the study.
     replays: pd.DataFrame
-    reason: str
+    reason: str  # Why it is not confirmed; empty if it is.
 
     @property
     def is_confirmed(self) -> bool:
@@ -91,11 +80,6 @@ def confirm(
     python_control : bool, optional
         Also run it in python-control, at the tighter tolerances: another engine, and other code of
         the diagram.
-
-    Returns
-    -------
-    Confirmation
-        Each replay with its margin, and why the violation is not confirmed, if it is not.
 
     Raises
     ------

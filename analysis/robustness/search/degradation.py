@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, integer, of_type, vector
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 
 from ..statistics.guarantee import Violation, checked_confidence, violation_probability
@@ -18,33 +18,15 @@ from ..uncertainty.space import Space, scaled
 from .evaluation import Evaluate, evaluated
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="degradation_curve")
 class Degradation:
-    """Statements about the probability of a violation at several sizes of the uncertainty.
+    """Statements about the probability of a violation at several sizes of the uncertainty."""
 
-    Attributes
-    ----------
-    factors : tuple of float
-        All deviations from the nominal values are multiplied by these.
-    statements : tuple of Violation
-        One for each factor, with its interval and assumptions.
-    margins : tuple of ndarray of shape (runs,)
-        Of the same points of the unit cube at each factor.
-    confidence : float
-        That an interval holds: of each by itself, or of all together.
-    is_simultaneous : bool
-        Which of the two.
-
-    Examples
-    --------
-    See `degradation_curve`.
-    """
-
-    factors: tuple[float, ...]
-    statements: tuple[Violation, ...]
-    margins: tuple[np.ndarray, ...]
-    confidence: float
-    is_simultaneous: bool
+    factors: tuple[float, ...]  # All deviations from the nominal values are multiplied by these.
+    statements: tuple[Violation, ...]  # One for each factor, with its interval and assumptions.
+    margins: tuple[np.ndarray, ...]  # (runs,): Of the same points of the unit cube at each factor.
+    confidence: float  # That an interval holds: of each by itself, or of all together.
+    is_simultaneous: bool  # Which of the two.
 
     @property
     def table(self) -> pd.DataFrame:
@@ -101,11 +83,6 @@ def degradation_curve(
         By default each interval holds with this confidence by itself, and of many intervals some
         may miss.  True makes all of them hold together with at least this confidence, by widening
         each to 1 - (1 - confidence) / (number of factors) (Bonferroni).
-
-    Returns
-    -------
-    Degradation
-        Rate and bounds of the probability at each factor.
 
     Raises
     ------

@@ -45,13 +45,11 @@ def search_with_derivatives(
 
 
 def test_signals(space: Space) -> np.ndarray:
-    """Return points of the unit cube: signals that an engineer tries first.
-
-    Quantities ``name[0]``, ``name[1]``, ... are the pieces of one signal; what has no pieces is in
-    the middle.  All signals alternate between their ends; all step up halfway; all are constant
-    at an end, at first at different ones, and from one to the next only one of them changes; all
-    are in the middle; all step down halfway.
-    """
+    """Return points of the unit cube: signals that an engineer tries first."""
+    # Quantities ``name[0]``, ``name[1]``, ... are the pieces of one signal; what has no pieces is
+    # in the middle. All signals alternate between their ends; all step up halfway; all are constant
+    # at an end, at first at different ones, and from one to the next only one of them changes; all
+    # are in the middle; all step down halfway.
     quantities = [q.name for q in space.quantities]
     signals: dict[str, list[int]] = {}
     for place, name in enumerate(quantities):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.spatial import Delaunay
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -27,36 +27,21 @@ _WORK = 40  # what a point of the first grid takes next to its row, in numbers
 NEW = 5  # points that the refinement of a cell adds at most
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="failure_map")
 class FailureMap:
-    """Margins over the plane of two quantities.
+    """Margins over the plane of two quantities."""
 
-    Attributes
-    ----------
-    x, y : str
-        Names of the quantities.
-    table : pandas.DataFrame
-        One row per point: the columns of the space, ``spec`` and the round in which it was added.
-        Points were chosen by looking at earlier ones, so their failing share is not a probability.
-    triangles : ndarray of int, shape (k, 3)
-        Rows of the table that form a triangulation of the box, for `matplotlib.pyplot.tricontour`
-        and the like.
-    cell : tuple of 2 floats
-        Sides of the cells at the boundary: how sharp it is, where cells were fine enough to see it.
-    is_finished : bool
-        False if `most` ended the refinement.
-
-    Examples
-    --------
-    See `failure_map`.
-    """
-
-    x: str
+    x: str  # Names of the quantities.
     y: str
+    # One row per point: the columns of the space, ``spec`` and the round in which it was added.
+    # Points were chosen by looking at earlier ones, so their failing share is not a probability.
     table: pd.DataFrame
+    # (k, 3): Rows of the table that form a triangulation of the box, for
+    # `matplotlib.pyplot.tricontour` and the like.
     triangles: np.ndarray
+    # Sides of the cells at the boundary: how sharp it is, where cells were fine enough to see it.
     cell: tuple[float, float]
-    is_finished: bool
+    is_finished: bool  # False if `most` ended the refinement.
 
 
 @as_annotated
@@ -94,11 +79,6 @@ def failure_map(
         How often a cell is divided at most.
     most : int, optional
         Largest number of runs; the first grid always runs.
-
-    Returns
-    -------
-    FailureMap
-        Points with their margins, and the triangles between them.
 
     Raises
     ------

@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
+from nlctl.attributes import described_record
+
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
 
@@ -26,22 +28,9 @@ _NESTED = 60  # arguments of a largest value of windows that are followed
 _TIMES = 400  # samples that are examined
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class FirstOrder:
     """Signals of a row, and their derivatives.
-
-    Attributes
-    ----------
-    t : ndarray of shape (m,)
-        Times (s).
-    signals : mapping
-        For each name samples of shape (m,).
-    derivatives : mapping
-        For each name an array of shape (m, d), by the quantities of the space in units of their
-        boxes.
-    requirements : tuple of Requirement
-    reason : str
-        Why there are none, or none up to the end; empty if there are.
 
     Examples
     --------
@@ -60,11 +49,13 @@ class FirstOrder:
     [0.4 0.3] -0.6
     """
 
-    t: np.ndarray
-    signals: Mapping[str, np.ndarray]
+    t: np.ndarray  # (m,): Times (s).
+    signals: Mapping[str, np.ndarray]  # For each name samples of shape (m,).
+    # For each name an array of shape (m, d), by the quantities of the space in units of their
+    # boxes.
     derivatives: Mapping[str, np.ndarray]
     requirements: tuple[Requirement, ...]
-    reason: str = ""
+    reason: str = ""  # Why there are none, or none up to the end; empty if there are.
 
 
 # takes a row; for a loop ``functools.partial(first_order, prepared)``

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, number, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 
 from ..statistics.guarantee import Violation, violation_probability
@@ -25,46 +25,27 @@ _SMALLEST = 1e-3  # smaller sizes are not searched, as a part of the largest
 RAY = 12  # bisections along the ray to a witness
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="robustness_radius")
 class Radius:
     """The smallest size of the uncertainty at which a violation was found; prints a sentence.
 
     Sizes are factors by which the box is scaled about the nominal values.
-
-    Attributes
-    ----------
-    upper : float
-        A violation exists in the box of this size: the radius is at most that.  Infinite if none
-        was found, 0 if the nominal values violate the spec.
-    witness : dict, optional
-        The violating row, at the edge of that box.
-    margin : float
-        Of this row; NaN without one.
-    searched : float
-        Largest size at which the search found nothing.  That is not a bound: draws may have found a
-        violation there.
-    statement : Violation, optional
-        How likely a violation is at the size `searched`, from independent draws of the laws of
-        that size, which took no part in the search.
-    largest : float
-        Largest size that may be tried.
-    notes : tuple of str
-        Why it is the largest, and why there is no statement.
-    steps : pandas.DataFrame
-        What was run: step ("nominal", "search", "ray"), size, lowest margin, runs.
-
-    Examples
-    --------
-    See `robustness_radius`.
     """
 
+    # A violation exists in the box of this size: the radius is at most that. Infinite if none was
+    # found, 0 if the nominal values violate the spec.
     upper: float
-    witness: Mapping[str, Any] | None
-    margin: float
+    witness: Mapping[str, Any] | None  # The violating row, at the edge of that box.
+    margin: float  # Of this row; NaN without one.
+    # Largest size at which the search found nothing. That is not a bound: draws may have found a
+    # violation there.
     searched: float
+    # How likely a violation is at the size `searched`, from independent draws of the laws of that
+    # size, which took no part in the search.
     statement: Violation | None
-    largest: float
-    notes: tuple[str, ...]
+    largest: float  # Largest size that may be tried.
+    notes: tuple[str, ...]  # Why it is the largest, and why there is no statement.
+    # What was run: step ("nominal", "search", "ray"), size, lowest margin, runs.
     steps: pd.DataFrame
 
     @property
@@ -154,11 +135,6 @@ def robustness_radius(
         Of the statement from `draws`, between 0 and 1.
     entropy : int, optional
         Of searches and draws; drawn itself if left out.
-
-    Returns
-    -------
-    Radius
-        The factor of the smallest such box that was found, and each step of the search.
 
     Raises
     ------

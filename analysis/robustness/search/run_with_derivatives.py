@@ -68,7 +68,8 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
             loop, study.timepts, study.inputs,
             {name: float(values[0]) for name, values in given["initial_state"].items()} or None,
             with_respect_to=names, params={k: v[0] for k, v in given["params"].items()},
-            rtol=study.rtol, atol=study.atol, max_steps=study.max_steps, method=_explicit(study),
+            rtol=study.rtol, atol=study.atol, max_steps=study.max_steps,
+            method="auto" if study.method == "taylor" else study.method,  # one that can have them
         )  # fmt: skip
     except AuditError:
         raise
@@ -85,11 +86,6 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
         requirements=study.spec.requirements,
         reason=run.message or "",
     )
-
-
-def _explicit(study: Any) -> str:
-    """Return the method of the run, one that derivatives can have."""
-    return "auto" if study.method == "taylor" else study.method
 
 
 def _none(prepared: Prepared, reason: str) -> FirstOrder:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.wording import counted, some_of
 
@@ -22,35 +22,17 @@ _Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="shrink")
 class Shrunk:
-    """A violation by few deviating quantities; printed, it is a sentence.
+    """A violation by few deviating quantities; printed, it is a sentence."""
 
-    Attributes
-    ----------
-    row : dict
-        Violates the spec; all but `names` are nominal.
-    margin : float
-        Of this row.
-    names : tuple of str
-        What deviates.  Each is needed: with any single one of them back at nominal, the spec
-        holds.
-    of : int
-        How many deviated at first.
-    is_fewest : bool
-        Whether every smaller set of the first row's deviations was tried and holds; otherwise
-        fewer may suffice.
-    runs : int
-
-    Examples
-    --------
-    See `shrink`.
-    """
-
-    row: Mapping[str, Any]
-    margin: float
+    row: Mapping[str, Any]  # Violates the spec; all but `names` are nominal.
+    margin: float  # Of this row.
+    # What deviates. Each is needed: with any single one of them back at nominal, the spec holds.
     names: tuple[str, ...]
-    of: int
+    of: int  # How many deviated at first.
+    # Whether every smaller set of the first row's deviations was tried and holds; otherwise fewer
+    # may suffice.
     is_fewest: bool
     runs: int
 
@@ -91,11 +73,6 @@ def shrink(
         Number of bisections for each number: to 2^-steps of its deviation.
     most : int, optional
         Largest number of runs that 2 may take.
-
-    Returns
-    -------
-    Shrunk
-        The row with the fewest deviations that was found to violate.
 
     Raises
     ------

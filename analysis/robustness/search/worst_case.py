@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..uncertainty.design import Design, checked_entropy, listed
@@ -20,39 +20,22 @@ from .evaluation import Evaluate, margins_of, row_text
 from .first_order import FirstOrderOf
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="worst_case")
 class WorstCase:
-    """The rows that a search ran, and the worst of them; printed, it is a sentence.
+    """The rows that a search ran, and the worst of them; printed, it is a sentence."""
 
-    Attributes
-    ----------
-    design : Design
-        All rows in the order in which they ran.  They were chosen by looking at earlier results,
-        so statements about probabilities refuse them.
-    results : pandas.DataFrame
-        What was evaluated, by row.
-    searchers : ndarray of str, shape (design.size,)
-        What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``; with derivatives also
-        ``"test signals"`` and ``"gradient"``, and ``"derivatives"`` for a row that was run once
-        more, for its derivatives.
-    is_finished : bool
-        False if Ctrl-C ended the search.
-    all_corners : bool
-        Whether every corner of the box is among the rows; otherwise they are a random subset.
-    without_derivative : tuple of str
-        Why there was none at some rows, or from some time on: there the other searchers did the
-        work.
-
-    Examples
-    --------
-    See `worst_case`.
-    """
-
+    # All rows in the order in which they ran. They were chosen by looking at earlier results, so
+    # statements about probabilities refuse them.
     design: Design
-    results: pd.DataFrame
+    results: pd.DataFrame  # What was evaluated, by row.
+    # (design.size,): What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``; with
+    # derivatives also ``"test signals"`` and ``"gradient"``, and ``"derivatives"`` for a row that
+    # was run once more, for its derivatives.
     searchers: np.ndarray
-    is_finished: bool
+    is_finished: bool  # False if Ctrl-C ended the search.
+    # Whether every corner of the box is among the rows; otherwise they are a random subset.
     all_corners: bool
+    # Why there was none at some rows, or from some time on: there the other searchers did the work.
     without_derivative: tuple[str, ...] = ()
 
     @property
@@ -154,11 +137,6 @@ def worst_case(
         violation.
     derivatives : callable, optional
         ``functools.partial(first_order, prepared)``: takes a row, returns its `FirstOrder`.
-
-    Returns
-    -------
-    WorstCase
-        The row, its margin, and every run of the search.
 
     Raises
     ------

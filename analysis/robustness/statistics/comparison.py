@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, of_type, one_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.wording import counted, some_of
@@ -25,42 +25,23 @@ from .paired import Better, differences, mcnemar, wins
 _Columns = dict[str, np.ndarray]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="compare")
 class Comparison:
-    """What a comparison found.
+    """What a comparison found."""
 
-    Attributes
-    ----------
-    choice : str
-        What was compared, ``"controller"``.
-    size : int
-        Number of samples, each of which was run with every option.
-    confidence : float
-        Of each interval by itself.
-    ranking : pandas.DataFrame
-        One row per option, best first: by violations, then by the mean rank in the first metric.
-        violations; rate with its exact interval rate_low, rate_high; failed, the runs that did not
-        reach their end, which are violations as well; and for each metric its median over the
-        other runs, ``median <metric>``, and the mean of its rank among the options, 1 being best,
-        over all samples, ``rank <metric>``.
-    violations : pandas.DataFrame
-        McNemar's test for every pair, see `paired.mcnemar`.
-    differences : pandas.DataFrame
-        By metric and pair, see `paired.differences`; p_holm is adjusted for the pairs of a metric.
-    wins : pandas.DataFrame
-        By metric and winner: in how many samples it beats each other option, see `paired.wins`.
-
-    Examples
-    --------
-    See `compare`.
-    """
-
-    choice: str
-    size: int
-    confidence: float
+    choice: str  # What was compared, ``"controller"``.
+    size: int  # Number of samples, each of which was run with every option.
+    confidence: float  # Of each interval by itself.
+    # One row per option, best first: by violations, then by the mean rank in the first metric.
+    # violations; rate with its exact interval rate_low, rate_high; failed, the runs that did not
+    # reach their end, which are violations as well; and for each metric its median over the other
+    # runs, ``median <metric>``, and the mean of its rank among the options, 1 being best, over all
+    # samples, ``rank <metric>``.
     ranking: pd.DataFrame
-    violations: pd.DataFrame
+    violations: pd.DataFrame  # McNemar's test for every pair, see `paired.mcnemar`.
+    # By metric and pair, see `paired.differences`; p_holm is adjusted for the pairs of a metric.
     differences: pd.DataFrame
+    # By metric and winner: in how many samples it beats each other option, see `paired.wins`.
     wins: pd.DataFrame
 
     def __str__(self) -> str:

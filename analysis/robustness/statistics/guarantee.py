@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, of_type, one_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 from nlctl.wording import counted, some_of
 
@@ -38,39 +38,21 @@ class NoGuaranteeError(UsageError):
     """
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="violation_probability")
 class Violation:
-    """How likely a violation is; printed, it is a sentence with its assumptions.
-
-    Attributes
-    ----------
-    violations, runs : int
-    confidence : float
-    lower, upper : float
-        Bounds of the probability that hold together with this confidence.
-    side : {"upper", "lower", "both"}
-        Which of the two is in use; the other is 0 or 1.
-    singly : tuple of 2 floats
-        A lower and an upper bound that hold with this confidence each by itself; `lower` and
-        `upper` where both are in use.
-    method : str
-    assumptions : tuple of str
-        What the statement rests on.
-
-    Examples
-    --------
-    See `violation_probability`.
-    """
+    """How likely a violation is; printed, it is a sentence with its assumptions."""
 
     violations: int
     runs: int
     confidence: float
-    lower: float
+    lower: float  # Bounds of the probability that hold together with this confidence.
     upper: float
-    side: Side
+    side: Side  # Which of the two is in use; the other is 0 or 1.
+    # A lower and an upper bound that hold with this confidence each by itself; `lower` and `upper`
+    # where both are in use.
     singly: tuple[float, float]
     method: str
-    assumptions: tuple[str, ...]
+    assumptions: tuple[str, ...]  # What the statement rests on.
 
     def __str__(self) -> str:
         return (
@@ -260,11 +242,6 @@ def violation_probability(
         That the bounds hold, between 0 and 1.
     side : {"upper", "lower", "both"}, optional
         The bound that is left out is 0 or 1.
-
-    Returns
-    -------
-    Violation
-        Share, bounds, and the sentence with its assumptions.
 
     Raises
     ------

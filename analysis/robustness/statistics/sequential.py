@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy import optimize, special
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
+from nlctl.attributes import described_record
 from nlctl.wording import counted
 
 from ..uncertainty.design import Design
@@ -27,17 +27,14 @@ PRIOR = 0.5  # both parameters of the Beta distribution that alternatives are mi
 
 
 def log_evidence(violations: Any, runs: Any, p: float) -> Any:
-    """Return log M of the evidence against a probability p of a violation.
-
-        M_n(p) = int q^k (1-q)^(n-k) dBeta(q) / (p^k (1-p)^(n-k))
-               = B(k + 1/2, n - k + 1/2) / B(1/2, 1/2) / (p^k (1-p)^(n-k))
-
-    the likelihood of k violations in n runs, mixed over all probabilities by Beta(1/2, 1/2), over
-    that of p.  Under p it is a nonnegative martingale that starts from 1, so that it ever reaches
-    1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n are
-    a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe, Sekhon,
-    Ann. Statist. 49, 2021).
-    """
+    """Return log M of the evidence against a probability p of a violation."""
+    #     M_n(p) = int q^k (1-q)^(n-k) dBeta(q) / (p^k (1-p)^(n-k))
+    #            = B(k + 1/2, n - k + 1/2) / B(1/2, 1/2) / (p^k (1-p)^(n-k))
+    # the likelihood of k violations in n runs, mixed over all probabilities by Beta(1/2, 1/2), over
+    # that of p. Under p it is a nonnegative martingale that starts from 1, so that it ever reaches
+    # 1/a with probability at most a (Ville's inequality): the p with M_n(p) < 1/a at all times n
+    # are a confidence sequence (Robbins, Ann. Math. Stat. 41, 1970; Howard, Ramdas, McAuliffe,
+    # Sekhon, Ann. Statist. 49, 2021).
     k, n = violations, runs
     mixed = special.betaln(k + PRIOR, n - k + PRIOR) - special.betaln(PRIOR, PRIOR)
     return mixed - special.xlogy(k, p) - special.xlog1py(n - k, -p)
@@ -99,25 +96,13 @@ def _zero(
     return scale(root)
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="decide")
 class SequentialTest:
-    """Whether a probability lies below or above a threshold; printed, it is a sentence.
-
-    Attributes
-    ----------
-    threshold : float
-    decision : {"below", "above", "undecided"}
-    statement : Violation
-        What is known when it was decided, or now.
-
-    Examples
-    --------
-    See `decide`.
-    """
+    """Whether a probability lies below or above a threshold; printed, it is a sentence."""
 
     threshold: float
     decision: Literal["below", "above", "undecided"]
-    statement: Violation
+    statement: Violation  # What is known when it was decided, or now.
 
     def __str__(self) -> str:
         runs = f"after {counted(self.statement.runs, 'run')}"
@@ -203,11 +188,6 @@ def decide(
         Probability, between 0 and 1.
     confidence : float, optional
         Between 0 and 1.
-
-    Returns
-    -------
-    SequentialTest
-        The decision, and after how many rows.
 
     Raises
     ------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,6 +9,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
@@ -19,24 +19,13 @@ from .sequential import SequentialTest, log_evidence
 Answer = Literal["shown", "refuted", "not shown yet"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="bound_verdict")
 class Verdict:
-    """What runs say of a claim; printed, ``not shown yet (needs at least 132 more runs ...)``.
+    """What runs say of a claim; printed, ``not shown yet (needs at least 132 more runs ...)``."""
 
-    Attributes
-    ----------
-    answer : {"shown", "refuted", "not shown yet"}
-        Shown and refuted with the confidence of the statement that the claim is about.
-    needs : str
-        What it takes to show it; empty where that is not a question.
-
-    Examples
-    --------
-    See `bound_verdict`.
-    """
-
+    # Shown and refuted with the confidence of the statement that the claim is about.
     answer: Answer
-    needs: str = ""
+    needs: str = ""  # What it takes to show it; empty where that is not a question.
 
     def __str__(self) -> str:
         return f"{self.answer} (needs {self.needs})" if self.needs else self.answer
@@ -57,11 +46,6 @@ def bound_verdict(statement: Violation, limit: float) -> Verdict:
         From `guarantee.violation_probability`.
     limit : float
         Between 0 and 1.
-
-    Returns
-    -------
-    Verdict
-        Shown, refuted, or not shown yet.
 
     Raises
     ------
@@ -100,11 +84,6 @@ def test_verdict(test: SequentialTest) -> Verdict:
     ----------
     test : SequentialTest
         As `decide` returns it.
-
-    Returns
-    -------
-    Verdict
-        Shown, refuted, or not shown yet.
 
     Examples
     --------

@@ -13,7 +13,7 @@ only within a piece.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, tuple_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers
@@ -61,14 +62,10 @@ def limits_of_requirements(requirements: Sequence[Any]) -> dict[str, list[Limit]
     return limits
 
 
-def conjunction(formula: Formula, until: float, pieces: int) -> tuple[tuple[Formula, ...], ...]:
-    """Return formulas whose margins have that of `formula` as the least, at the start."""
+def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula, ...]]:
+    """Yield formulas whose margins have that of `formula` as the least, at the start."""
     # Windows are cut into `pieces`, up to the time (s) `until` where they have no end; those of the
     # same window follow each other in a row of their own. What is not a conjunction is alone.
-    return tuple(_rows(formula, until, pieces))
-
-
-def _rows(formula: Formula, until: float, pieces: int) -> Iterator[tuple[Formula, ...]]:
     match formula:
         case And():
             for part in formula.parts:
@@ -93,33 +90,20 @@ _PIECES = 16  # of a window, where a requirement is taken apart
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="margin")
 class Requirement:
     """A named formula that has to hold at the start of a response.
 
     It is also a metric of `nlctl.ensemble_response`.
-
-    Attributes
-    ----------
-    key : str
-        Short name for tables and files.
-    formula : Formula
-        See `formula.in_band`, `formula.always`, `formula.eventually` and ``&``, ``|``, ``~``.
-    meaning : str
-        In words, for the report.
-    until : float
-        Time (s) that a run has to reach and that windows without an end stop at.  A run that ends
-        before has failed.
-
-    Examples
-    --------
-    See `margin`.
     """
 
-    key: str
+    key: str  # Short name for tables and files.
+    # See `formula.in_band`, `formula.always`, `formula.eventually` and ``&``, ``|``, ``~``.
     formula: Formula
+    # Time (s) that a run has to reach and that windows without an end stop at. A run that ends
+    # before has failed.
     until: float
-    meaning: str = ""
+    meaning: str = ""  # In words, for the report.
 
     start = -np.inf
     end = np.inf
@@ -148,7 +132,7 @@ class Requirement:
         In a row are pieces of the window: which time decides changes less often in a piece, so
         that margins of parts have fewer kinks.
         """
-        rows = conjunction(self.formula, self.until, _PIECES)
+        rows = _rows(self.formula, self.until, _PIECES)
         return tuple(
             tuple(Requirement(key=f"{self.key}, {part}", formula=part, until=self.until)
                   for part in row)
@@ -178,7 +162,7 @@ class Requirement:
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="margins")
 class Spec:
     """Requirements that all have to hold.
 
@@ -186,10 +170,6 @@ class Spec:
     ------
     ParameterError
         If there is none, or two have the same key.
-
-    Examples
-    --------
-    See `margins`.
     """
 
     requirements: tuple[Requirement, ...]

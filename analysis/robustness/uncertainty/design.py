@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, integer, of_type
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -26,38 +27,20 @@ _Kind = Literal[
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="independent")
 class Design:
-    """Rows to run.
-
-    Attributes
-    ----------
-    space : Space
-    kind : str
-        How the rows were chosen.
-    size : int
-        Number of rows.
-    is_iid : bool
-        Whether the rows are independent draws of the space's laws: what a statement about
-        probabilities needs.
-    entropy : int
-        What all random numbers follow from.
-    points : pandas.DataFrame, optional
-        The rows; None for i.i.d. rows, which are drawn when they are asked for.
-    details : mapping
-        Numbers that analyses of this kind of design need.
-
-    Examples
-    --------
-    See `independent`.
-    """
+    """Rows to run."""
 
     space: Space
-    kind: _Kind
-    size: int
+    kind: _Kind  # How the rows were chosen.
+    size: int  # Number of rows.
+    # Whether the rows are independent draws of the space's laws: what a statement about
+    # probabilities needs.
     is_iid: bool
-    entropy: int
+    entropy: int  # What all random numbers follow from.
+    # The rows; None for i.i.d. rows, which are drawn when they are asked for.
     points: pd.DataFrame | None = None
+    # Numbers that analyses of this kind of design need.
     details: Mapping[str, Any] = field(default_factory=dict)
 
     @property

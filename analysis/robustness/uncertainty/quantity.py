@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, vector
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.params import as_numbers
 from nlctl.wording import counted
@@ -33,24 +33,9 @@ class SpaceError(UsageError):
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Uncertain:
     """A number that is not known exactly.
-
-    Attributes
-    ----------
-    name : str
-        Qualified parameter, ``"actuator.b_r"`` or ``"controller.lambdas[0]"``, or initial state,
-        ``"plant.x1(0)"``.
-    law : frozen distribution of scipy.stats
-        Has ``ppf`` and ``support``.  By default uniform on `bounds`.
-    bounds : tuple of 2 floats, optional
-        Ends of the `box`.
-    nominal : float, optional
-        What the box is scaled about, and what the other quantities hold while one varies.  By
-        default the diagram's own value, see `binding.resolved`.
-    unit : str
-        By default the diagram's.
 
     Raises
     ------
@@ -69,11 +54,15 @@ class Uncertain:
     2.0 (1.7, 2.3)
     """
 
+    # Qualified parameter, ``"actuator.b_r"`` or ``"controller.lambdas[0]"``, or initial state,
+    # ``"plant.x1(0)"``.
     name: str
-    law: Any = None
-    bounds: tuple[float, float] | None = None
+    law: Any = None  # Has ``ppf`` and ``support``. By default uniform on `bounds`.
+    bounds: tuple[float, float] | None = None  # Ends of the `box`.
+    # What the box is scaled about, and what the other quantities hold while one varies. By default
+    # the diagram's own value, see `binding.resolved`.
     nominal: float | None = None
-    unit: str = ""
+    unit: str = ""  # By default the diagram's.
 
     def __post_init__(self) -> None:
         text("an uncertain quantity", "name", self.name)
@@ -135,20 +124,9 @@ def _interval(name: str, bounds: Sequence[float] | np.ndarray) -> tuple[float, f
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Choice:
     """One of several blocks: another controller, actuator or reference.
-
-    Attributes
-    ----------
-    name : str
-        Keyword of the function that builds the diagram, ``"actuator"``.
-    options : mapping
-        ``{label: record or python-control system}``.
-    nominal : str
-        Label that holds while other quantities vary; by default the first.
-    weights : tuple of float
-        Probability of each option; by default all alike.
 
     Raises
     ------
@@ -165,10 +143,10 @@ class Choice:
     'dead zone'
     """
 
-    name: str
-    options: Mapping[str, Any]
-    nominal: str = ""
-    weights: tuple[float, ...] = ()
+    name: str  # Keyword of the function that builds the diagram, ``"actuator"``.
+    options: Mapping[str, Any]  # ``{label: record or python-control system}``.
+    nominal: str = ""  # Label that holds while other quantities vary; by default the first.
+    weights: tuple[float, ...] = ()  # Probability of each option; by default all alike.
 
     def __post_init__(self) -> None:
         text("a choice", "name", self.name)

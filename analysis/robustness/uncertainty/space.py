@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, tuple_of
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -19,17 +20,9 @@ from .quantity import Choice, SpaceError, Uncertain
 
 
 @as_annotated
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Space:
     """Everything that is uncertain in a study, independent of each other.
-
-    Attributes
-    ----------
-    quantities : tuple of Uncertain
-    choices : tuple of Choice
-    scale : float
-        Every number is moved towards or away from its nominal value by this factor,
-        nominal + scale (value - nominal); choices are not scaled.
 
     Raises
     ------
@@ -48,6 +41,8 @@ class Space:
 
     quantities: tuple[Uncertain, ...] = ()
     choices: tuple[Choice, ...] = ()
+    # Every number is moved towards or away from its nominal value by this factor, nominal + scale
+    # (value - nominal); choices are not scaled.
     scale: float = 1.0
 
     def __post_init__(self) -> None:

@@ -68,12 +68,24 @@ def _loaded(name: str, path: Path, admits: Admits | None) -> ModuleType:
     try:
         content = path.read_bytes()  # never __pycache__, which others may have made
         _FILES[name] = path, content
-        exec(compile(content, str(path), "exec", dont_inherit=True), module.__dict__)
+        exec(_compiled(content, path), module.__dict__)
     except BaseException:
         del sys.modules[name]
         raise
     cloudpickle.register_pickle_by_value(module)  # worker processes cannot import it
     return module
+
+
+def _compiled(content: bytes, path: Path) -> Any:
+    """Return the code of a file, which must be Python."""
+    try:
+        return compile(content, str(path), "exec", dont_inherit=True)
+    except (SyntaxError, ValueError) as error:  # ValueError: zeros in it, before Python 3.12
+        line = getattr(error, "lineno", None)
+        where = f"line {line}: " if line else ""
+        raise ParameterError(
+            f"'{path}' is not Python: {where}{getattr(error, 'msg', None) or error}"
+        ) from None
 
 
 def _importer(importing: str, folder: Path, admits: Admits | None) -> Callable[..., Any]:

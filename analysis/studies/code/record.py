@@ -64,10 +64,8 @@ def _is_others(path: Path) -> bool:
 
 
 def remember(statements: Iterable[str]) -> bool:
-    """Add statements to the record; return whether it holds them now.
-
-    Where it cannot be written nothing is lost but the question that is asked again.
-    """
+    """Add statements to the record; return whether it holds them now."""
+    # Where it cannot be written nothing is lost but the question that is asked again.
     before_it, path = remembered(), record_file()
     new = frozenset(statements) - before_it
     if not new:

@@ -154,10 +154,8 @@ def _is_own(path: Path, home: Path) -> bool:
 
 
 def untrusted(named: Iterable[tuple[KeyPath, str]], grant: Grant) -> list[Problem]:
-    """Return which of these functions and kinds need trust, each with its place in the file.
-
-    Nothing is imported to find that out.
-    """
+    """Return which of these functions and kinds need trust, each with its place in the file."""
+    # Nothing is imported to find that out.
     return [
         Problem(place=place, message=f"{reason}: {grant.remedy}", needs_trust=True)
         for place, name in named
@@ -179,10 +177,8 @@ def _reason(name: str, grant: Grant) -> str:
 
 
 def check_defined(function: Any, name: str, grant: Grant) -> None:
-    """Refuse a function that another module defines than one that may run.
-
-    A file may have the names of others: ``from pandas import read_pickle``.
-    """
+    """Refuse a function that another module defines than one that may run."""
+    # A file may have the names of others: ``from pandas import read_pickle``.
     module = getattr(_plain(function), "__module__", None) or ""
     file = getattr(sys.modules.get(module), "__file__", None)
     if file is None or not grant.admits(Path(file)):  # none: made by text that a file has run
@@ -322,10 +318,9 @@ def check_function(function: Any, name: str) -> None:
 
 
 def check_loop_function(function: Any, name: str) -> None:
-    """Refuse, without calling it, a function that is not known to return a diagram.
-
-    That is known by its return annotation, or because it, or what it calls, uses control or nlctl.
-    """
+    """Refuse, without calling it, a function that is not known to return a diagram."""
+    # That is known by its return annotation, or because it, or what it calls, uses control or
+    # nlctl.
     check_function(function, name)
     plain = _plain(function)
     waits = inspect.iscoroutinefunction(plain) or inspect.isgeneratorfunction(plain)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from nlctl.attributes import described_record
 from nlctl.errors import UsageError
 from nlctl.names import unknown
 
@@ -20,32 +21,16 @@ OWN_KIND = "a kind of your own is 'path/to/file.py:name' or 'module:name'"
 _LARGEST = 10**40  # integers beyond are not printed
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="StudyError")
 class Problem:
-    """One mistake.
+    """One mistake."""
 
-    Attributes
-    ----------
-    place : tuple
-        Keys and list indices that lead to it.
-    message : str
-    line : int, optional
-        Line of the file, from 1; None for what is not in the file.
-    settings : tuple of str
-        Of the command line, ``key=value``, that are mistaken or have a part in it.
-    needs_trust : bool
-        Whether it is none for who trusts the code that the study names.
-
-    Examples
-    --------
-    See `StudyError`.
-    """
-
-    place: KeyPath
+    place: KeyPath  # Keys and list indices that lead to it.
     message: str
-    line: int | None = None
+    line: int | None = None  # Line of the file, from 1; None for what is not in the file.
+    # Of the command line, ``key=value``, that are mistaken or have a part in it.
     settings: tuple[str, ...] = ()
-    needs_trust: bool = False
+    needs_trust: bool = False  # Whether it is none for who trusts the code that the study names.
 
     def plain(self) -> dict[str, Any]:
         """Return it as JSON can hold it.
@@ -173,6 +158,10 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
         if one["type"] == "extra_forbidden":
             names = _keys_at(model, one["loc"][:-1])
             message = str(unknown("key", str(one["loc"][-1]), names))
+            if len(one["loc"]) == 3 and one["loc"][0] == "space" and "." not in str(one["loc"][1]):
+                message += f'; a name with a dot needs quotes: "{".".join(one["loc"][1:])}"'
+        elif one["type"] == "tuple_type":
+            message = "needs a list of values"
         elif one["type"] == "missing":
             message = "is missing"
         elif one["type"] == "union_tag_not_found":
@@ -197,10 +186,8 @@ def _text(value: object) -> str:
 
 
 def _in_file(loc: KeyPath, data: Any, absent: bool) -> KeyPath:
-    """Drop the names of union members that pydantic puts between keys and behind them.
-
-    Only if `absent` may the last part be a key that is not there.
-    """
+    """Drop the names of union members that pydantic puts between keys and behind them."""
+    # Only if `absent` may the last part be a key that is not there.
     place: list[str | int] = []
     for i, part in enumerate(loc):
         try:

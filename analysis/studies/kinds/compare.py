@@ -133,10 +133,8 @@ def _options(asked: Compare, setup: Setup) -> Choice:
 
 
 def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
-    """Return the experiment with the options in its space, and the requirements that count.
-
-    Metrics of signals that only some options have are left out.
-    """
+    """Return the experiment with the options in its space, and the requirements that count."""
+    # Metrics of signals that only some options have are left out.
     study, experiment = setup.study, setup.experiment
     space = _with_options(experiment, options)
     built = diagrams(space, experiment.build)

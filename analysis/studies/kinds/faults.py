@@ -389,10 +389,8 @@ def _effects(
 
 
 def _after(time: float, onset: float, step: float) -> str:
-    """Return the time from the onset to a violation, which samples give to within a `step`.
-
-    One before the onset has nothing to do with the fault.
-    """
+    """Return the time from the onset to a violation, which samples give to within a `step`."""
+    # One before the onset has nothing to do with the fault.
     if not np.isfinite(time):
         return "–"
     if time < onset - step:

@@ -17,10 +17,8 @@ _Row = Mapping[str, Any]
 
 
 def found_rows(rows: Mapping[str, _Row], quantities: pd.DataFrame, key: str) -> Iterator[Item]:
-    """Yield some rows next to the nominal one, and how far their numbers deviate.
-
-    What a row leaves out is nominal.
-    """
+    """Yield some rows next to the nominal one, and how far their numbers deviate."""
+    # What a row leaves out is nominal.
     middle = dict(known(quantities, "nominal"))
     rows = {label: middle | dict(row) for label, row in rows.items()}
     table = deviations_table(rows, quantities)
@@ -46,10 +44,8 @@ def _marked(value: object, middle: Any) -> str:
 
 
 def deviations_table(rows: Mapping[str, _Row], quantities: pd.DataFrame) -> pd.DataFrame:
-    """Return how far the numbers of some rows lie from nominal, in sides of their boxes.
-
-    1 is the upper end of the box, -1 the lower one; one line per quantity, one column per row.
-    """
+    """Return how far the numbers of some rows lie from nominal, in sides of their boxes."""
+    # 1 is the upper end of the box, -1 the lower one; one line per quantity, one column per row.
     numbers = quantities.reindex(columns=["nominal", "low", "high"]).dropna()
 
     def sides(value: float, nominal: float, low: float, high: float) -> float:

@@ -52,10 +52,8 @@ def running_items(
 
 
 def running(margins: np.ndarray, confidence: float) -> pd.DataFrame:
-    """Return the share of violations after n rows with its confidence sequence, for some n.
-
-    Columns violations, rate, low, high; NaN is a violation.
-    """
+    """Return the share of violations after n rows with its confidence sequence, for some n."""
+    # Columns violations, rate, low, high; NaN is a violation.
     counts = np.cumsum(violates(margins))
     numbers = np.unique(np.geomspace(1, counts.size, _POINTS).round().astype(int))
     rows = []

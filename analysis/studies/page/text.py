@@ -56,10 +56,8 @@ def unit_text(unit: Any) -> str:
 
 
 def margin_text(value: float) -> str:
-    """Return a margin as text; that of a run that did not reach its end says so.
-
-    Where NaN counts as the lowest margin it has become -inf.
-    """
+    """Return a margin as text; that of a run that did not reach its end says so."""
+    # Where NaN counts as the lowest margin it has become -inf.
     if np.isnan(value) or value == -np.inf:
         return "NaN"
     return f"{value:.4g}" if value > -FAILED else DID_NOT_END

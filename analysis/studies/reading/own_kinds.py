@@ -46,10 +46,8 @@ def model_of(kinds: Mapping[str, Kind]) -> type[Study]:
 
 
 def own_kinds(data: Mapping[str, Any], grant: Grant) -> tuple[dict[str, Kind], list[Problem]]:
-    """Return the kinds that a study file names by their place, and the mistakes among them.
-
-    The files and modules that have them are run, see `code.rule`.
-    """
+    """Return the kinds that a study file names by their place, and the mistakes among them."""
+    # The files and modules that have them are run, see `code.rule`.
     named = list(_named(data))
     problems = untrusted(named, grant)
     refused = {problem.place for problem in problems}
@@ -74,10 +72,8 @@ def _named(data: Mapping[str, Any]) -> Iterator[tuple[KeyPath, str]]:
 
 
 def stand_ins(data: Mapping[str, Any], known: Mapping[str, Kind]) -> dict[str, Kind]:
-    """Return for every kind of one's own that is not known one that takes any table.
-
-    With it a run can be read whose kind has gone: its findings keep what they say.
-    """
+    """Return for every kind of one's own that is not known one that takes any table."""
+    # With it a run can be read whose kind has gone: its findings keep what they say.
     names = dict.fromkeys(name for _, name in _named(data) if name not in known)
     return {name: _stand_in(name) for name in names}
 

@@ -6,13 +6,14 @@ import copy
 import json
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from nlctl.annotations import as_annotated
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
 
 from ..code.record import study_digest
@@ -42,18 +43,9 @@ STAND_INS = {  # while the rest of a mistaken file is validated
 _SPOKEN_OF = ("spec", "space", "runs")  # tables whose entries other parts of a study name
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False, made_by="read_study")
 class StudyFile(Setup):
-    """A study without mistakes, with the settings of the command line.
-
-    Attributes
-    ----------
-    path : Path
-
-    Examples
-    --------
-    See `read_study`.
-    """
+    """A study without mistakes, with the settings of the command line."""
 
     path: Path
 
@@ -86,11 +78,6 @@ def read_study(
     received : bool, optional
         Whether the file came with a folder of results: then code of that folder runs only if this
         user has run or trusted it.
-
-    Returns
-    -------
-    StudyFile
-        The study, its loop and its experiment.
 
     Raises
     ------
@@ -161,13 +148,10 @@ def _refused(study: Study, grant: Grant) -> list[Problem]:
 def _validated(
     data: dict[str, Any], model: type[Study], mistaken: Sequence[Problem] = ()
 ) -> tuple[Study | None, list[Problem], list[int]]:
-    """Return the study, its mistakes, and which entries of ``analysis`` it has.
-
-    `mistaken` are mistakes that are known already.
-
-    Where there are mistakes, it is the study without the mistaken parts, if that is one: so
-    mistakes of form and wrong names are found in one go.
-    """
+    """Return the study, its mistakes, and which entries of ``analysis`` it has."""
+    # `mistaken` are mistakes that are known already.
+    # Where there are mistakes, it is the study without the mistaken parts, if that is one: so
+    # mistakes of form and wrong names are found in one go.
     rest, problems = copy.deepcopy(data), list(mistaken)
     for problem in mistaken:
         _remove(rest, problem.place)

@@ -68,13 +68,10 @@ class _Notes:
 def checked_experiment(
     study: Study, folder: Path, named: Mapping[str, Collection[str]] | None = None
 ) -> tuple[Experiment | None, list[Problem]]:
-    """Return the experiment of a study, and all mistakes; None if there are any.
-
-    `named` are the names in the tables of the file, those of mistaken entries too, which the
-    study lacks: what speaks of them is not a mistake of its own.
-
-    Errors of another kind than `UsageError` come from the user's own functions and pass.
-    """
+    """Return the experiment of a study, and all mistakes; None if there are any."""
+    # `named` are the names in the tables of the file, those of mistaken entries too, which the
+    # study lacks: what speaks of them is not a mistake of its own.
+    # Errors of another kind than `UsageError` come from the user's own functions and pass.
     notes = _Notes()
     tables = {"spec": study.spec, "space": study.space} | dict(named or {})
     _check_tables(study, tables, notes)
@@ -114,7 +111,7 @@ def checked_experiment(
         for i, asked in _comparable(study, folder, notes):
             if (check := asked.definition.check) is not None:
                 notes.attempt(("analysis", i), check, asked, setup)
-    return checked, _unique(notes.problems)
+    return checked, list(dict.fromkeys(notes.problems))  # several diagrams have some in common
 
 
 def _check_tables(study: Study, tables: Mapping[str, Collection[str]], notes: _Notes) -> None:
@@ -161,11 +158,6 @@ class _Empty:
     """Stands for a loop that could not be built."""
 
     output_labels = ()
-
-
-def _unique(problems: Sequence[Problem]) -> list[Problem]:
-    """Leave out what several diagrams have in common."""
-    return list(dict.fromkeys(problems))
 
 
 def _diagrams(study: Study, folder: Path, notes: _Notes) -> list[ct.InputOutputSystem]:

@@ -15,6 +15,9 @@ import numpy as np
 
 import nlctl
 
+# sphinx_gallery_live = ["source.A", "play.c_r", "play.c_l"]
+# sphinx_gallery_live_run = "nlctl.input_output_response(loop, t)"
+
 A, c = 1.0, 0.25
 
 

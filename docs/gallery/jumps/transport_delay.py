@@ -15,6 +15,8 @@ from scipy.special import lambertw
 
 import nlctl
 
+# sphinx_gallery_live_run = "nlctl.input_output_response(loop, t)"
+
 a = 1.0
 loop = nlctl.interconnect(
     {

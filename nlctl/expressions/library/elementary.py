@@ -31,7 +31,7 @@ def angle(np: Facade, x: Any, deg: bool = False) -> Any:
     return phase * (180.0 / np.pi) if deg else phase
 
 
-@formula(np.modf)
+@formula(np.modf, math.modf)
 def parts_of_number(np: Facade, x: Any) -> Any:
     """What is behind the point, and what is before it."""
     whole = np.trunc(x)

@@ -12,6 +12,7 @@ from ...blocks import Block, supplied_of
 from ...delays.transport import PAST
 from ...errors import CompileError
 from ...params import as_numbers
+from ...probing import check_arguments
 from ...upstream.control_internals import current_parameters, outputs_now, rates_now, set_parameters
 from ...upstream.systems import System
 from ...wording import counted
@@ -36,6 +37,7 @@ def check_functions(path: str, system: System) -> FunctionReading:
     is_block, readings = isinstance(system, Block), []
     for what, function in _functions(system):
         values = current_parameters(system) if is_block else current_values(system)
+        check_arguments(f"block '{path}'", what, function, ("t", "x", "u", "params"))
         try:
             readings.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
-from ...expressions.conditions import conditions, switching_function
+from ...expressions.conditions import conditions, factors, switching_function
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
 from ..diagram.nodes import Node
@@ -87,20 +87,20 @@ def found_conditions(
         if condition in timed:
             of_time[condition] = None
             continue
-        function = switching_function(reader.graph, condition)
-        key, size, bends = _key(function), function.size or 1, condition.op in _BENDS
-        if key in located:
-            bends &= located[key].bends
-            located[key] = replace(located[key], bends=bends)
-            continue
-        if key in known or not function.varies or _remembers(function, node):
-            continue
-        if rows + size > _MOST:
-            beyond += size
-            continue
-        path = "" if node is None else node.path
-        located[key] = Located(function=function, block=path, what=condition.op, bends=bends)
-        rows += size
+        bends, path = condition.op in _BENDS, "" if node is None else node.path
+        for function in factors(switching_function(reader.graph, condition)):
+            key, size = _key(function), function.size or 1
+            if key in located:
+                both = bends and located[key].bends
+                located[key] = replace(located[key], bends=both)
+                continue
+            if key in known or not function.varies or _remembers(function, node):
+                continue
+            if rows + size > _MOST:
+                beyond += size
+                continue
+            located[key] = Located(function=function, block=path, what=condition.op, bends=bends)
+            rows += size
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     return Conditions(
         located=tuple(sorted(located.values(), key=lambda one: not one.bends)),

@@ -16,14 +16,13 @@ from .delays import is_full, keep, look_within, unresolved
 from .evaluate import inputs_at
 from .events.crossing import NOTHING, crossing, left_to_other_side
 from .events.excursions import look_between
-from .events.functions import begin_next, has_events
+from .events.functions import at_zero, begin_next, has_events
 from .events.kinks import crossed_before, look_at_kinks
 from .events.location import (
     AGAIN,
     CLEAR,
     EVENT,
     REFUSED,
-    SMALL_KINK,
     jumped,
     locate,
     locate_jump,
@@ -105,7 +104,7 @@ def _accept(task, lanes, w, found, done, passed):
             _sample(lane, j, task, t_new, w)
         _counted(task, lane, w, event, j)
         lane.begun, lane.t = lane.t, t_new
-        if task.timed.opaque:
+        if task.timed.opaque > 0.0:
             lane.rests = _rests(task, w, j)
         if lane.across:
             lane.left_zero = _from_zero(task, w, False, j)
@@ -186,7 +185,7 @@ def _take(task, w, done):
                 x[m, j] = become
                 for c in range(rows.declared):
                     events.behind[c, j] = 0.0  # with another memory the way back is an event
-        begin_next(w, j)
+        begin_next(task, w, j)
 
 
 @numba.njit(**INNER)
@@ -347,10 +346,13 @@ def _note_events(task, lanes, w, found, done):
             continue
         turns = 1 if rows.memory.size else 0
         for i in range(rows.guarded):
-            if opposite(events.g_start[i, j], events.g[i, j]):
+            before, now = events.g_start[i, j], events.g[i, j]
+            if opposite(before, now):
                 turns = 0
-                if _counts(task, lanes[j], i, events.g[i, j]):
-                    note(task, lanes[j], w, lanes[j].t, i, events.g[i, j] > 0.0, j)
+                if at_zero(task, i, before) or at_zero(task, i, now):
+                    continue  # noted where it has left that
+                if _counts(task, lanes[j], i, now):
+                    note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
             elif left_to_other_side(task, w, i, j):
                 turns = 0
         for i in range(rows.guarded, rows.switching):
@@ -368,17 +370,15 @@ def _note_left(task, lane, w, located, j):
     """
     events, rows = w.events, task.rows
     for i in range(rows.bending if rows.memory.size else 0, rows.guarded):
-        if events.g_start[i, j] != 0.0 or not abs(events.g[i, j]) > 0.0:
+        before, now, came = events.g_start[i, j], events.g[i, j], events.came[i, j]
+        if not at_zero(task, i, before) or at_zero(task, i, now) or now != now:
             continue
-        now, came = events.g[i, j], events.came[i, j]
         if came == 0.0 and i >= rows.watched and rows.ending[i - rows.watched]:
             continue
         if came == 0.0 and i < rows.bending:
             continue
-        is_kink = rows.bending <= i < rows.declared
-        is_rounding = is_kink and abs(now) <= SMALL_KINK * task.atol
-        if came == 0.0 or (opposite(came, now) and not is_rounding):
-            t = lane.t if located and came != 0.0 else lane.begun
+        if came == 0.0 or opposite(came, now):
+            t = lane.t if located and came != 0.0 and before == 0.0 else lane.begun
             if _counts(task, lane, i, now):
                 note(task, lane, w, t, i, now > 0.0, j)
 

@@ -44,7 +44,7 @@ def limit_step(task, lane, j):
     """Shorten the step that is proposed where it might pass over a function of t alone.
 
     A function that is called as it stands may move at any time: from rest, where error control
-    sees nothing of it, no step passes an output sample.
+    sees nothing of it, no step passes an output sample, or is longer than `opaque`.
     """
     if task.fixed > 0.0 or lane.tries > 0 or lane.status != RUNNING:
         return
@@ -53,8 +53,8 @@ def limit_step(task, lane, j):
         times = task.times
         share = (lane.t - times[0]) / (times[times.size - 1] - times[0])
         longest = min(longest, task.timed.reach[j, min(int(share * cells), cells - 1)] - lane.t)
-    if task.timed.opaque and lane.rests and lane.segment < task.times.size - 1:
-        longest = min(longest, task.times[lane.segment + 1] - lane.t)
+    if task.timed.opaque > 0.0 and lane.rests and lane.segment < task.times.size - 1:
+        longest = min(longest, task.times[lane.segment + 1] - lane.t, task.timed.opaque)
     if lane.h > longest > 0.0:
         lane.h = longest
 

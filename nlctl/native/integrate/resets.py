@@ -1,8 +1,8 @@
 """Guards: where one has fallen through 0, its block jumps to what its reset says.
 
 All guards that have fallen at an instant jump together, from the values before; what falls by that
-jumps next, and so on until none falls.  A run in which that has no end, or jumps follow each other
-without progress of time, ends as ZENO.
+jumps next, and so on until none falls.  A run in which that has no end ends as ZENO, and one whose
+jumps accumulate, or follow each other without progress of time.
 """
 
 from __future__ import annotations
@@ -12,16 +12,19 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from ...accumulation import PACE, jumps_end
 from ..machine.address import call_out
 from .evaluate import evaluate, inputs_at
 from .log import note
-from .memory import Places1, Places2, Reals2, arrays_of
+from .memory import Places1, Places2, Reals2, Reals3, arrays_of
 from .restart import restart
 from .state import DIVERGED, INNER, RUNNING, ZENO
 
 _MOST = 100  # jumps at one instant, or without progress of time
 _STILL = 1e-11  # of a time: less is no progress
+_HOVERS = 1e-13  # of a run: a ball that lies on the ground hops as far as rounding lets it
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
+_jumps_end = numba.njit(**INNER)(jumps_end)
 
 
 class Resets(NamedTuple):
@@ -38,12 +41,15 @@ class Guards(NamedTuple):
 
     above: Places2  # whether it was not negative when last seen
     rising: Reals2  # the value of one that was negative behind its jump and is to rise, or NaN
+    pace: Reals3  # how its jumps follow each other, see `jumps_end`
     table: Places2
 
 
 def new_guards(guards: int, lanes: int) -> Guards:
     """Return the arrays for so many guards."""
-    return arrays_of(Guards, above=(guards, lanes), rising=(guards, lanes))
+    return arrays_of(
+        Guards, above=(guards, lanes), rising=(guards, lanes), pace=(guards, lanes, PACE)
+    )
 
 
 @numba.njit(**INNER)
@@ -119,11 +125,14 @@ def _jump(task, lanes, w, fallen, chosen):
             if not fallen[i, j]:
                 continue
             note(task, lane, w, lane.t, task.rows.guarded + i, False, j)
-            lane.culprit = i
+            if lane.status != ZENO:
+                lane.culprit = i
+            if _jumps_end(w.guards.pace[i, j], lane.t):
+                lane.status = ZENO
             for m in range(task.resets.states.size):
                 if task.resets.owned[i, m]:
                     w.x[task.resets.states[m], j] = w.s[m, j]
-        _counted(lane)
+        _counted(task, lane)
         lane.jacobian_at = np.nan
         if task.times[lane.segment] == lane.t:
             for i in range(w.x.shape[0]):
@@ -133,13 +142,14 @@ def _jump(task, lanes, w, fallen, chosen):
 
 
 @numba.njit(**INNER)
-def _counted(lane):
+def _counted(task, lane):
     """Count jumps without progress of time, or in the first step after another.
 
     Too many have no end.  That they do not end is so from the first of them on.
     """
     gone = lane.t - lane.fell_at
-    lane.crowd = lane.crowd + 1 if gone <= max(_STILL * abs(lane.t), 1.5 * lane.last) else 0
+    still = max(_STILL * abs(lane.t), _HOVERS * (task.times[-1] - task.times[0]))
+    lane.crowd = lane.crowd + 1 if gone <= max(still, 1.5 * lane.last) else 0
     lane.fell_at = lane.t
     lane.since = lane.since if lane.crowd else lane.t
     if lane.crowd > _MOST:

@@ -72,7 +72,7 @@ def restart(rhs, task, lanes, w, chosen):
         _lock(rhs, task, lanes, w, chosen)
     for j in range(lanes.size):
         if chosen[j]:
-            begin_next(w, j)
+            begin_next(task, w, j)
 
 
 @numba.njit(**INNER)

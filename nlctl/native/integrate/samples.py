@@ -31,7 +31,7 @@ class Timed(NamedTuple):
     jumps: Reals2  # (lanes, instants): when they jump or have kinks, then inf
     longest: Reals1  # (lanes,) step in s that none may be longer than
     reach: Reals2  # (lanes, cells): until when a step may lead that begins in a cell
-    opaque: int  # whether something is called as it stands: nobody knows when it jumps
+    opaque: float  # longest step from rest where something is called as it stands (s), otherwise 0
     table: Places2
 
 

@@ -85,7 +85,7 @@ class _AsItStands:
         places = np.cumsum((1, x, u, p))
         parts = [given[a:b].copy() for a, b in pairwise(places)]
         results = [
-            np.asarray(f(float(given[0]), parts[0], parts[1], self._params(parts[2]))).reshape(-1)
+            self._numbers(f(float(given[0]), parts[0], parts[1], self._params(parts[2])))
             for f in self.functions
         ]
         values = np.concatenate([np.empty(0), *results])
@@ -95,6 +95,16 @@ class _AsItStands:
                 f"function, needs {count}"
             )
         return values
+
+    def _numbers(self, values: Any) -> np.ndarray:
+        """Return what a function returns as a vector; what is not a number is refused."""
+        array = np.asarray(values).reshape(-1)
+        if array.dtype.kind not in "biufc":
+            raise BlockError(
+                f"block '{self.path}' returns {str(values)[:60]!r} from its {self.kind} function, "
+                "needs numbers"
+            )
+        return array
 
     def _params(self, p: np.ndarray) -> Any:
         """Return the parameters as the block's functions take them."""

@@ -16,7 +16,7 @@ from ..driver import ROUNDS, begin, differentiated, go_on, watched
 from ..happened import happened
 from ..histories import arriving_first
 from ..integrate.state import OK, RUNNING
-from ..integrators import integrators
+from ..integrators import handle, integrators
 from ..results import Trajectory, made
 from ..run import Run
 from ..settings import Settings
@@ -41,6 +41,8 @@ class HeldRun:
     def __init__(self, compiled: Compiled, dt: float, settings: Settings) -> None:
         self.compiled, self.dt, self.settings = compiled, dt, settings
         self._functions = integrators()
+        self._called: tuple[Any, tuple[Any, ...]] = None, ()
+        self._shown: tuple[Any, tuple[Any, ...]] = None, ()
         self.k, self.start = 0, 0.0
         self.states = np.zeros(0)
         self.p = np.zeros(0)
@@ -85,13 +87,17 @@ class HeldRun:
         if self.k and past.fresh.size and np.any(u != self.inputs):
             np.minimum(past.fresh, 1, out=past.fresh)  # a kink: where the last step ended
         with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-            run = self._moved()
-            self._keep(run)
-            if run.lanes["status"][0] != OK:
-                return None
-            outputs, states = self._outputs(
-                float(self.window.times[i + 1]), run.work.samples[i + 1, :, 0], u, i + 1
-            )
+            return self.concluded(self._moved(), u)
+
+    def concluded(self, run: Run, u: np.ndarray) -> np.ndarray | None:
+        """Stand at the end of a step; return the outputs there, None if the run has ended."""
+        self._keep(run)
+        if run.lanes["status"][0] != OK:
+            return None
+        end = self.window.place(self.k) + 1
+        outputs, states = self._outputs(
+            float(self.window.times[end]), run.work.samples[end, :, 0], u, end
+        )
         self.states, self.inputs, self.k = states, u, self.k + 1
         return outputs if np.isfinite(outputs).all() else None
 
@@ -103,16 +109,26 @@ class HeldRun:
         run = until(self.window, self.k)
         lanes["status"], lanes["noted"], lanes["resumes"] = RUNNING, 0, 0
         run.work.taylor.expanded[:] = 0  # that was without the inputs that follow
-        rhs, _ = run.machine.entries
-        point, along = (0, 0) if run.along is None else run.along.entries
-        self._functions["advance"](rhs, point, along, run.task, run.work, ROUNDS)
-        if lanes["status"][0] == OK:  # as nearly all steps end
+        self._functions["advance"](*self.arguments(run))
+        return self.followed(run)
+
+    def followed(self, run: Run) -> Run:
+        """Return a run at the end of a step whose first rounds have been made."""
+        if run.lanes["status"][0] == OK:  # as nearly all steps end
             run.machine.check(run.task.p)
             return run
         run = self._turned(go_on(run, ROUNDS))
         while run.lanes["status"][0] == RUNNING:
             run = self._turned(watched(run, self.paces))
         return run
+
+    def arguments(self, run: Run) -> tuple[Any, ...]:
+        """Return what integrators take of a run; it is kept, for most steps are of the same one."""
+        if self._called[0] is not run:
+            rhs, _ = run.machine.entries
+            point, along = (0, 0) if run.along is None else run.along.entries
+            self._called = run, (rhs, point, along, handle(run.task), handle(run.work), ROUNDS)
+        return self._called[1]
 
     def _turned(self, run: Run) -> Run:
         """Return a run by the method, and with the derivatives, that it asks for."""
@@ -137,10 +153,14 @@ class HeldRun:
         """Return the outputs and the states, whose memories are what they have become."""
         run, (task, work) = self.window.run, self.window.ending
         task.times[:] = t, t + 1.0
-        task.inputs[:] = u[:, None]
+        task.inputs.T[:] = u
         work.samples[:, :, 0] = x
-        work.past.shown[:] = run.work.past.shown[place]
-        self._functions["outputs"](*run.machine.entries, task, work)
+        if work.past.shown.size:
+            work.past.shown[:] = run.work.past.shown[place]
+        if self._shown[0] is not self.window:
+            taken = *run.machine.entries, handle(task), handle(work)
+            self._shown = self.window, taken
+        self._functions["outputs"](*self._shown[1])
         run.machine.check(task.p)
         return work.y[0, : task.outputs, 0].copy(), work.samples[0, :, 0].copy()
 

@@ -15,103 +15,15 @@ from ...arguments import ATOL, RTOL, number
 from ...errors import DivergedError, ParameterError, UsageError
 from ...params import as_numbers
 from ...responses.arguments import checked_params, state_array
-from ...responses.event_log import NO_EVENTS
 from ...upstream.systems import System
 from ...wording import counted
-from ..audit import Audit, Trial
-from ..audit import audit as compare
 from ..compiled import Compiled, as_compiled
 from ..integrate.methods.tableau import Tableau
-from ..integrate.state import Status
-from ..machine.evaluations import prepared_parameters
 from ..own_errors import own_error
 from ..response import failure
-from ..results import Statistics, Trajectory
 from ..settings import Settings
 from .held import HeldRun
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class KeptSample:
-    """What a run in discrete time was before a step."""
-
-    k: int
-    states: np.ndarray
-
-
-class SampledRun:
-    """x[k+1] = f(t[k], x[k], u[k]), and y = h(t[k+1], x[k+1], u[k]) while u[k] still holds."""
-
-    def __init__(self, compiled: Compiled, dt: float) -> None:
-        self.compiled, self.dt = compiled, dt
-        self.k, self.start = 0, 0.0
-        self.states, self.inputs = np.zeros(0), np.zeros(0)
-        self.p = np.zeros(0)
-
-    @property
-    def time(self) -> float:
-        """Time that is reached (s)."""
-        return float(self.start + self.dt * self.k)
-
-    def begin(self, x0: np.ndarray, p: np.ndarray, start: float) -> None:
-        """Stand at the initial state."""
-        self.p, self.k, self.start, self.states = p, 0, start, x0.copy()
-        self.inputs = np.zeros(self.compiled.system.ninputs or 0)
-        self.code, self.c = prepared_parameters(self.compiled, p)
-        rows = self.code.lowered.rows
-        self._given = np.zeros(1), np.zeros((x0.size, 1)), np.zeros((self.inputs.size, 1))
-        self._made = np.zeros((x0.size, 1)), *(np.zeros((rows[name], 1)) for name in "gm")
-        self._y = np.zeros((self.compiled.system.noutputs or 0, 1))
-
-    def shown(self, u: np.ndarray) -> np.ndarray:
-        """Return the outputs where the run stands, with inputs `u`."""
-        self._give(u)
-        self.code.out(*self._given, self.c, self._y)
-        self.code.check(self.c)
-        return self._y[:, 0].copy()
-
-    def advance(self, u: np.ndarray) -> np.ndarray | None:
-        """Go on for a step; return the outputs at its end, None if they are not finite."""
-        self._give(u)
-        with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
-            self.code.rhs(*self._given, self.c, *self._made)
-            self.code.check(self.c)
-            states = self._made[0][:, 0].copy()
-            if not np.isfinite(states).all():
-                return None
-            self.states, self.inputs, self.k = states, u, self.k + 1
-            outputs = self.shown(u)
-        return outputs if np.isfinite(outputs).all() else None
-
-    def _give(self, u: np.ndarray) -> None:
-        t, x, given = self._given
-        t[0], x[:, 0], given[:, 0] = self.time, self.states, u
-
-    def keep(self) -> KeptSample:
-        """Return all that the run knows."""
-        return KeptSample(k=self.k, states=self.states)
-
-    def go_back(self, kept: KeptSample) -> None:
-        """Stand where the run once stood."""
-        self.k, self.states = kept.k, kept.states
-
-    def compared(self, x0: np.ndarray, params: Any, audit: Audit) -> None:
-        """Compare the program with python-control at both ends of the step that was made."""
-        u = np.repeat(self.inputs[:, None], 2, axis=1)
-        trial = Trial(
-            time=np.array([self.time - self.dt, self.time]), p=self.p, params=params, width=1,
-            states=np.column_stack([x0, self.states]), inputs=u,
-        )  # fmt: skip
-        compare(self.compiled, trial, audit)
-
-    def ended(self) -> Trajectory:
-        """Return the step in which the run has ended, as a run."""
-        statistics = Statistics(status=Status.DIVERGED, time=self.time, accepted=0, rejected=0)
-        return Trajectory(
-            time=np.array([self.time]), outputs=np.zeros((0, 1)), states=self.states[:, None],
-            statistics=statistics, inputs=self.inputs[:, None],
-        )  # fmt: skip
-
+from .sampled_run import SampledRun
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -180,7 +92,7 @@ class Stepper:
     def __init__(self, compiled: Compiled, dt: float, settings: Settings, form: Any) -> None:
         self.compiled, self.dt = compiled, dt
         continuous = ct.isctime(compiled.system)
-        self._run = HeldRun(compiled, dt, settings) if continuous else SampledRun(compiled, dt)
+        self.run = HeldRun(compiled, dt, settings) if continuous else SampledRun(compiled, dt)
         self._audit, self._ignores = form
         self._failed: DivergedError | None = None
         self.reset()
@@ -188,12 +100,12 @@ class Stepper:
     @property
     def time(self) -> float:
         """Time that is reached (s)."""
-        return self._run.time
+        return self.run.time
 
     @property
     def states(self) -> np.ndarray:
         """States at that time, shape (nstates,): before samples that are due there."""
-        return self._run.states.copy()
+        return self.run.states.copy()
 
     @property
     def success(self) -> bool:
@@ -208,8 +120,7 @@ class Stepper:
     @property
     def events(self) -> pd.DataFrame:
         """What has happened in the last step: time (s), block, which, direction."""
-        log = self._run.events() if isinstance(self._run, HeldRun) else NO_EVENTS
-        return log.table()
+        return self.run.events().table()
 
     @as_annotated
     def reset(
@@ -249,10 +160,34 @@ class Stepper:
         u = self._inputs(inputs)
         checked_params(params)
         x0 = state_array(self.compiled.system, initial_state)
-        p = self.compiled.parameter_vector(params)
-        self._run.begin(x0, p, number("reset", "time", time))
+        return self.begin(x0, self.compiled.parameter_vector(params), params, time, u)
+
+    def begin(
+        self, x0: np.ndarray, p: np.ndarray, params: Any, time: float, u: np.ndarray
+    ) -> np.ndarray:
+        """Begin again with a state and a vector of parameters, see `reset`.
+
+        Parameters
+        ----------
+        x0 : ndarray of shape (nstates,)
+            The state.
+        p : ndarray
+            All parameters, in their order.
+        params : mapping or None
+            Those that were given, as python-control takes them.
+        time : float
+            At which the run begins (s).
+        u : ndarray of shape (ninputs,)
+            The inputs of the outputs that are returned.
+
+        Returns
+        -------
+        ndarray of shape (noutputs,)
+            The outputs at the beginning.
+        """
+        self.run.begin(x0, p, number("reset", "time", time))
         self._params, self._failed, self._compared = params, None, False
-        return self._run.shown(u)
+        return self.run.shown(u)
 
     @as_annotated
     def step(self, inputs: ArrayLike = 0.0) -> np.ndarray:
@@ -285,12 +220,12 @@ class Stepper:
         u = self._inputs(inputs)
         if self._failed is not None:
             return self._ended()
-        before, start = self._run.states, self._run.k == 0
-        outputs = self._run.advance(u)
+        before, start = self.run.states, self.run.k == 0
+        outputs = self.run.advance(u)
         if start and not self._compared and outputs is not None:
             self._compared = True
-            self._run.compared(before, self._params, self._audit)
-        return self._fail() if outputs is None else outputs
+            self.run.compared(before, self._params, self._audit)
+        return self.fail() if outputs is None else outputs
 
     @as_annotated
     def rollout(self, inputs: ArrayLike) -> np.ndarray:
@@ -322,7 +257,7 @@ class Stepper:
         here = self.snapshot()
         rows = np.full((self.compiled.system.noutputs or 0, given.shape[1]), np.nan)
         for k, u in enumerate(np.ascontiguousarray(given.T, dtype=float)):
-            outputs = None if self._failed is not None else self._run.advance(u)
+            outputs = None if self._failed is not None else self.run.advance(u)
             if outputs is None:
                 break
             rows[:, k] = outputs
@@ -337,7 +272,7 @@ class Stepper:
         StepperState
             It does not change when the run continues.
         """
-        run, states = self._run, self._run.states.copy()
+        run, states = self.run, self.run.states.copy()
         states.flags.writeable = False
         return StepperState(
             time=run.time, states=states, params=self._params, failed=self._failed,
@@ -358,12 +293,12 @@ class Stepper:
         ParameterError
             If it is that of another stepper.
         """
-        if not isinstance(state, StepperState) or state.owner is not self._run:
+        if not isinstance(state, StepperState) or state.owner is not self.run:
             raise ParameterError(
                 f"restore needs a state that snapshot() of this stepper has returned, got "
                 f"{'one of another' if isinstance(state, StepperState) else repr(state)}"
             )
-        self._run.go_back(state.kept)
+        self.run.go_back(state.kept)
         self._params, self._failed = state.params, state.failed
 
     def __repr__(self) -> str:
@@ -388,10 +323,21 @@ class Stepper:
             )
         return given.astype(float)
 
-    def _fail(self) -> np.ndarray:
-        """Note why the run has ended; raise it, or return NaN."""
-        result, p = self._run.ended(), self._run.p
-        name, t = self.compiled.system.name, self._run.time
+    def fail(self) -> np.ndarray:
+        """Note why the run has ended; raise it, or return NaN.
+
+        Returns
+        -------
+        ndarray of shape (noutputs,)
+            NaN, where errors are ignored.
+
+        Raises
+        ------
+        DivergedError
+            Why it has ended, where they are not.
+        """
+        result, p = self.run.ended(), self.run.p
+        name, t = self.compiled.system.name, self.run.time
         self._failed = failure(self.compiled, result, p, self._params) or DivergedError(
             f"'{name}' diverged: no finite outputs at t = {t:.6g} s", t
         )

@@ -22,7 +22,7 @@ from ..run import Run
 from ..settings import Settings
 
 HELD_STEPS = 500  # of a window
-_TIMES = list(type_of(Task).formats).index("times")  # row of the task's table
+TIMES_ROW = list(type_of(Task).formats).index("times")  # of the task's table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,7 @@ class Window:
     memory: np.ndarray  # all that the run knows but for its inputs
     ending: tuple[Any, Any]  # for the outputs at the end of a step
     first: int  # number of the first of these steps
-    times: np.ndarray  # shape (2 HELD_STEPS,); what the task's times are in full (s)
+    times: np.ndarray  # what the task's times are in full (s)
     # shape (cells,); what the task has of the cells of these times: until when a step may lead (s)
     reach: np.ndarray
 
@@ -117,7 +117,7 @@ def in_full(window: Window) -> Run:
 def _ending_at(window: Window, last: int) -> Run:
     """Return the run of a window with so many times: in place, all else of the task stays."""
     task = window.run.task
-    task.table[_TIMES, 1] = last
+    task.table[TIMES_ROW, 1] = last
     if not is_jit_disabled():
         return window.run
     return replace(window.run, task=task._replace(times=window.times[:last]))
@@ -128,13 +128,13 @@ def following(
 ) -> Window:
     """Return the window of the steps that follow, with what is known then of functions of t."""
     first = window.first + HELD_STEPS
-    times, work = held_grid(*span, first), window.run.work
+    times, work, end = held_grid(*span, first), window.run.work, window.place(first - 1) + 1
     fresh = _laid(compiled, times, work.x[:, 0], p, settings)
     old, new = window.run.task, fresh.task
     task = with_fields(new, stiff=old.stiff, taylor=old.taylor, pair=old.pair)
-    task.inputs[:, 0] = old.inputs[:, -1]
+    task.inputs[:, 0] = old.inputs[:, end]
     shown = np.zeros((times.size, *work.past.shown.shape[1:]))
-    shown[0] = work.past.shown[window.times.size - 1]
+    shown[0] = work.past.shown[end]
     work = with_fields(
         work, past=with_fields(work.past, shown=shown),
         samples=np.full((times.size, *work.samples.shape[1:]), np.nan),
@@ -168,24 +168,40 @@ _SHOWN = {  # what a step fills and nothing reads later
 }
 
 
-def in_one_piece(work: Any) -> tuple[Any, np.ndarray]:
-    """Return a workspace with its arrays in one piece of memory, and that memory."""
-    arrays = {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
-    places: dict[int, int] = {}  # arrays that are the same memory stay so
-    size = 0
-    for array in arrays.values():
-        if data_address(array) not in places:
-            places[data_address(array)] = size
-            size += -(-array.nbytes // _LINE) * _LINE
-    whole = np.zeros(size + _LINE, np.uint8)
-    first = -whole.ctypes.data % _LINE
-    memory = whole[first : first + size]
+def in_one_piece(work: Any, memory: np.ndarray | None = None) -> tuple[Any, np.ndarray]:
+    """Return a workspace with its arrays in one piece of memory, this or a new one, and that."""
+    places, size = _places(work)
+    if memory is None:
+        whole = np.zeros(size + _LINE, np.uint8)
+        first = -whole.ctypes.data % _LINE
+        memory = whole[first : first + size]
     views = {}
-    for path, array in arrays.items():
+    for path, array in _kept_arrays(work).items():
         begin = places[data_address(array)]
         views[path] = memory[begin : begin + array.nbytes].view(array.dtype).reshape(array.shape)
         views[path][:] = array
     return _with_arrays(work, views), memory
+
+
+def memory_size(work: Any) -> int:
+    """Return how many bytes a workspace takes in one piece."""
+    return _places(work)[1]
+
+
+def _places(work: Any) -> tuple[dict[int, int], int]:
+    """Return where arrays begin in one piece of memory, by their addresses now, and its size."""
+    places: dict[int, int] = {}  # arrays that are the same memory stay so
+    size = 0
+    for array in _kept_arrays(work).values():
+        if data_address(array) not in places:
+            places[data_address(array)] = size
+            size += -(-array.nbytes // _LINE) * _LINE
+    return places, size
+
+
+def _kept_arrays(work: Any) -> dict[tuple[str, ...], np.ndarray]:
+    """Return the arrays of a workspace that a run reads again, by their names."""
+    return {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
 
 
 def _arrays(record: Any, path: tuple[str, ...] = ()) -> Any:

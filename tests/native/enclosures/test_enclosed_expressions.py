@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from examples import many, parted
 from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -43,7 +44,7 @@ def outside(code, low, high, points):
     return missed, taken
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", parted(range(6)))
 def test_no_sample_of_a_random_expression_is_outside(seed):
     """All operations, with poles, jumps, ends of domains, points and sides without an end."""
     rng = np.random.default_rng(seed)
@@ -58,7 +59,7 @@ def test_no_sample_of_a_random_expression_is_outside(seed):
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=25)
+@settings(max_examples=many(25, part=3))
 def test_a_smaller_box_has_a_smaller_range(seed):
     """Inclusion is monotone, to the rounding of functions: and what has a value keeps it."""
     rng = np.random.default_rng(seed)

@@ -47,3 +47,27 @@ def test_windows_of_any_width_and_height(compiled, method, rtol):
         )  # fmt: skip
         exact = end_of(**params)
         assert run.states[0, -1] == pytest.approx(exact, abs=50 * rtol * max(1, abs(exact))), params
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_a_product_that_is_negative_for_a_moment(method):
+    """(x - a) (x - b) < 0 with x = t: for b - a, 1e-6, where the product is 2.5e-13 at most."""
+
+    def hit(t, x, u, params):
+        return [1.0, np.where((x[0] - 0.5) * (x[0] - 0.500001) < 0, 1e6, 0.0)]
+
+    system = ct.nlsys(hit, None, inputs=0, outputs=2, states=2, name="hit")
+    made = nlctl.input_output_response(system, [0, 10], 0, 0, method=method)
+    np.testing.assert_allclose(made.states[:, -1], [10.0, 1.0], rtol=0, atol=1e-6)
+
+
+def test_a_pulse_of_a_function_that_is_called_is_seen_from_rest():
+    """1 for 0.5 s of 100 s, with no output sample inside."""
+    pulses = [0.0] * 200
+    pulses[83] = 1.0
+    system = ct.nlsys(
+        lambda t, x, u, params: [pulses[min(int(2 * t), 199)]], None, inputs=0, outputs=1,
+        states=1, name="driven",
+    )  # fmt: skip
+    made = nlctl.input_output_response(system, [0, 100], 0, 0, engine="native")
+    np.testing.assert_allclose(made.states[0, -1], 0.5, rtol=0, atol=1e-5)

@@ -156,7 +156,7 @@ def test_it_has_no_path_of_the_machine_that_made_it():
     assert b".py" not in code
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_made_anew_it_is_the_same_file(tmp_path):
     """Whoever makes it, on whatever machine, with the same numba."""
     if header()["numba"] != numba.__version__:

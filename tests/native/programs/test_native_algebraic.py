@@ -3,6 +3,7 @@
 import control as ct
 import numpy as np
 import pytest
+from examples import many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_plan import interpreted
@@ -90,7 +91,7 @@ def test_a_loop_is_an_error_unless_asked_for():
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=many(25, part=3))
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(0, 10**6))
 def test_rings_of_direct_feedthrough_are_exact_to_rounding(count, size, seed):
     """Linear blocks in a ring, states included, agree with the closed loop of matrix algebra."""

@@ -67,7 +67,7 @@ def static(function, inputs=1, outputs=1, **params):
 
 
 @pytest.mark.slow
-@settings(max_examples=many(150))
+@settings(max_examples=many(150, part=15))
 @given(diagrams_of.diagrams(), st.integers(0, 1000), st.sampled_from([1, 2]))
 def test_random_diagrams_agree_with_python_control(diagram, seed, lanes):
     """Random blocks, wiring, gains, nesting, linear parts."""
@@ -500,7 +500,7 @@ STEPS = st.tuples(st.integers(0, 9), *[st.integers(0, 20)] * 3)
 
 
 @pytest.mark.slow
-@settings(max_examples=many(100, part=12))
+@settings(max_examples=many(100, part=25))
 @given(st.lists(STEPS, max_size=7), st.sampled_from([9, 16, 20]), st.sampled_from([1, 2]),
        st.booleans())  # fmt: skip
 def test_random_programs_of_vectors_agree_with_numpy(steps, n, lanes, opaque):

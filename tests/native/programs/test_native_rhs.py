@@ -108,7 +108,7 @@ def diagrams(draw):
 
 
 @pytest.mark.slow
-@settings(max_examples=many(500))
+@settings(max_examples=many(500, part=10))
 @given(diagrams(), st.integers(0, 1000))
 def test_random_diagrams_agree_with_python_control(diagram, seed):
     """Random blocks, wiring, gains, nesting, linear parts: the emitted source agrees."""

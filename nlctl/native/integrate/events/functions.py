@@ -9,6 +9,7 @@ import numpy as np
 
 from ..memory import Places1, Places2, Reals1, Reals2, Reals3, arrays_of
 from ..state import INNER
+from .location import SMALL_KINK
 
 
 class EventRows(NamedTuple):
@@ -103,12 +104,19 @@ def has_events(w):
 
 
 @numba.njit(**INNER)
-def begin_next(w, j):
+def at_zero(task, i, value):
+    """Whether a condition is on neither side: exactly 0, at a kink what rounding makes of that."""
+    is_kink = task.rows.bending <= i < task.rows.declared
+    return value == 0.0 or (is_kink and abs(value) <= SMALL_KINK * task.atol)
+
+
+@numba.njit(**INNER)
+def begin_next(task, w, j):
     """Make what event functions are at the end of a lane's step those of the next one's start."""
     events, memories = w.events, w.memories
     for i in range(events.g.shape[0]):
         events.g_start[i, j] = events.g[i, j]
-        if events.g[i, j] != 0.0:
+        if not at_zero(task, i, events.g[i, j]):
             events.came[i, j] = np.sign(events.g[i, j])
     for i in range(memories.m.shape[0]):
         memories.m_start[i, j] = memories.m[i, j]
