@@ -11,25 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .errors import ParameterError
-from .params import as_numbers, integer
+from .params import as_numbers
+from .params import integer as integer
 from .wording import nearest
-
-__all__ = [
-    "ATOL",
-    "RTOL",
-    "a_function",
-    "flag",
-    "fraction",
-    "integer",
-    "number",
-    "of_type",
-    "one_of",
-    "pairs",
-    "text",
-    "tolerances",
-    "tuple_of",
-    "vector",
-]
 
 _T = TypeVar("_T")
 RTOL, ATOL = 1e-8, 1e-10  # of every run unless it is given others: a member of an ensemble is a run

@@ -42,10 +42,12 @@ class Spec(Protocol):
 
     Attributes
     ----------
-    inputs, outputs, states : sequence of str
-        Names of the signals and states.
+    inputs, outputs : sequence of str
+        Names of the signals.
+    states : sequence of str
+        Names of the states; `nlctl.record` makes it () where there is no `update`.
     feedthrough : bool
-        Whether an output depends on `u` at the same instant.
+        Whether an output depends on `u` at the same instant; `nlctl.record` makes it True.
     output : callable
         ``output(t, x, u, p)`` returns the outputs, as a tuple or a 1-D array: `t` is the time in
         s, `x` the states, `u` the inputs, and `p` holds the record's parameters (``p.b_r``).
@@ -94,9 +96,8 @@ class Spec(Protocol):
 
     >>> @nlctl.record
     ... class Square:
-    ...     inputs, outputs, states, feedthrough = ("u",), ("v",), (), True
+    ...     inputs, outputs = ("u",), ("v",)
     ...
-    ...     @staticmethod
     ...     @nlctl.equation
     ...     def output(t, x, u, p):
     ...         return (u[0] ** 2,)
@@ -108,10 +109,6 @@ class Spec(Protocol):
     def inputs(self) -> Sequence[str]: ...
     @property
     def outputs(self) -> Sequence[str]: ...
-    @property
-    def states(self) -> Sequence[str]: ...
-    @property
-    def feedthrough(self) -> bool: ...
 
     @property
     def output(self) -> Any:
@@ -192,32 +189,11 @@ class Block(OwnParameters):
             )
         return complex(describing_function(self, A))
 
-    def answer(self, t: float, x: Any, u: Any) -> Any:
-        """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now.
-
-        Parameters
-        ----------
-        t : float
-            Time (s).
-        x : array_like of shape (n,)
-            States.
-        u : array_like of shape (m,)
-            Inputs.
-
-        Returns
-        -------
-        ndarray of shape (k,)
-            The outputs.
-
-        Raises
-        ------
-        UsageError
-            If nothing is: it is a transport delay, for example, which python-control would run
-            wrongly.
-        """
+    def _answer(self, t: float, x: Any, u: Any) -> Any:
+        """Return its outputs; if these are supplied, see `nlctl.supplied`, what is supplied now."""
         supplied = supplied_of(self)
         if supplied is None:
-            return super().answer(t, x, u)
+            return super()._answer(t, x, u)
         now = supplied_now(self)
         if now is None:
             raise UsageError(f"block '{self.name}' {supplied.why}")
@@ -235,29 +211,16 @@ class Block(OwnParameters):
                 raise unknown("parameter", name, fields, f"of block '{self.name}'")
         return overrides
 
-    def taken(self, params: Mapping[str, Any]) -> Any:
-        """Return what equations get as `p`; python-control asks for it before a run.
-
-        Parameters
-        ----------
-        params : mapping
-            Overrides of this run, by the names of the block's parameters.
-
-        Returns
-        -------
-        object
-            What the equations read as `p`: a number or an array under each name.
-        """
+    def _taken(self, params: Mapping[str, Any]) -> Any:
+        """Return what equations get as `p`; python-control asks for it before a run."""
         before, self.current_spec = self.current_spec, self._resolved(params)
         if self.current_spec is before:
             return current_parameters(self)
         return equation_arguments(self.current_spec)
 
     def _resolved(self, params: Mapping[str, Any]) -> Any:
-        """Return the record with overrides; they must not change the number of signals.
-
-        Without any it is the record itself, which was checked when it was made.
-        """
+        """Return the record with overrides; they must not change the number of signals."""
+        # Without any it is the record itself, which was checked when it was made.
         spec, given = self.spec, self._own(params)
         if not is_checked(spec) or any(v is not getattr(spec, k, given) for k, v in given.items()):
             spec = with_overrides(spec, given, self.name)

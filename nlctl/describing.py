@@ -120,10 +120,7 @@ def _rig(block: Any) -> Compiled:
         _harmonic, None, inputs=["v"], outputs=["b", "a"], states=["b", "a"],
         params={"omega": 1.0}, name="harmonic",
     )  # fmt: skip
-    input_, output = (
-        f"{system.name}.{system.input_labels[0]}",
-        f"{system.name}.{system.output_labels[0]}",
-    )
+    input_, output = _ends(system)
     rig = interconnect(
         [sine, system, harmonic], [[input_, "sine.u"], ["harmonic.v", output]],
         outlist=["harmonic.b", "harmonic.a"], name=f"describing function of {system.name}",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, TypeVar
 
 from numba.extending import register_jitable
 
 from .errors import ParameterError
+from .params import MARKED
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -47,4 +49,6 @@ def equation(function: _Function) -> _Function:
     """
     if not callable(function):
         raise ParameterError(f"equation needs a function, got {type(function).__name__}")
+    if isinstance(function, FunctionType):
+        MARKED.add(function)
     return register_jitable(function)

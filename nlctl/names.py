@@ -44,10 +44,8 @@ def unknown(
 
 
 def base_name(name: str) -> str:
-    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``.
-
-    Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
-    """
+    """Return a parameter's name without an element index: ``"c.lambdas[0]"`` -> ``"c.lambdas"``."""
+    # Block names may hold brackets as well (python-control's generic ``sys[0]``); they stay.
     path, dot, last = name.rpartition(".")
     return path + dot + last.partition("[")[0]
 
@@ -87,36 +85,24 @@ def renamed(who: str, kind: str, had: list[str], given: Any) -> list[str]:
 
 
 class Parameters(dict[str, Any]):
-    """``{qualified name: value}`` of a block or diagram, for use as python-control ``params``.
-
-    Attributes
-    ----------
-    block : Block or None
-        The block whose parameters these are; None for a diagram's.
-    scope : control.InputOutputSystem or None
-        Diagram whose name is put in front of every key when the diagram is nested in another.
-    clashes : set of str
-        Keys that do not stand for exactly one block.  Each block then keeps its own value, and
-        an override of such a name is refused.
-    table : Parameters or None
-        The enclosing diagram's parameters, known while python-control hands overrides down.
-    complete : bool
-        Whether this is a copy.  What was not copied yet is a block's own values, or a diagram's
-        parameters while python-control still collects them.
-    strays : list of str
-        Names in a plain dict that mean no block here.  In a copy that python-control hands down
-        they are those of blocks elsewhere; in a diagram's own parameters they are misspelt, which
-        shows when a run asks for them.
-    """
+    """``{qualified name: value}`` of a block or diagram, for use as python-control ``params``."""
 
     def __init__(self, values: Mapping[str, Any], block: Any = None) -> None:
         super().__init__(values)
-        self.block = block
+        self.block = block  # whose parameters these are; None for a diagram's
         self.owners: dict[str, Any] = dict.fromkeys(values, block)
+        # keys that do not stand for exactly one block: each keeps its own value, and an override
+        # of such a name is refused
         self.clashes: set[str] = set()
+        # the diagram whose name is put in front of every key when it is nested in another
         self.scope: ct.InputOutputSystem | None = None
+        # the enclosing diagram's parameters, known while python-control hands overrides down
         self.table: Parameters | None = None
+        # whether this is a copy: what was not copied yet is a block's own values, or a diagram's
+        # parameters while python-control still collects them
         self.complete = False
+        # names in a plain dict that mean no block here: in a copy that python-control hands down
+        # those of blocks elsewhere, in a diagram's own parameters misspelt ones
         self.strays: list[str] = []
 
     @property
@@ -256,10 +242,8 @@ class Parameters(dict[str, Any]):
         return True
 
     def _path_of_bare(self, name: str) -> str:
-        """Return the path of the block that a name without one means, if it means one.
-
-        It is a third-party block's, unless it looks like one of ours cut short.
-        """
+        """Return the path of the block that a name without one means, if it means one."""
+        # It is a third-party block's, unless it looks like one of ours cut short.
         names, _ = self._known_names()
         twins = [k for k in names if k.endswith("." + base_name(name))]
         if name in names or not twins:

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import math
 import re
 from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
+from types import FunctionType
 from typing import Any, TypeVar, dataclass_transform
+from weakref import WeakSet
 
 import numpy as np
 
@@ -20,10 +23,13 @@ from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 from .pickles import state_of, with_state
 
+Floats = tuple[float, ...]
+Matrix = tuple[Floats, ...]
 _T = TypeVar("_T")
 _KEY = "nlctl"
 _MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
 HIGHEST_ORDER = 100  # of plants and references: a block has a signal for each derivative
+MARKED: WeakSet[Callable[..., Any]] = WeakSet()  # what `nlctl.equation` has marked
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -145,7 +151,9 @@ def record(cls: type[_T]) -> type[_T]:
     """Make a class a frozen, keyword-only dataclass whose parameters are checked at birth.
 
     Bounds come from `param`; a method ``check(self)``, where the class has one, looks at rules
-    that concern several fields and raises `ParameterError`.
+    that concern several fields and raises `ParameterError`.  Its equations become static methods.
+    Of a block, see `nlctl.Spec`, ``feedthrough`` is True unless the class says otherwise, and
+    without an ``update`` there are no states.
 
     Parameters
     ----------
@@ -184,6 +192,7 @@ def record(cls: type[_T]) -> type[_T]:
         cls.__post_init__ = check_params  # type: ignore[attr-defined]
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    _complete(described)
     described.__doc__ = _documented(described, doc or "")
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
@@ -208,6 +217,18 @@ def record(cls: type[_T]) -> type[_T]:
     return described
 
 
+def _complete(cls: Any) -> None:
+    """Make the equations of a class static methods, and set what goes without saying."""
+    fields = {field.name for field in dataclasses.fields(cls)}
+    for name, value in list(vars(cls).items()):
+        if name not in fields and isinstance(value, FunctionType) and value in MARKED:
+            setattr(cls, name, staticmethod(value))
+    if hasattr(cls, "output"):
+        cls.feedthrough = getattr(cls, "feedthrough", True)
+        if not hasattr(cls, "update"):
+            cls.states = getattr(cls, "states", ())
+
+
 def _documented(cls: Any, doc: str) -> str:
     """Return the docstring of a record class with all fields in numpydoc's Parameters."""
     margin = doc.rpartition("\n")[2]  # what stands in front of the closing quotes
@@ -217,7 +238,8 @@ def _documented(cls: Any, doc: str) -> str:
     lines = []
     for field in dataclasses.fields(cls):
         if field.name not in told_of:
-            lines += _entry(field, declared_params(cls).get(field.name))
+            inherited = _inherited_entry(cls, field.name)
+            lines += inherited or _entry(field, declared_params(cls).get(field.name))
     if not lines:
         return doc
     entries = "".join(f"{margin}{line}\n" for line in lines)
@@ -231,9 +253,19 @@ def _documented(cls: Any, doc: str) -> str:
     return f"{doc.rstrip()}\n\n{section}"
 
 
+def _inherited_entry(cls: type, name: str) -> list[str]:
+    """Return the lines in which a base class describes a field; none if it has another default."""
+    for base in cls.__mro__[1:]:
+        entry = re.search(rf"^([ \t]*){name} : .+(?:\n\1[ \t]+\S.*)+", base.__doc__ or "", re.M)
+        if entry and getattr(cls, name, None) == getattr(base, name, None):
+            return inspect.cleandoc(f"\n{entry[0]}").splitlines()
+    return []
+
+
 def _entry(field: Any, rule: Param | None) -> list[str]:
     """Return the lines of one field: name, type and default; meaning, unit and bounds."""
     kind = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", "")
+    kind = {"Floats": "tuple of float", "Matrix": "tuple of tuple of float"}.get(kind, kind)
     default = "" if field.default is dataclasses.MISSING else _default_text(field.default)
     head = f"{field.name} : {kind}{default}"
     if rule is None:
@@ -322,6 +354,13 @@ def integer(who: str, name: str, value: Any, at_least: int, at_most: float = mat
     return int(value)
 
 
+def set_integer(spec: Any, name: str, at_least: int, at_most: float = math.inf) -> None:
+    """Check an argument of a record, such as an order, and keep it as an int."""
+    label = "an order" if name == "order" else name
+    value = integer(type(spec).__name__, label, getattr(spec, name), at_least, at_most)
+    object.__setattr__(spec, name, value)
+
+
 def checked_times(timepts: Any) -> np.ndarray:
     """Return a time grid as a float array."""
     times = as_numbers(timepts)
@@ -392,11 +431,9 @@ def _arguments_type(name: str, fields: tuple[str, ...]) -> type:
 
 
 def equation_arguments(spec: Any) -> Any:
-    """Return what the equations of `spec` receive as ``p``: its numbers as a named tuple.
-
-    Vectors and matrices become read-only float arrays.  A record may add numbers that follow
-    from its parameters with a method ``derived(self) -> dict``.
-    """
+    """Return what the equations of `spec` receive as ``p``: its numbers as a named tuple."""
+    # Vectors and matrices become read-only float arrays. A record may add numbers that follow
+    # from its parameters with a method ``derived(self) -> dict``.
     values = {name: getattr(spec, name) for name in declared_params(spec)}
     if hasattr(spec, "derived"):
         values |= spec.derived()

@@ -18,7 +18,7 @@ from .arguments import a_function
 from .equations import equation
 from .errors import ParameterError
 from .names import unknown
-from .params import HIGHEST_ORDER, integer, param, record
+from .params import HIGHEST_ORDER, Floats, param, record, set_integer
 
 __all__ = ["ForcedDuffing", "Genesio", "PureFeedback", "WingRock"]
 
@@ -87,12 +87,11 @@ class PureFeedback:
 
     inputs = ("v",)
     feedthrough = False
-    output = staticmethod(measured_state)
+    output = measured_state
 
     def check(self) -> None:
         """Refuse an order below 1 and an initial value for a state that does not exist."""
-        order = integer("PureFeedback", "an order", self.order, at_least=1, at_most=HIGHEST_ORDER)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1, at_most=HIGHEST_ORDER)
         a_function("PureFeedback", "f", self.f)
         a_function("PureFeedback", "d", self.d)
         for name, value in self.initial.items():
@@ -101,15 +100,8 @@ class PureFeedback:
             if not np.isfinite(value):
                 raise ParameterError(f"PureFeedback needs a finite initial {name}, got {value}")
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(self.order)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names y, x1, ..., xn."""
-        return ("y", *self.states)
+    states = property(lambda self: coordinate_names(self.order))
+    outputs = property(lambda self: ("y", *self.states))
 
     @cached_property
     def terms(self) -> tuple[Callable, Callable]:
@@ -134,10 +126,8 @@ class PureFeedback:
 
 @equation
 def duffing_f(x, v, p):
-    """Example 1: f(x, v) = -p1 x1 - p x2 - x1^3 + h(x, v), with p = 0.2 + 0.2 cos(5 x1).
-
-    h(x, v) = (1 + 0.1 cos x1) (1 + 0.2 cos v) v is the non-affine term.
-    """
+    """Example 1: f(x, v) = -p1 x1 - p x2 - x1^3 + h(x, v), with p = 0.2 + 0.2 cos(5 x1)."""
+    # h(x, v) = (1 + 0.1 cos x1) (1 + 0.2 cos v) v is the non-affine term.
     x1, x2 = x
     damping = p.p_mean + p.p_ripple * np.cos(5 * x1)
     h = (1 + p.gain_x * np.cos(x1)) * (1 + p.gain_v * np.cos(v)) * v
@@ -146,22 +136,19 @@ def duffing_f(x, v, p):
 
 @equation
 def duffing_forcing(t, p):
-    """Example 1: q cos(w t) with q = 5 + 0.1 cos t and w = 0.5 + 0.1 sin t.
-
-    Read literally, w(t) t is a chirp: its instantaneous frequency grows with t.  With
-    ``integrate_w`` the phase is the integral of w from 0 to t, and the frequency stays bounded.
-    """
+    """Example 1: q cos(w t) with q = 5 + 0.1 cos t and w = 0.5 + 0.1 sin t."""
+    # Read literally, w(t) t is a chirp: its instantaneous frequency grows with t. With
+    # ``integrate_w`` the phase is the integral of w from 0 to t, and the frequency stays
+    # bounded.
     swing = 1 - np.cos(t) if p.integrate_w else t * np.sin(t)
     return (p.q_mean + p.q_ripple * np.cos(t)) * np.cos(p.w_mean * t + p.w_ripple * swing)
 
 
 @equation
 def duffing_d(x, t, p):
-    """Example 1: everything that a static network cannot represent.
-
-    The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is not
-    a function of x and so belongs to the disturbance of (1), not to g(x).
-    """
+    """Example 1: everything that a static network cannot represent."""
+    # The paper's d(x, t) = 0.1 (x1^2 + x2^2) sin t, and the forcing q cos(w t), which is not
+    # a function of x and so belongs to the disturbance of (1), not to g(x).
     x1, x2 = x
     return duffing_forcing(t, p) + p.d_amplitude * (x1 * x1 + x2 * x2) * np.sin(t + p.d_phase)
 
@@ -211,18 +198,16 @@ class ForcedDuffing:
     initial = {"x1": 0.5}
     feedthrough = False
 
-    f = staticmethod(duffing_f)
-    d = staticmethod(duffing_d)
-    update = staticmethod(integrator_chain(duffing_f, duffing_d))
-    output = staticmethod(measured_state)
+    f = duffing_f
+    d = duffing_d
+    update = integrator_chain(duffing_f, duffing_d)
+    output = measured_state
 
 
 @equation
 def genesio_f(x, v, p):
-    """Example 2: f(x, v) = -c x1 - b x2 - a x3 + x1^2 + h(x, v).
-
-    h(x, v) = (2 + cos x1) (1 + 0.2 sin^2 v) v is the non-affine term.
-    """
+    """Example 2: f(x, v) = -c x1 - b x2 - a x3 + x1^2 + h(x, v)."""
+    # h(x, v) = (2 + cos x1) (1 + 0.2 sin^2 v) v is the non-affine term.
     x1, x2, x3 = x
     sine = np.sin(v)
     h = (p.gain_mean + p.gain_x * np.cos(x1)) * (1 + p.gain_v * sine * sine) * v
@@ -269,10 +254,10 @@ class Genesio:
     initial = {"x1": 1.0}
     feedthrough = False
 
-    f = staticmethod(genesio_f)
-    d = staticmethod(genesio_d)
-    update = staticmethod(integrator_chain(genesio_f, genesio_d))
-    output = staticmethod(measured_state)
+    f = genesio_f
+    d = genesio_d
+    update = integrator_chain(genesio_f, genesio_d)
+    output = measured_state
 
 
 @equation
@@ -325,7 +310,7 @@ class WingRock:
     [0.8, 0.4]
     """
 
-    w: tuple[float, ...] = param(
+    w: Floats = param(
         (0.8, 0.2314, 0.6918, -0.6245, 0.0095, 0.0214), unit="s^-2", meaning="weights w_0, ..., w_5"
     )
     L: float = param(3.0, unit="1/s^2", meaning="effect of the ailerons")
@@ -334,19 +319,17 @@ class WingRock:
     outputs = ("y", "x1", "x2", "x2_dot")
     states = ("x1", "x2")
     initial = {"x1": 1.2, "x2": 1.0}
-    feedthrough = True
 
-    f = staticmethod(wing_rock_f)
-    d = staticmethod(wing_rock_d)
-    update = staticmethod(integrator_chain(wing_rock_f, wing_rock_d))
-    output = staticmethod(wing_rock_output)
+    f = wing_rock_f
+    d = wing_rock_d
+    update = integrator_chain(wing_rock_f, wing_rock_d)
+    output = wing_rock_output
 
     def check(self) -> None:
         """Six weights."""
         if len(self.w) != 6:
             raise ParameterError(f"WingRock needs 6 weights w, got {len(self.w)}")
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +17,7 @@ from .arguments import pairs
 from .equations import equation
 from .errors import ParameterError
 from .functions import noise_spectrum, noise_value
-from .params import HIGHEST_ORDER, integer, param, record
+from .params import HIGHEST_ORDER, Floats, param, record, set_integer
 from .wording import counted
 
 __all__ = ["BandLimitedNoise", "FilteredStep", "FunctionReference", "SumOfSines"]
@@ -27,22 +28,32 @@ def derivative_names(order: int) -> tuple[str, ...]:
     return ("yd", *(f"yd{k}" for k in range(1, order + 1)))
 
 
-def _check_order(spec: Any) -> None:
-    """A reference has an integer number of derivatives."""
-    order = integer(type(spec).__name__, "an order", spec.order, at_least=0, at_most=HIGHEST_ORDER)
-    object.__setattr__(spec, "order", order)
-
-
 @record
-class SumOfSines:
-    """Sum of sines with all derivatives up to order n; by default the paper's.
-
-        yd = sum_i a_i sin(w_i t + phi_i) = 0.5 (sin t + sin 0.5 t)
+class _Reference:
+    """What references share: yd and its derivatives.
 
     Parameters
     ----------
     order : int, optional
         Number n >= 0 of derivatives that are outputs.
+    """
+
+    order: int = 2
+
+    inputs = ()
+    feedthrough = False
+    outputs = property(lambda self: derivative_names(self.order))
+
+    def check(self) -> None:
+        """An integer number of derivatives."""
+        set_integer(self, "order", at_least=0, at_most=HIGHEST_ORDER)
+
+
+@record
+class SumOfSines(_Reference):
+    """Sum of sines with all derivatives up to order n; by default the paper's.
+
+        yd = sum_i a_i sin(w_i t + phi_i) = 0.5 (sin t + sin 0.5 t)
 
     Examples
     --------
@@ -53,18 +64,11 @@ class SumOfSines:
     [0.   0.75 0.  ]
     """
 
-    order: int = 2
-    amplitudes: tuple[float, ...] = param(
-        (0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a"
-    )
-    frequencies: tuple[float, ...] = param(
+    amplitudes: Floats = param((0.5, 0.5), unit="1", meaning="amplitudes a_i", symbol="a")
+    frequencies: Floats = param(
         (1.0, 0.5), unit="rad/s", meaning="frequencies w_i", at_least=0, symbol="w"
     )
-    phases: tuple[float, ...] = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
-
-    inputs = ()
-    states = ()
-    feedthrough = False
+    phases: Floats = param((0.0, 0.0), unit="rad", meaning="phases phi_i", symbol="phi")
 
     def derived(self) -> dict[str, Any]:
         """The number of derivatives, for the equation."""
@@ -72,7 +76,7 @@ class SumOfSines:
 
     def check(self) -> None:
         """One amplitude, frequency and phase per sine."""
-        _check_order(self)
+        super().check()
         sizes = len(self.amplitudes), len(self.frequencies), len(self.phases)
         if len(set(sizes)) > 1:
             raise ParameterError(
@@ -80,12 +84,6 @@ class SumOfSines:
                 "{}, {} and {}".format(*sizes)
             )
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The k-th derivative of sin is a shift of the phase by k pi / 2."""
@@ -97,15 +95,10 @@ class SumOfSines:
 
 
 @record
-class FilteredStep:
+class FilteredStep(_Reference):
     """A step through a reference filter of order n + 1, so that yd^(n) is continuous.
 
         yd = [omega / (s + omega)]^(n+1) step,    step = height for t >= t_step, otherwise 0
-
-    Parameters
-    ----------
-    order : int, optional
-        Number n >= 0 of derivatives that are outputs.
 
     Examples
     --------
@@ -118,25 +111,12 @@ class FilteredStep:
     0.632121 0.632121
     """
 
-    order: int = 2
     height: float = param(1.0, unit="1", meaning="height of the step")
     t_step: float = param(0.0, unit="s", meaning="time of the step")
     omega: float = param(2.0, unit="rad/s", meaning="corner frequency of the filter", above=0)
 
-    inputs = ()
-    feedthrough = False
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
-
-    states = outputs
     vector = True
-
-    def check(self) -> None:
-        """An integer number of derivatives."""
-        _check_order(self)
+    states = property(lambda self: self.outputs)
 
     def derived(self) -> dict[str, Any]:
         """Coefficients of (s/omega + 1)^(n+1) at s^0, ..., s^n, times omega^(n+1)."""
@@ -145,22 +125,19 @@ class FilteredStep:
             "coefficients": np.array([math.comb(m, k) * self.omega ** (m - k) for k in range(m)])
         }
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Filter in controller form; its states are yd and its derivatives."""
         step = p.height * p.coefficients[0] if t >= p.t_step else 0.0
         return np.append(x[1:], step - np.sum(p.coefficients * x))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The filter's states."""
         return x.copy()
 
 
 @record
-class FunctionReference:
+class FunctionReference(_Reference):
     """A reference given by a function of time that returns yd and its derivatives.
 
     Parameters
@@ -178,27 +155,18 @@ class FunctionReference:
     >>> reference = nlctl.FunctionReference(order=2, function=ramp)
     """
 
-    order: int
+    order: int = field()
     function: Callable[[float], Sequence[float]]
-
-    inputs = ()
-    states = ()
-    feedthrough = False
 
     def check(self) -> None:
         """The function must return as many derivatives as promised."""
-        _check_order(self)
+        super().check()
         got = np.size(self.function(0.0))
         if got != self.order + 1:
             raise ParameterError(
                 f"FunctionReference of order {self.order} needs a function that returns "
                 f"{counted(self.order + 1, 'value')} ({', '.join(self.outputs)}), got {got}"
             )
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names yd, yd1, ..., ydn."""
-        return derivative_names(self.order)
 
     @cached_property
     def output(self) -> Callable:
@@ -213,7 +181,31 @@ class FunctionReference:
 
 
 @record
-class BandLimitedNoise:
+class NoiseBand:
+    """What is noise in a band of frequencies, and how it is drawn."""
+
+    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
+    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
+    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
+    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
+
+    def check(self) -> None:
+        """A band has two ends."""
+        if not self.low < self.high:
+            who = type(self).__name__
+            raise ParameterError(f"{who} needs low < high, got {self.low:g} and {self.high:g}")
+
+    def spectrum(self, count: int) -> tuple[np.ndarray, ...]:
+        """Return frequencies and phases of so many signals, each of shape (count, components)."""
+        drawn = [
+            noise_spectrum(self.low, self.high, [self.seed, i], self.components)
+            for i in range(count)
+        ]
+        return tuple(map(np.array, zip(*drawn, strict=True)))
+
+
+@record
+class BandLimitedNoise(NoiseBand):
     """Adds band-limited noise to signals: measurement noise, or a disturbance on the way.
 
         out_i(t) = in_i(t) + n_i(t)
@@ -241,35 +233,19 @@ class BandLimitedNoise:
     inputs: tuple[str, ...] = ("x1", "x2")
     outputs: tuple[str, ...] = ("x1_measured", "x2_measured")
     rms: float = param(0.01, unit="1", meaning="root mean square of each noise", at_least=0)
-    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
-    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
-    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
-    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
         """Signals come in pairs; a band has two ends."""
         pairs("BandLimitedNoise", self.inputs, self.outputs)
-        if not self.low < self.high:
-            raise ParameterError(
-                f"BandLimitedNoise needs low < high, got {self.low:g} and {self.high:g}"
-            )
+        super().check()
 
     def derived(self) -> dict[str, Any]:
         """Frequencies and phases, one row per signal."""
-        spectra = [
-            noise_spectrum(self.low, self.high, [self.seed, i], self.components)
-            for i in range(len(self.inputs))
-        ]
-        return {
-            "spectrum": np.array([s[0] for s in spectra]),
-            "angles": np.array([s[1] for s in spectra]),
-        }
+        omega, phase = self.spectrum(len(self.inputs))
+        return {"spectrum": omega, "angles": phase}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Each signal with its own noise."""

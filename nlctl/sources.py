@@ -13,7 +13,7 @@ import numpy as np
 from .arguments import are_names, flag, names_in, one_of
 from .equations import equation
 from .errors import ParameterError
-from .params import param, record
+from .params import Floats, param, record
 
 __all__ = ["Chirp", "Pulse", "PulseTrain", "Ramp", "Sine", "Square", "Step", "TimeTable"]
 
@@ -21,12 +21,27 @@ _EARLY = 1 + 2.0**-50  # start + k period, which rounding moves, has begun its p
 _MOST = 4096  # points of a table
 
 
-def _check_output(spec: Any) -> None:
-    """A source has one output."""
-    names = names_in(spec.outputs)
-    if len(names) != 1 or not are_names(names):
-        raise ParameterError(f"{type(spec).__name__} needs one name in outputs, got {names}")
-    object.__setattr__(spec, "outputs", names)
+@record
+class _Source:
+    """What sources share.
+
+    Parameters
+    ----------
+    outputs : tuple of str, optional
+        Name of the signal.
+    """
+
+    outputs: tuple[str, ...] = ("ref",)
+
+    inputs = ()
+    feedthrough = False
+
+    def check(self) -> None:
+        """One output."""
+        names = names_in(self.outputs)
+        if len(names) != 1 or not are_names(names):
+            raise ParameterError(f"{type(self).__name__} needs one name in outputs, got {names}")
+        object.__setattr__(self, "outputs", names)
 
 
 @equation
@@ -37,15 +52,10 @@ def since_period(t, start, period):
 
 
 @record
-class Step:
+class Step(_Source):
     """Step: offset before t_step, offset + height from then on.
 
         ref = offset + height [t >= t_step]
-
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
 
     Examples
     --------
@@ -54,16 +64,10 @@ class Step:
     [0.] [2.]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     height: float = param(1.0, unit="1", meaning="height of the step")
     t_step: float = param(0.0, unit="s", meaning="time of the step")
     offset: float = param(0.0, unit="1", meaning="value before the step")
 
-    inputs = states = ()
-    feedthrough = False
-    check = _check_output
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The value on either side of the step."""
@@ -73,15 +77,10 @@ class Step:
 
 
 @record
-class Ramp:
+class Ramp(_Source):
     """Ramp: offset before t_start, and a constant slope from then on.
 
         ref = offset + slope max(t - t_start, 0)
-
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
 
     Examples
     --------
@@ -90,16 +89,10 @@ class Ramp:
     [0.] [6.]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     slope: float = param(1.0, unit="1/s", meaning="slope")
     t_start: float = param(0.0, unit="s", meaning="time at which the ramp begins")
     offset: float = param(0.0, unit="1", meaning="value before the ramp")
 
-    inputs = states = ()
-    feedthrough = False
-    check = _check_output
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """A kink at t_start."""
@@ -107,15 +100,10 @@ class Ramp:
 
 
 @record
-class Sine:
+class Sine(_Source):
     """Sine with an offset; `nlctl.SumOfSines` has several, with derivatives.
 
         ref = offset + amplitude sin(omega t + phase)
-
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
 
     Examples
     --------
@@ -124,25 +112,18 @@ class Sine:
     [2.]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     amplitude: float = param(1.0, unit="1", meaning="amplitude")
     omega: float = param(1.0, unit="rad/s", meaning="angular frequency", at_least=0)
     phase: float = param(0.0, unit="rad", meaning="phase at t = 0", symbol="phi")
     offset: float = param(0.0, unit="1", meaning="mean value")
 
-    inputs = states = ()
-    feedthrough = False
-    check = _check_output
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The sine."""
         return (p.offset + p.amplitude * np.sin(p.omega * t + p.phase),)
 
 
 @record
-class Square:
+class Square(_Source):
     """Square wave: offset + amplitude in the first part of each period, then offset - amplitude.
 
         ref = offset               before t_start
@@ -155,11 +136,6 @@ class Square:
 
     over n = 1, 3, 5, ..., where omega = 2 pi / period.
 
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
-
     Examples
     --------
     >>> square = nlctl.block(nlctl.sources.Square(period=2.0, duty=0.25), "square")
@@ -167,18 +143,12 @@ class Square:
     [1.0, 1.0, -1.0, -1.0, 1.0]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     amplitude: float = param(1.0, unit="1", meaning="amplitude")
     period: float = param(1.0, unit="s", meaning="period", above=0, symbol="T")
     duty: float = param(0.5, unit="1", meaning="part of each period that is high", above=0, below=1)
     t_start: float = param(0.0, unit="s", meaning="beginning of the first period")
     offset: float = param(0.0, unit="1", meaning="value in the middle")
 
-    inputs = states = ()
-    feedthrough = False
-    check = _check_output
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High at first in each period, then low."""
@@ -190,15 +160,10 @@ class Square:
 
 
 @record
-class Pulse:
+class Pulse(_Source):
     """One rectangular pulse.
 
         ref = offset + height [t_start <= t < t_start + width]
-
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
 
     Examples
     --------
@@ -212,17 +177,11 @@ class Pulse:
     0.005
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     height: float = param(1.0, unit="1", meaning="height of the pulse")
     t_start: float = param(0.0, unit="s", meaning="beginning of the pulse")
     width: float = param(0.1, unit="s", meaning="duration of the pulse", above=0)
     offset: float = param(0.0, unit="1", meaning="value outside of the pulse")
 
-    inputs = states = ()
-    feedthrough = False
-    check = _check_output
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High within the pulse."""
@@ -232,16 +191,11 @@ class Pulse:
 
 
 @record
-class PulseTrain:
+class PulseTrain(_Source):
     """Rectangular pulses, one at the beginning of each period.
 
         ref = offset + height   for 0 <= tau and tau mod period < width
               offset            otherwise,   tau = t - t_start
-
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
 
     Examples
     --------
@@ -250,26 +204,21 @@ class PulseTrain:
     [0.0, 1.0, 0.0, 1.0]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     height: float = param(1.0, unit="1", meaning="height of the pulses")
     t_start: float = param(0.0, unit="s", meaning="beginning of the first pulse")
     width: float = param(0.1, unit="s", meaning="duration of each pulse", above=0)
     period: float = param(1.0, unit="s", meaning="from one pulse to the next", above=0, symbol="T")
     offset: float = param(0.0, unit="1", meaning="value between pulses")
 
-    inputs = states = ()
-    feedthrough = False
-
     def check(self) -> None:
         """A pulse ends before the next one begins."""
-        _check_output(self)
+        super().check()
         if not self.width < self.period:
             raise ParameterError(
                 f"PulseTrain needs width < period, got {self.width:g} and {self.period:g}: "
                 "pulses that touch are a Step"
             )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """High at the beginning of each period."""
@@ -279,7 +228,7 @@ class PulseTrain:
 
 
 @record
-class Chirp:
+class Chirp(_Source):
     """Sine whose frequency sweeps from omega_0 at t = 0 to omega_1 at t_1, and stays there.
 
         ref = offset + amplitude sin(phi(t)),   phi' = omega(t),   phi(0) = phase
@@ -290,8 +239,6 @@ class Chirp:
 
     Parameters
     ----------
-    outputs : tuple of str, optional
-        Name of the signal.
     sweep : {"linear", "logarithmic"}, optional
         How the frequency changes with time.
 
@@ -304,7 +251,6 @@ class Chirp:
     [1.]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     sweep: str = "linear"
     amplitude: float = param(1.0, unit="1", meaning="amplitude")
     omega_0: float = param(0.1, unit="rad/s", meaning="frequency at t = 0", at_least=0)
@@ -313,12 +259,9 @@ class Chirp:
     phase: float = param(0.0, unit="rad", meaning="phase at t = 0", symbol="phi")
     offset: float = param(0.0, unit="1", meaning="mean value")
 
-    inputs = states = ()
-    feedthrough = False
-
     def check(self) -> None:
         """One of two sweeps; a ratio of frequencies needs both above 0."""
-        _check_output(self)
+        super().check()
         one_of("Chirp", "sweep", self.sweep, ("linear", "logarithmic"))
         for name in ("omega_0", "omega_1") if self.sweep == "logarithmic" else ():
             if not getattr(self, name) > 0:
@@ -332,7 +275,6 @@ class Chirp:
             return {"rate": 0.0}
         return {"rate": float(np.log(self.omega_1 / self.omega_0)) / self.t_1}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The integral of the frequency, in three parts: before, within and behind the sweep."""
@@ -348,7 +290,7 @@ class Chirp:
 
 
 @record
-class TimeTable:
+class TimeTable(_Source):
     """A table of data over time: straight lines from one point to the next, or held values.
 
         ref = values[k] + slope_k (t - times[k])
@@ -360,8 +302,6 @@ class TimeTable:
 
     Parameters
     ----------
-    outputs : tuple of str, optional
-        Name of the signal.
     hold : bool, optional
         Whether each value is held until the next time (zero-order hold).
     periodic : bool, optional
@@ -374,19 +314,16 @@ class TimeTable:
     [1.]
     """
 
-    outputs: tuple[str, ...] = ("ref",)
     hold: bool = False
     periodic: bool = False
-    times: tuple[float, ...] = param((0.0, 1.0), unit="s", meaning="times t_k", symbol="tau")
-    values: tuple[float, ...] = param((0.0, 1.0), unit="1", meaning="values at these times")
+    times: Floats = param((0.0, 1.0), unit="s", meaning="times t_k", symbol="tau")
+    values: Floats = param((0.0, 1.0), unit="1", meaning="values at these times")
 
-    inputs = states = ()
-    feedthrough = False
     vector = True
 
     def check(self) -> None:
         """Times increase, and each has a value."""
-        _check_output(self)
+        super().check()
         flag("TimeTable", "hold", self.hold)
         flag("TimeTable", "periodic", self.periodic)
         n = len(self.times)
@@ -420,7 +357,6 @@ class TimeTable:
         slopes = np.diff(self.values) / np.diff(self.times)
         return {"slopes": np.zeros_like(slopes) if self.hold else slopes, "periods": self.periodic}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The piece that holds now; the first and the last value outside of all."""

@@ -18,43 +18,21 @@ import numpy as np
 
 @dataclass(frozen=True, kw_only=True)
 class Supplied:
-    """How a record's outputs are supplied, as its class says in `supplied`.
+    """How a record's outputs are supplied, as its class says in `supplied`."""
 
-    Attributes
-    ----------
-    why : str
-        Of whom, as the end of a sentence: python-control alone would run it wrongly.
-    continuous : str
-        Likewise, why it needs continuous time.
-    shared : str
-        What one block in two places of a diagram would have for both.
-    rates : int
-        How many numbers its equations get behind the inputs, about the rate of these.
-    discrete : str
-        What takes its place in discrete time, if nothing else says that.
-    """
-
-    why: str
-    continuous: str
-    shared: str
-    rates: int = 0
-    discrete: str = ""
+    why: str  # of whom, as the end of a sentence: python-control alone would run it wrongly
+    continuous: str  # likewise, why it needs continuous time
+    shared: str  # what one block in two places of a diagram would have for both
+    rates: int = 0  # how many numbers its equations get behind the inputs, about the rate of these
+    discrete: str = ""  # what takes its place in discrete time, if nothing else says that
 
 
 @dataclass(kw_only=True)
 class SuppliedOutput:
-    """What leaves a block at an instant that it alone does not know, and what arrives there then.
+    """What leaves a block at an instant, which it alone does not know, and what arrives then."""
 
-    Attributes
-    ----------
-    leaving : callable
-        What leaves at a time, of shape (signals,).
-    arriving : ndarray of shape (signals,)
-        What has arrived when it was last asked.
-    """
-
-    leaving: Callable[[float], np.ndarray]
-    arriving: np.ndarray
+    leaving: Callable[[float], np.ndarray]  # what leaves at a time, of shape (signals,)
+    arriving: np.ndarray  # (signals,): what has arrived when it was last asked
 
 
 _NOW: ContextVar[Mapping[int, SuppliedOutput] | None] = ContextVar("nlctl_supplied", default=None)
@@ -62,11 +40,9 @@ _NOW: ContextVar[Mapping[int, SuppliedOutput] | None] = ContextVar("nlctl_suppli
 
 @contextmanager
 def supplying(outputs: Mapping[Any, SuppliedOutput]) -> Iterator[None]:
-    """Say what leaves blocks whose outputs are supplied, where a diagram is evaluated.
-
-    Python-control then finds the signals of the present, and what arrives at these blocks is left
-    in `outputs`, which goes by block.
-    """
+    """Say what leaves blocks whose outputs are supplied, where a diagram is evaluated."""
+    # Python-control then finds the signals of the present, and what arrives at these blocks
+    # is left in `outputs`, which goes by block.
     token = _NOW.set({id(block): output for block, output in outputs.items()})
     try:
         yield

@@ -6,8 +6,6 @@ import difflib
 from collections.abc import Iterable
 from typing import SupportsIndex
 
-__all__ = ["counted", "nearest", "numbered", "some_of"]
-
 
 def counted(number: SupportsIndex, one: str, many: str = "") -> str:
     """Return a number and its noun: ``"1 state"``, ``"2 states"``."""

@@ -20,10 +20,10 @@ class Ball:
 
     inputs, outputs, states, feedthrough = (), ("h",), ("h", "v"), False
     initial = {"h": 1.0}
-    update = staticmethod(nlctl.equation(lambda t, x, u, p: (x[1], -GRAVITY)))
-    output = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0],)))
-    guard = staticmethod(nlctl.equation(lambda t, x, u, p: (x[0],)))
-    reset = staticmethod(nlctl.equation(lambda t, x, u, p: (0.0, -KEPT * x[1])))
+    update = nlctl.equation(lambda t, x, u, p: (x[1], -GRAVITY))
+    output = nlctl.equation(lambda t, x, u, p: (x[0],))
+    guard = nlctl.equation(lambda t, x, u, p: (x[0],))
+    reset = nlctl.equation(lambda t, x, u, p: (0.0, -KEPT * x[1]))
 
 
 def kinds_of_jump():

@@ -19,12 +19,10 @@ class Lag:
 
     inputs, outputs, states, feedthrough = ("u",), ("v",), ("x",), False
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         return ((u[0] - x[0]) / p.T,)
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return (x[0],)
@@ -60,17 +58,14 @@ class Peak:
     memory = ("largest",)
     initial = {"largest": -10.0}
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         return (1000.0 * np.maximum(u[0] - x[0], 0.0),)  # without accepted steps: relax onto it
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return (np.maximum(u[0], x[0]),)
 
-    @staticmethod
     @nlctl.equation
     def commit(t, x, u, p):
         return (np.maximum(u[0], x[0]),)

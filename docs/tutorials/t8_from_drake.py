@@ -42,14 +42,12 @@ class Pendulum:
 
     inputs, outputs, states, feedthrough = ("tau",), ("theta", "omega"), ("theta", "omega"), False
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         theta, omega = x
         (tau,) = u
         return omega, (tau - p.b * omega - p.m * p.g * p.l * np.sin(theta)) / (p.m * p.l**2)
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return x[0], x[1]

@@ -9,8 +9,8 @@ import numpy as np
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
-from ..params import as_numbers, param, record
-from .memories import relaxation
+from ..params import param, record
+from .memories import Remembering, relaxation
 
 
 @equation
@@ -37,7 +37,7 @@ def check_gap(spec: Any) -> None:
 
 
 @record
-class Backlash:
+class Backlash(Remembering):
     """Backlash as the play operator (Lv et al. 2017, Example 2).
 
         v = m_r (u - c_r)    u rises and v touches the right side of the gap
@@ -75,24 +75,12 @@ class Backlash:
     m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
     c_r: float = param(0.5, unit="1", meaning="right end of the gap, in u")
     c_l: float = param(-0.6, unit="1", meaning="left end of the gap, in u")
-    v0: float = 0.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("memory",)
-    memory = ("memory",)
-    feedthrough = True
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The memory starts from v(0-)."""
-        return {"memory": self.v0}
 
     def check(self) -> None:
         """The gap has a left and a right end, and the memory a finite start."""
-        number = as_numbers(self.v0)
-        if number is None or number.ndim or not np.isfinite(number):
-            raise ParameterError(f"Backlash needs a finite v0, got {self.v0!r}")
+        super().check()
         check_gap(self)
 
     @property
@@ -100,29 +88,21 @@ class Backlash:
         """Bounds (k_1, k_2) of k in (2): the slopes."""
         return min(self.m_r, self.m_l), max(self.m_r, self.m_l)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The memory clipped into the gap."""
-        (memory,) = x
-        (u1,) = u
-        return (play(u1, memory, p),)
+        return (play(u[0], x[0], p),)
 
     commit = output  # the memory v(t-) becomes the output
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact with either side of the gap."""
-        (memory,) = x
-        (u1,) = u
-        low, high = play_band(u1, p)
-        return memory - low, memory - high
+        low, high = play_band(u[0], p)
+        return x[0] - low, x[0] - high
 
-    @staticmethod
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return play_band(u, p)

@@ -6,23 +6,27 @@ from ..arguments import number
 from ..equations import equation
 from ..functions import clip
 from ..params import param, record
-from .memories import output_of_state
+from .memories import FromUToV, output_of_state
 
 LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, t) u + eps_u of u"
 
 
 @record
-class _Follower:
-    """What actuators share whose output is their first state."""
+class _Follower(FromUToV):
+    """What actuators share whose output is their first state.
+
+    Parameters
+    ----------
+    v0 : float, optional
+        Output at the start.
+    """
 
     v0: float = 0.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("v",)
     feedthrough = False
     no_split = LAGS_BEHIND
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
     @property
     def initial(self) -> dict[str, float]:
@@ -47,11 +51,6 @@ class RateLimiter(_Follower):
 
     It does not obey (2): v depends on the past of u.
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start.
-
     Examples
     --------
     A unit step is followed at 2 1/s, so it takes half a second:
@@ -67,14 +66,12 @@ class RateLimiter(_Follower):
     fall: float = param(-1.0, unit="1/s", meaning="least v'", below=0)
     K: float = param(100.0, unit="1/s", meaning="gain that follows u within the limits", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The limited rate."""
         (v,) = x
         return (clip(p.K * (u[0] - v), p.fall, p.rise),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the limits begin and end to count."""
@@ -90,11 +87,6 @@ class Lag(_Follower):
 
     It does not obey (2): v depends on the past of u.
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start.
-
     Examples
     --------
     After one time constant 1 - 1/e of a step is there:
@@ -109,10 +101,8 @@ class Lag(_Follower):
     k: float = param(1.0, unit="1", meaning="gain")
     T: float = param(0.05, unit="s", meaning="time constant", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
-        """The lag."""
         (v,) = x
         return ((p.k * u[0] - v) / p.T,)
 
@@ -125,11 +115,6 @@ class SecondOrderLag(_Follower):
 
     zeta < 1 overshoots, by exp(-pi zeta / sqrt(1 - zeta^2)) of a step.  It does not obey (2): v
     depends on the past of u.
-
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start; it starts at rest.
 
     Examples
     --------
@@ -149,7 +134,6 @@ class SecondOrderLag(_Follower):
 
     states = ("v", "v1")
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The output's rate, and the oscillator."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..params import param, record
-from .memories import output_of_state, relaxation
+from .memories import Remembering, output_of_state, relaxation
 
 FORCE_LAW = "it is a force law of a velocity, no actuator from u to v"
 
@@ -33,6 +32,7 @@ def check_levels(spec: LuGre | Stribeck | StickSlip) -> None:
         )
 
 
+@record
 class _ForceLaw:
     """What force laws of a velocity share."""
 
@@ -40,7 +40,6 @@ class _ForceLaw:
     outputs = ("force",)
     no_split = FORCE_LAW
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the velocity changes its sign."""
@@ -67,13 +66,8 @@ class Coulomb(_ForceLaw):
     F_c: float = param(1.0, unit="N", meaning="Coulomb friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    states = ()
-    feedthrough = True
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The force law."""
         (velocity,) = u
         return (p.F_c * np.sign(velocity) + p.sigma_2 * velocity,)
 
@@ -102,17 +96,12 @@ class Stribeck(_ForceLaw):
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
 
-    states = ()
-    feedthrough = True
-
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
         check_levels(self)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The force law."""
         (velocity,) = u
         return (stribeck_level(velocity, p) * np.sign(velocity) + p.sigma_2 * velocity,)
 
@@ -128,7 +117,7 @@ def stick_mode(velocity, applied, mode, p):
 
 
 @record
-class StickSlip:
+class StickSlip(Remembering):
     """Coulomb friction that sticks: the force that holds a mass at rest, up to a limit.
 
         force = applied                              it sticks
@@ -161,27 +150,19 @@ class StickSlip:
     F_s: float = param(1.5, unit="N", meaning="static friction", above=0)
     sigma_2: float = param(0.4, unit="N s/m", meaning="viscous friction", at_least=0)
     v_rest: float = param(1e-6, unit="m/s", meaning="velocity up to which it is at rest", above=0)
-    v0: float = 0.0
 
     inputs = ("velocity", "applied")
     outputs = ("force",)
     states = ("mode",)
-    memory = ("mode",)
-    feedthrough = True
     no_split = FORCE_LAW
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The mode at the start."""
-        return {"mode": float(self.v0)}
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction; one of three modes at the start."""
+        super().check()
         check_levels(self)
-        if number("StickSlip", "v0", self.v0) not in (-1, 0, 1):
+        if self.v0 not in (-1, 0, 1):
             raise ParameterError(f"StickSlip needs v0 to be 0, 1 or -1, got {self.v0:g}")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force that holds, or slips."""
@@ -191,16 +172,13 @@ class StickSlip:
         slipping = p.F_c * now + p.sigma_2 * velocity
         return (np.where(now == 0, applied, slipping),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The mode."""
         (mode,) = x
         return (stick_mode(u[0], u[1], mode, p),)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the mass comes to rest, and where it may break away."""
@@ -235,9 +213,8 @@ class Dahl(_ForceLaw):
 
     states = ("force",)
     feedthrough = False
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The force along the path."""
@@ -280,13 +257,11 @@ class LuGre(_ForceLaw):
     v_s: float = param(1e-3, unit="m/s", meaning="Stribeck velocity", above=0)
 
     states = ("z",)
-    feedthrough = True
 
     def check(self) -> None:
         """Static friction is not below Coulomb friction."""
         check_levels(self)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The mean deflection of the bristles."""
@@ -294,7 +269,6 @@ class LuGre(_ForceLaw):
         (velocity,) = u
         return (bristle_rate(z, velocity, p),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force of bent bristles and of viscosity."""
@@ -341,7 +315,7 @@ class BoucWen(_ForceLaw):
 
     states = ("z",)
     feedthrough = False
-    output = staticmethod(output_of_state)
+    output = output_of_state
 
     @property
     def z_max(self) -> float:
@@ -351,7 +325,6 @@ class BoucWen(_ForceLaw):
             return float("inf")
         return float((self.alpha / (self.beta * sum_)) ** (1 / self.nu))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The hysteretic force along the path."""
@@ -361,7 +334,6 @@ class BoucWen(_ForceLaw):
         opposing = p.gamma * np.abs(velocity) * np.sign(z) * size + p.delta * velocity * size
         return (p.alpha * velocity - p.beta * opposing,)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the velocity or z changes its sign."""

@@ -7,9 +7,9 @@ import numpy as np
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
-from ..params import param, record
-from .memories import checked_start, memory_names, relaxation, started
-from .prandtl_ishlinskii import check_pairs, check_thresholds
+from ..params import Floats, param, record
+from .memories import relaxation
+from .prandtl_ishlinskii import Plays
 from .static import BOUNDED_OUTPUT
 
 
@@ -36,7 +36,7 @@ def generalised_plays(u, memories, p):
 
 
 @record
-class GeneralisedPrandtlIshlinskii:
+class GeneralisedPrandtlIshlinskii(Plays):
     """Generalised Prandtl-Ishlinskii operator: plays between a rising and a falling envelope.
 
         v = sum_i w_i S_i,   S_i = min(max(S_i(t-), gamma_r(u) - r_i), gamma_f(u) + r_i)
@@ -71,37 +71,16 @@ class GeneralisedPrandtlIshlinskii:
     [0.0, 0.9, -0.9]
     """
 
-    rising: tuple[float, ...] = param(
+    rising: Floats = param(
         (8.0, 0.14, -0.05, 0.0), unit="1", meaning="a_0, ..., a_3 of the rising envelope"
     )
-    falling: tuple[float, ...] = param(
+    falling: Floats = param(
         (8.4, 0.14, 0.1, 0.5), unit="1", meaning="a_0, ..., a_3 of the falling envelope"
     )
-    w: tuple[float, ...] = param(
-        (0.5, 0.2, 0.2, 0.1), unit="1", meaning="weights of the plays", above=0
-    )
-    r: tuple[float, ...] = param(
-        (0.0, 0.2, 0.4, 0.6), unit="1", meaning="thresholds, increasing", at_least=0
-    )
-    v0: float | tuple[float, ...] = 0.0
+    w: Floats = param((0.5, 0.2, 0.2, 0.1), unit="1", meaning="weights of the plays", above=0)
+    r: Floats = param((0.0, 0.2, 0.4, 0.6), unit="1", meaning="thresholds, increasing", at_least=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
-    feedthrough = True
-    vector = True
     no_split = BOUNDED_OUTPUT
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names memory[0], ..., one for each play."""
-        return memory_names("memory", len(self.r))
-
-    memory = states
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The memories start from S_i(0-)."""
-        return started("memory", self.v0, len(self.r))
 
     def check(self) -> None:
         """Four numbers for each envelope, which increases; weights, thresholds, a finite start."""
@@ -112,32 +91,24 @@ class GeneralisedPrandtlIshlinskii:
                     f"GeneralisedPrandtlIshlinskii needs {name} = (a_0, a_1, a_2, a_3) with "
                     f"a_0 > 0 and a_1 > 0, so that the envelope increases, got {a}"
                 )
-        check_pairs(self)
-        check_thresholds(self)
-        checked_start(self, len(self.r))
+        super().check()
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (np.sum(p.w * generalised_plays(u[0], x, p)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return generalised_plays(u[0], x, p)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its band."""
         low, high = envelope_bands(u[0], p)
         return np.concatenate((x - low, x - high))
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output at input u, whatever the memories."""

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..equations import equation
-from ..params import param, record
+from ..params import Floats, param, record
 from .backlash import check_gap
-from .memories import checked_start, memory_names, relaxation, started
+from .memories import FromUToV, Remembering, relaxation
 from .prandtl_ishlinskii import (
-    check_thresholds,
+    Plays,
     check_weights,
     unit_contact,
     unit_play,
@@ -26,7 +26,7 @@ from .relay import check_sides, moving_side
 
 
 @record
-class DeadZoneInverse:
+class DeadZoneInverse(FromUToV):
     """Right inverse of a dead zone with constant slopes.
 
         v = u / slope_r + b_r    u > 0
@@ -51,18 +51,12 @@ class DeadZoneInverse:
     b_r: float = param(0.5, unit="1", meaning="right break point of the dead zone", above=0)
     b_l: float = param(-0.3, unit="1", meaning="left break point of the dead zone", below=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
-
     @property
     def gains(self) -> tuple[float, float]:
         """Bounds (k_1, k_2) of k in (2): the slopes of the inverse."""
         slopes = 1 / self.slope_r, 1 / self.slope_l
         return min(slopes), max(slopes)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the dead zone needs."""
@@ -73,13 +67,10 @@ class DeadZoneInverse:
             return (desired / p.slope_l + p.b_l,)
         return (desired,)  # 0, or NaN
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The jump."""
         return (u[0],)
 
-    @staticmethod
     @equation
     def band(t, u, p):
         """Least and greatest output near input u: at the jump, from one side to the other."""
@@ -94,7 +85,7 @@ def needed_lines(desired, p):
 
 
 @record
-class BacklashInverse:
+class BacklashInverse(Remembering):
     """Right inverse of a backlash, for an input whose rate is known.
 
         v = max(u / m_r + c_r, u / m_l + c_l)    s = +1,   s = +1       u' > 0
@@ -131,23 +122,14 @@ class BacklashInverse:
     v0: float = 1.0
 
     inputs = ("u", "u1")
-    outputs = ("v",)
     states = ("side",)
-    memory = ("side",)
-    feedthrough = True
     no_split = "it takes the rate u' besides u"
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The side from which it starts."""
-        return {"side": float(self.v0)}
 
     def check(self) -> None:
         """The gap has a left and a right end; the side is one of two."""
         check_gap(self)
-        check_sides(self, 1)
+        check_sides(self)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the backlash needs."""
@@ -158,16 +140,13 @@ class BacklashInverse:
         upper, lower = np.maximum(one, other), np.minimum(one, other)
         return (np.where(now > 0, upper, np.where(now < 0, lower, now)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The side."""
         (side,) = x
         return (moving_side(u[1], side),)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where u reverses, and where the lines cross."""
@@ -177,7 +156,7 @@ class BacklashInverse:
 
 
 @record
-class PrandtlIshlinskiiInverse:
+class PrandtlIshlinskiiInverse(Plays):
     """Inverse of a Prandtl-Ishlinskii operator, which is one as well.
 
         v = W_0 u + sum_i W_i H_i,   H_i = min(max(H_i(t-), u - R_i), u + R_i)
@@ -205,25 +184,10 @@ class PrandtlIshlinskiiInverse:
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u in the operator", above=0)
-    w: tuple[float, ...] = param(
-        (0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays"
-    )
-    r: tuple[float, ...] = param(
+    w: Floats = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the operator's plays")
+    r: Floats = param(
         (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds of the operator, increasing", above=0
     )
-    v0: float | tuple[float, ...] = 0.0
-
-    inputs = ("u",)
-    outputs = ("v",)
-    feedthrough = True
-    vector = True
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names memory[0], ..., one for each play."""
-        return memory_names("memory", len(self.r))
-
-    memory = states
 
     @property
     def initial(self) -> dict[str, float]:
@@ -233,7 +197,7 @@ class PrandtlIshlinskiiInverse:
         memories = [
             (self.w_0 + w[: i + 1].sum()) * z[i] + w[i + 1 :] @ z[i + 1 :] for i in range(len(w))
         ]
-        return started("memory", memories, len(self.r))
+        return dict(zip(self.states, map(float, memories), strict=True))
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -243,9 +207,8 @@ class PrandtlIshlinskiiInverse:
 
     def check(self) -> None:
         """The operator has an increasing loading curve, and as many memories as thresholds."""
+        super().check()
         check_weights(self, "so that the operator has an inverse")
-        check_thresholds(self)
-        checked_start(self, len(self.r))
 
     def derived(self) -> dict[str, Any]:
         """Weights W_0, W and thresholds R of the inverse."""
@@ -253,28 +216,21 @@ class PrandtlIshlinskiiInverse:
         r = np.array([0.0, *self.r])
         return {"W_0": 1 / m[0], "W": np.diff(1 / m), "R": np.cumsum(m[:-1] * np.diff(r))}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return unit_play(u[0], x, p.R)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.R))
 
-    @staticmethod
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return weighted_band(u, p.W_0, p.W, p.R)

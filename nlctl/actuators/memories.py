@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..arguments import vector
+from ..arguments import number, vector
 from ..equations import equation
 from ..errors import ParameterError
+from ..params import record
 
 # rate (1/s) at which memories relax onto what they become, in plain `control` alone.
 # `control.input_output_response` has no hook for accepted steps. Both engines of
@@ -17,17 +18,16 @@ from ..errors import ParameterError
 RELAXATION = 1e3
 
 
-def relaxation(commit: Any) -> Any:
+def relaxation(commit: Callable[..., Any]) -> Callable[..., Any]:
     """Return the `update` of memories that relax onto what `commit` says that they become."""
-    become: Callable[..., Any] = getattr(commit, "__func__", commit)
 
     @equation
     def update(t, x, u, p):
         """Relaxation of the memories."""
-        after = become(t, x, u, p)
+        after = commit(t, x, u, p)
         return tuple([RELAXATION * (after[i] - x[i]) for i in range(len(x))])
 
-    return staticmethod(update)
+    return update
 
 
 @equation
@@ -41,16 +41,39 @@ def memory_names(name: str, count: int) -> tuple[str, ...]:
     return tuple(f"{name}[{i}]" for i in range(count))
 
 
-def started(name: str, v0: Any, count: int) -> dict[str, float]:
-    """Return the initial values of `count` memories from one number for all, or one each."""
-    values = np.broadcast_to(np.asarray(v0, dtype=float), (count,))
-    return {f"{name}[{i}]": float(values[i]) for i in range(count)}
-
-
 def checked_start(spec: Any, count: int) -> np.ndarray:
     """Return a record's v0 as an array."""
     who = type(spec).__name__
+    if count == 1:
+        return np.array([number(who, "v0", spec.v0)])
     given = vector(who, "v0", np.atleast_1d(spec.v0))
     if given.size not in (1, count):
         raise ParameterError(f"{who} needs v0 to be one number or {count}, got {given.size}")
     return given
+
+
+class FromUToV:
+    """What actuators share: the names of their signals."""
+
+    inputs = ("u",)
+    outputs = ("v",)
+
+
+@record
+class Remembering(FromUToV):
+    """What blocks share whose states are memories: where these start."""
+
+    v0: float | tuple[float, ...] = 0.0
+    states: ClassVar[Any]
+
+    memory = property(lambda self: self.states)
+
+    @property
+    def initial(self) -> dict[str, float]:
+        """The memories start from v0."""
+        values = np.broadcast_to(np.asarray(self.v0, dtype=float), (len(self.states),))
+        return dict(zip(self.states, values.tolist(), strict=True))
+
+    def check(self) -> None:
+        """One finite start for all memories, or one each."""
+        checked_start(self, len(self.states))

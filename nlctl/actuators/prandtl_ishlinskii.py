@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ..arguments import number
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
-from ..params import param, record
+from ..params import Floats, param, record
 from ..wording import counted
-from .memories import checked_start, memory_names, relaxation, started
+from .memories import FromUToV, Remembering, memory_names, relaxation
 from .static import BOUNDED_OUTPUT
 
 
@@ -42,7 +41,7 @@ def weighted_band(u, w_0, w, r):
 
 
 @record
-class Stop:
+class Stop(Remembering):
     """Stop operator, the elastic-plastic element dual to the play.
 
         v = u - w,   w = min(max(w(t-), u - r), u + r)
@@ -70,41 +69,23 @@ class Stop:
     """
 
     r: float = param(1.0, unit="1", meaning="largest |v|, half gap of the play", above=0)
-    v0: float = 0.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("memory",)
-    memory = ("memory",)
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
-    @property
-    def initial(self) -> dict[str, float]:
-        """The play starts from w(0-)."""
-        return {"memory": float(self.v0)}
-
-    def check(self) -> None:
-        """The memory has a finite start."""
-        number("Stop", "v0", self.v0)
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What the play leaves of u."""
         (memory,) = x
         return (u[0] - unit_play(u[0], memory, p.r),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The play."""
         (memory,) = x
         return (unit_play(u[0], memory, p.r),)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where it begins or ends to yield: contact with either side of the gap."""
@@ -122,8 +103,7 @@ def check_pairs(spec: Any) -> None:
 
 
 def check_weights(spec: Any, meaning: str) -> None:
-    """Refuse thresholds and weights of different number, and a slope that is not positive."""
-    check_pairs(spec)
+    """Refuse a slope that is not positive."""
     who = type(spec).__name__
     slopes = spec.w_0 + np.cumsum(spec.w)
     if not np.all(slopes > 0):
@@ -133,14 +113,26 @@ def check_weights(spec: Any, meaning: str) -> None:
         )
 
 
-def check_thresholds(spec: Any) -> None:
-    """Refuse thresholds that do not increase."""
-    if not np.all(np.diff(spec.r) > 0):
-        raise ParameterError(f"{type(spec).__name__} needs increasing thresholds r, got {spec.r}")
+@record
+class Plays(Remembering):
+    """What sums of plays share: a memory and a weight w for each threshold r, in order."""
+
+    vector = True
+    r: ClassVar[Any]
+
+    states = property(lambda self: memory_names("memory", len(self.r)))
+
+    def check(self) -> None:
+        """A weight for each threshold, thresholds that increase, finite memories."""
+        check_pairs(self)
+        if not np.all(np.diff(self.r) > 0):
+            who = type(self).__name__
+            raise ParameterError(f"{who} needs increasing thresholds r, got {self.r}")
+        super().check()
 
 
 @record
-class PrandtlIshlinskii:
+class PrandtlIshlinskii(Plays):
     """Prandtl-Ishlinskii operator: a weighted sum of plays.
 
         v = w_0 u + sum_i w_i H_i,   H_i = min(max(H_i(t-), u - r_i), u + r_i)
@@ -169,28 +161,8 @@ class PrandtlIshlinskii:
     """
 
     w_0: float = param(0.6, unit="1", meaning="weight of u itself", above=0)
-    w: tuple[float, ...] = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the plays")
-    r: tuple[float, ...] = param(
-        (0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0
-    )
-    v0: float | tuple[float, ...] = 0.0
-
-    inputs = ("u",)
-    outputs = ("v",)
-    feedthrough = True
-    vector = True
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names memory[0], ..., one for each play."""
-        return memory_names("memory", len(self.r))
-
-    memory = states
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The memories start from H_i(0-)."""
-        return started("memory", self.v0, len(self.r))
+    w: Floats = param((0.25, 0.15, 0.1, 0.1), unit="1", meaning="weights of the plays")
+    r: Floats = param((0.2, 0.4, 0.6, 0.8), unit="1", meaning="thresholds, increasing", above=0)
 
     @property
     def gains(self) -> tuple[float, float]:
@@ -200,39 +172,31 @@ class PrandtlIshlinskii:
 
     def check(self) -> None:
         """A weight for each threshold, thresholds in order, an increasing loading curve."""
+        super().check()
         check_weights(self, "so that the loading curve increases")
-        check_thresholds(self)
-        checked_start(self, len(self.r))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The weighted sum."""
         return (weighted_plays(u[0], x, p.w_0, p.w, p.r),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The plays."""
         return unit_play(u[0], x, p.r)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
         return np.concatenate(unit_contact(u[0], x, p.r))
 
-    @staticmethod
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return weighted_band(u, p.w_0, p.w, p.r)
 
 
 @record
-class OneSidedDeadZones:
+class OneSidedDeadZones(FromUToV):
     """Superposition of one-sided dead zones: a piecewise linear characteristic without memory.
 
         v = w_0 u + sum_i w_i S_i,   S_i = max(u - r_i, 0)  for r_i > 0
@@ -256,13 +220,9 @@ class OneSidedDeadZones:
     """
 
     w_0: float = param(1.0, unit="1", meaning="slope at u = 0", above=0)
-    w: tuple[float, ...] = param((-0.3, 0.4), unit="1", meaning="changes of slope, outwards")
-    r: tuple[float, ...] = param((-0.5, 0.7), unit="1", meaning="where the slope changes")
+    w: Floats = param((-0.3, 0.4), unit="1", meaning="changes of slope, outwards")
+    r: Floats = param((-0.5, 0.7), unit="1", meaning="where the slope changes")
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
     vector = True
 
     @property
@@ -291,15 +251,11 @@ class OneSidedDeadZones:
                 "the thresholds"
             )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         beyond = np.where(p.r > 0, np.maximum(u[0] - p.r, 0.0), np.minimum(u[0] - p.r, 0.0))
         return (p.w_0 * u[0] + np.sum(p.w * beyond),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The thresholds."""
         return u[0] - p.r

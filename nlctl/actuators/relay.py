@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ..annotations import as_annotated
-from ..arguments import number, vector
+from ..arguments import vector
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import param, record
-from .memories import checked_start, memory_names, relaxation, started
+from ..params import Floats, param, record
+from .memories import Remembering, checked_start, memory_names, relaxation
 from .static import BOUNDED_OUTPUT
 
 
@@ -44,15 +44,14 @@ def moving_side(rate, side):
     return np.where(rate == 0, kept_side(side), moves)
 
 
-def check_sides(spec: Any, count: int) -> None:
+def check_sides(spec: Any) -> None:
     """Refuse initial sides other than 1 and -1."""
-    sides = checked_start(spec, count)
-    if not np.all(np.abs(sides) == 1):
+    if not np.all(np.abs(checked_start(spec, len(spec.states))) == 1):
         raise ParameterError(f"{type(spec).__name__} needs v0 of 1 and -1 only, got {spec.v0}")
 
 
 @record
-class Relay:
+class Relay(Remembering):
     """Relay with hysteresis.
 
         v = height s,   s = +1       u >= on
@@ -85,45 +84,31 @@ class Relay:
     height: float = param(1.0, unit="1", meaning="output |v|", above=0)
     v0: float = -1.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     states = ("side",)
-    memory = ("side",)
     feedthrough = False
     no_split = BOUNDED_OUTPUT
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The relay starts from its side s(0-)."""
-        return {"side": float(self.v0)}
 
     def check(self) -> None:
         """It switches off below where it switches on, and starts from one side."""
         if not self.off < self.on:
             raise ParameterError(f"Relay needs off < on, got {self.off:g} and {self.on:g}")
-        number("Relay", "v0", self.v0)
-        check_sides(self, 1)
+        check_sides(self)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The side, with its height."""
         (side,) = x
         return (p.height * held_side(side),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The side."""
         (side,) = x
         return (relay_side(u[0], side, p.on, p.off),)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The thresholds."""
         return u[0] - p.on, u[0] - p.off
 
 
@@ -163,7 +148,7 @@ _GRID = relay_grid((-1.0, -0.5, 0.0, 0.5, 1.0))
 
 
 @record
-class Preisach:
+class Preisach(Remembering):
     """Preisach operator with finitely many relays.
 
         v = sum_k w_k s_k,   s_k = +1         u >= alpha_k
@@ -192,28 +177,15 @@ class Preisach:
     [-1.  0.  1.  1.]
     """
 
-    alpha: tuple[float, ...] = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
-    beta: tuple[float, ...] = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
-    w: tuple[float, ...] = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
+    alpha: Floats = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
+    beta: Floats = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
+    w: Floats = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
     v0: float | tuple[float, ...] = -1.0
 
-    inputs = ("u",)
-    outputs = ("v",)
     feedthrough = False
     vector = True
     no_split = BOUNDED_OUTPUT
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names side[0], ..., one for each relay."""
-        return memory_names("side", len(self.w))
-
-    memory = states
-
-    @property
-    def initial(self) -> dict[str, float]:
-        """The relays start from their sides s_k(0-)."""
-        return started("side", self.v0, len(self.w))
+    states = property(lambda self: memory_names("side", len(self.w)))
 
     def check(self) -> None:
         """Each relay has two thresholds in order, a weight, and starts from one side."""
@@ -229,24 +201,19 @@ class Preisach:
                 raise ParameterError(
                     f"Preisach needs beta[{k}] < alpha[{k}], got {lower:g} and {upper:g}"
                 )
-        check_sides(self, len(self.w))
+        check_sides(self)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The weighted sum of the sides."""
         return (np.sum(p.w * held_side(x)),)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
-        """The sides."""
         return relay_side(u[0], x, p.alpha, p.beta)
 
     update = relaxation(commit)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """All thresholds."""
         return np.concatenate((u[0] - p.alpha, u[0] - p.beta))

@@ -8,12 +8,13 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..functions import clip
 from ..params import param, record
+from .memories import FromUToV
 
 BOUNDED_OUTPUT = "its output is bounded for all u, so that no k >= k_1 > 0 keeps eps_u bounded"
 
 
 @record
-class DeadZone:
+class DeadZone(FromUToV):
     """Asymmetric dead zone with slopes that depend on the input (Lv et al. 2017, Example 1).
 
         v = (1 + 0.3 sin u) (u - b_r)      u >= b_r
@@ -36,11 +37,6 @@ class DeadZone:
     b_r: float = param(0.5, unit="1", meaning="right break point", at_least=0)
     b_l: float = param(-0.3, unit="1", meaning="left break point", at_most=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
-
     def check(self) -> None:
         """Assumption 1 wants a positive slope everywhere."""
         for side in ("r", "l"):
@@ -51,10 +47,8 @@ class DeadZone:
                     f"positive, got {ripple:g} and {slope:g}"
                 )
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         (u1,) = u
         if p.b_l < u1 < p.b_r:  # false for NaN, which then reaches v
             return (0.0,)
@@ -62,7 +56,6 @@ class DeadZone:
             return ((p.slope_r + p.ripple_r * np.sin(u1)) * (u1 - p.b_r),)
         return ((p.slope_l + p.ripple_l * np.cos(u1)) * (u1 - p.b_l),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points."""
@@ -71,7 +64,7 @@ class DeadZone:
 
 
 @record
-class Gain:
+class Gain(FromUToV):
     """Linear actuator.
 
         v = k u
@@ -88,25 +81,18 @@ class Gain:
 
     k: float = param(1.0, unit="1", meaning="gain")
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
-
     @property
     def gains(self) -> tuple[float, float]:
         """Bounds (k_1, k_2) of k in (2): the gain."""
         return self.k, self.k
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The gain."""
         return (p.k * u[0],)
 
 
 @record
-class Saturation:
+class Saturation(FromUToV):
     """Symmetric saturation, v = min(max(u, -limit), limit).
 
     No k >= k_1 > 0 keeps eps_u of (2) bounded for it: the paper's theory does not cover it.
@@ -120,19 +106,12 @@ class Saturation:
 
     limit: float = param(10.0, unit="1", meaning="largest |v|", above=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         return (clip(u[0], -p.limit, p.limit),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where it begins to saturate."""
@@ -140,7 +119,7 @@ class Saturation:
 
 
 @record
-class AsymmetricSaturation:
+class AsymmetricSaturation(FromUToV):
     """Saturation with other slopes and limits on either side.
 
         v = min(slope_r u, limit_r)    u >= 0
@@ -161,20 +140,13 @@ class AsymmetricSaturation:
     limit_r: float = param(10.0, unit="1", meaning="greatest v", above=0)
     limit_l: float = param(-6.0, unit="1", meaning="least v", below=0)
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
     no_split = BOUNDED_OUTPUT
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The characteristic v(u)."""
         slope = np.where(u[0] < 0, p.slope_l, p.slope_r)
         return (clip(slope * u[0], p.limit_l, p.limit_r),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the slope changes, and where it begins to saturate."""
@@ -182,7 +154,7 @@ class AsymmetricSaturation:
 
 
 @record
-class Quantiser:
+class Quantiser(FromUToV):
     """Uniform quantiser.
 
         v = q floor(u / q + 1/2)          mid-tread: 0 is a level
@@ -206,27 +178,17 @@ class Quantiser:
     q: float = param(0.1, unit="1", meaning="step", above=0)
     riser: bool = param(False, unit="1", meaning="whether 0 is a jump (mid-riser)")
 
-    inputs = ("u",)
-    outputs = ("v",)
-    states = ()
-    feedthrough = True
     gains = (1.0, 1.0)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The nearest level."""
         half = np.where(p.riser, 0.5, 0.0)
         return (p.q * (np.floor(u[0] / p.q + 0.5 - half) + half),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The jumps."""
         return (np.sin(np.pi * (u[0] / p.q + np.where(p.riser, 0.0, 0.5))),)
 
-    @staticmethod
     @equation
     def band(t, u, p):
-        """Least and greatest output at input u."""
         return u - 0.5 * p.q, u + 0.5 * p.q

@@ -3,31 +3,22 @@
 from .ablations import FixedGainLaw, ablations, replaced
 from .adaptive import Zero, adaptive_neural
 from .adaptive_inverse import AdaptiveDeadZoneInverse
-from .backstepping import DynamicSurface, dynamic_surface_control
+from .backstepping.dynamic_surface import DynamicSurface, dynamic_surface_control
 from .extremum_seeking import ExtremumSeeking
 from .filtered_error import FilteredError, binomial_lambdas
 from .known_sign import KnownSignLaw
-from .mrac import (
-    AffineRegressor,
-    ConcurrentWeights,
-    ConstrainedError,
-    ConstrainedLaw,
-    DirectLaw,
-    EModifiedWeights,
-    FilteredLaw,
-    HistoryStack,
-    LinearRegressor,
-    ModelError,
-    ModelReferenceLaw,
-    ProjectedWeights,
-    ReferenceModel,
-    StatePredictor,
-    WingRockRegressor,
-    l1_adaptive,
-    mrac,
-)
+from .mrac.concurrent import ConcurrentWeights, HistoryStack
+from .mrac.connected import mrac
+from .mrac.constrained import ConstrainedError, ConstrainedLaw
+from .mrac.l1 import FilteredLaw, StatePredictor, l1_adaptive
+from .mrac.laws import DirectLaw, ModelReferenceLaw
+from .mrac.model_error import ModelError
+from .mrac.modified_weights import EModifiedWeights, ProjectedWeights
+from .mrac.reference_model import ReferenceModel
+from .mrac.regressors import AffineRegressor, LinearRegressor, WingRockRegressor
 from .nussbaum import NussbaumLaw
-from .performance import FunnelControl, PrescribedPerformance
+from .performance.funnel import FunnelControl
+from .performance.prescribed import PrescribedPerformance
 from .pid import PID, PID2, standard_pid
 from .rbf import (
     AdaptiveWeights,
@@ -38,7 +29,7 @@ from .rbf import (
 )
 from .remedies import DeadZoneNussbaumLaw, LeakyNussbaumLaw, MonotoneNussbaumLaw
 from .robust import RobustTerm
-from .sliding_modes import SlidingModeLaw, SuperTwistingLaw, sliding_mode
+from .sliding_modes.boundary_layer import SlidingModeLaw, SuperTwistingLaw, sliding_mode
 
 __all__ = [
     "PID",

@@ -35,10 +35,7 @@ class FixedGainLaw:
 
     inputs = ("r", "W_psi", "robust", "Y_d")
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Equation (23) with -kappa instead of N(zeta)."""

@@ -16,7 +16,7 @@ from ..references import derivative_names
 from ..wording import counted
 from .filtered_error import FilteredError, binomial_lambdas
 from .nussbaum import NussbaumLaw
-from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres
+from .rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 from .robust import RobustTerm
 
 
@@ -39,7 +39,6 @@ class Zero:
     outputs: tuple[str, ...]
 
     inputs = ()
-    states = ()
     feedthrough = False
 
     @property
@@ -120,25 +119,19 @@ def adaptive_neural(
             f"adaptive_neural of order {order} needs centres with at most {order} coordinates, "
             f"got {len(basis.inputs)}"
         )
-    nodes = len(basis.centres) if isinstance(basis, GaussianBasis) else 27
-    if isinstance(weights, AdaptiveWeights) and weights.nodes != nodes:
-        raise ParameterError(
-            f"adaptive_neural needs as many weights as centres, got nodes={weights.nodes} for "
-            f"{counted(nodes, 'centre')}"
-        )
+    regressor, weights = fitting_network("adaptive_neural", basis, weights, AdaptiveWeights)
+    law = as_system(NussbaumLaw() if law is None else law, "law")
+    argument = ["zeta"] if "zeta" in law.output_labels else []  # KnownSignLaw has none
     pieces = {
         "filtered_error": filtered_error,
-        "basis": basis,
-        "weights": AdaptiveWeights(nodes=nodes) if weights is None else weights,
+        "basis": regressor,
+        "weights": weights,
         "robust": RobustTerm() if robust is None else robust,
-        "law": NussbaumLaw() if law is None else law,
+        "law": law,
     }
-    signals = [*coordinate_names(order), *derivative_names(order)]
-    systems = [as_system(piece, key) for key, piece in pieces.items()]
-    argument = ["zeta"] if "zeta" in systems[-1].output_labels else []  # KnownSignLaw has none
     return interconnect(
-        systems,
-        inputs=signals,
+        pieces,
+        inputs=[*coordinate_names(order), *derivative_names(order)],
         outputs=["e", "r", "u", *argument, "delta_hat", "W_norm"],
         name=name,
     )

@@ -62,7 +62,6 @@ class AdaptiveDeadZoneInverse:
     inputs = ("u_d", "r")
     outputs = ("u", "b_r_hat", "b_l_hat")
     states = ("m_r", "mb_r", "m_l", "mb_l")
-    feedthrough = True
 
     @property
     def initial(self) -> dict[str, float]:
@@ -70,7 +69,6 @@ class AdaptiveDeadZoneInverse:
         width = self.m_0 * self.b_0
         return {"m_r": self.m_0, "mb_r": width, "m_l": self.m_0, "mb_l": -width}
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Gradient on the side that acts, projected."""
@@ -84,14 +82,12 @@ class AdaptiveDeadZoneInverse:
             return still, still, kept_above(slope, m_l, p.m_min), -kept_above(-width, -mb_l, 0.0)
         return still, still, still, still
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The input of the actuator, and the estimated break points."""
         m_r, mb_r, m_l, mb_l = x
         return inverse_input(u[0], x, p), mb_r / m_r, mb_l / m_l
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where the side changes, and where an estimate meets its bound."""

@@ -49,7 +49,6 @@ class ExtremumSeeking:
     states = ("theta_hat", "xi", "eta")
     feedthrough = False
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The estimate, the demodulated and filtered performance, and its mean."""
@@ -58,9 +57,7 @@ class ExtremumSeeking:
         demodulated = (y - eta) * p.a * np.sin(p.omega * t)
         return p.k * xi, p.omega_l * (demodulated - xi), p.omega_h * (y - eta)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The estimate with its perturbation."""
         theta_hat, _, _ = x
         return (theta_hat + p.a * np.sin(p.omega * t),)

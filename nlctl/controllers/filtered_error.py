@@ -9,7 +9,7 @@ import numpy as np
 
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import param, record
+from ..params import Floats, param, record
 from ..plants import coordinate_names
 from ..references import derivative_names
 
@@ -78,15 +78,13 @@ class FilteredError:
     [2. 4. 1.]
     """
 
-    lambdas: tuple[float, ...] = param(
+    lambdas: Floats = param(
         (1.5,),
         unit="s^-i",
         meaning="lambda_1, ..., lambda_{n-1}; the order is their number + 1",
         may_be_empty=True,
     )
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -104,19 +102,10 @@ class FilteredError:
         """Order n of the plant."""
         return len(self.lambdas) + 1
 
-    @property
-    def plant_order(self) -> int:
-        """The order of the plants that it is made for, n: it sees no other states."""
-        return self.order
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd, yd1, ..., ydn."""
-        return (*coordinate_names(self.order), *derivative_names(self.order))
-
+    plant_order = property(lambda self: self.order)
+    inputs = property(lambda self: (*coordinate_names(self.order), *derivative_names(self.order)))
     outputs = ("e", "r", "Y_d")
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Equations (14) and (18); e is the tracking error e_1."""

@@ -48,10 +48,7 @@ class KnownSignLaw:
 
     inputs = ("r", "W_psi", "robust", "Y_d")
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law; r u = -N_0 r eta is never positive."""

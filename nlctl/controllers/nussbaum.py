@@ -59,9 +59,7 @@ class NussbaumLaw:
     outputs = ("u", "zeta")
     states = ("zeta",)
     initial = {"zeta": 1.0}
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Equation (24)."""

@@ -68,9 +68,7 @@ class PID:
     inputs = ("x1", "x2", "yd", "yd1")
     outputs = ("e", "u")
     states = ("integral", "slope")
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Integral with back-calculation, and the filter of the derivative."""
@@ -79,14 +77,12 @@ class PID:
         w, e = unlimited(x, u, p)
         return -p.k_i * e + back_calculation(limited(w, p), w, p), (x2 - yd1 - slope) / p.T_f
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The tracking error, and the limited control input."""
         w, e = unlimited(x, u, p)
         return e, limited(w, p)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Where u meets its limit."""
@@ -190,7 +186,6 @@ class PID2:
 
     outputs = ("u",)
     states = ("integral", "filtered")
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -217,10 +212,7 @@ class PID2:
         if not self.u_min < self.u_max:
             raise ParameterError(f"PID2 needs u_min < u_max, got {self.u_min:g} and {self.u_max:g}")
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the reference and the output, or of the error; and of what is applied."""
-        return (*self.signals, *([self.applied] if self.applied else []))
+    inputs = property(lambda self: (*self.signals, *([self.applied] if self.applied else [])))
 
     @cached_property
     def demand(self) -> Callable:

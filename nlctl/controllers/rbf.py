@@ -11,16 +11,13 @@ import numpy as np
 
 from ..annotations import as_annotated
 from ..arguments import integer, number, tuple_of
-from ..blocks import Spec
 from ..diagrams import as_system
 from ..equations import equation
 from ..errors import ParameterError
 from ..functions import gaussian
-from ..params import param, record
+from ..params import Floats, Matrix, param, record, set_integer
 from ..plants import coordinate_names
 from ..wording import counted
-
-Matrix = tuple[tuple[float, ...], ...]
 
 
 def _rows(array: np.ndarray) -> Matrix:
@@ -167,12 +164,10 @@ class GaussianBasis:
     centres: Matrix = param(
         diagonal_centres(27, 2), unit="1", meaning="centres mu_i, one per row", symbol="mu"
     )
-    widths: tuple[float, ...] = param(
+    widths: Floats = param(
         (2.0,), unit="1", meaning="widths nu_i: one for all, or one each", above=0, symbol="nu"
     )
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -183,17 +178,9 @@ class GaussianBasis:
                 f"{counted(len(self.centres), 'centre')}, got {len(self.widths)}"
             )
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(len(self.centres[0]))
+    inputs = property(lambda self: coordinate_names(len(self.centres[0])))
+    outputs = property(lambda self: regressor_names(len(self.centres)))
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[l-1]."""
-        return regressor_names(len(self.centres))
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The basis at the state u = x."""
@@ -225,24 +212,15 @@ class NetworkWeights:
     Gamma: float = param(0.5, unit="1", meaning="adaptation gain, Gamma I", above=0)
 
     outputs = ("W_psi", "W_norm")
-    feedthrough = True
     vector = True
-    output = staticmethod(network_output)
+    output = network_output
 
     def check(self) -> None:
         """A network has nodes."""
-        nodes = integer(type(self).__name__, "nodes", self.nodes, at_least=1)
-        object.__setattr__(self, "nodes", nodes)
+        set_integer(self, "nodes", at_least=1)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1]."""
-        return weight_inputs(self.nodes)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names W_hat[0], ..., W_hat[l-1]."""
-        return weight_names(self.nodes)
+    inputs = property(lambda self: weight_inputs(self.nodes))
+    states = property(lambda self: weight_names(self.nodes))
 
 
 @record
@@ -264,7 +242,6 @@ class AdaptiveWeights(NetworkWeights):
 
     sigma_1: float = param(0.5, unit="1", meaning="sigma-modification of W_hat", at_least=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, first line of (25)."""
@@ -273,7 +250,7 @@ class AdaptiveWeights(NetworkWeights):
 
 
 def fitting_network(
-    who: str, basis: Spec, weights: Any, default: Callable[..., Any]
+    who: str, basis: Any, weights: Any, default: Callable[..., Any]
 ) -> tuple[ct.InputOutputSystem, Any]:
     """Return a regressor as a block, and its weights."""
     regressor = as_system(basis, "basis")

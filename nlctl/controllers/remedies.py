@@ -45,13 +45,11 @@ class DeadZoneNussbaumLaw(NussbaumLaw):
 
     r_0: float = param(0.3, unit="1", meaning="half width of the dead zone of r", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Equation (24) with d(r) instead of r."""
         return (beyond(u[0], p.r_0) * control_base(u, p),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The ends of the dead zone."""
@@ -79,7 +77,6 @@ class LeakyNussbaumLaw(NussbaumLaw):
 
     c: float = param(0.01, unit="1/s", meaning="rate of the leakage", at_least=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Equation (24) with leakage."""
@@ -110,7 +107,6 @@ class MonotoneNussbaumLaw(NussbaumLaw):
 
     b: float = param(0.1, unit="1", meaning="width of the smooth sign of r s", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Equation (24) with the damped base."""

@@ -30,9 +30,7 @@ class RobustTerm:
     inputs = ("r",)
     outputs = ("robust", "delta_hat")
     states = ("delta_hat",)
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, second line of (25)."""
@@ -40,7 +38,6 @@ class RobustTerm:
         (r,) = u
         return (p.gamma * (r * smooth_sign(r, p.tau) - p.sigma_2 * delta_hat),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The term of (23), and the estimate."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 PIECE_DEGREE = 5  # of the polynomials
-PLACES = 1000  # places at which a function is looked at, at least: a pulse between two is not seen
+PLACES = 1000  # places at which a function is evaluated, at least: a pulse between two is not seen
 _NODES = chebyshev.chebpts1(PIECE_DEGREE + 1)
 _POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))  # values at the nodes -> coefficients
 _BETWEEN = np.array([-1.0, *0.5 * (_NODES[1:] + _NODES[:-1]), 1.0])
@@ -21,35 +21,23 @@ _HALVINGS = 40
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothPiece:
-    """Polynomials that functions are for a while.
+    """Polynomials that functions are for a while."""
 
-    Attributes
-    ----------
-    start, length : float
-        Time (s).
-    powers : ndarray of shape (count, 6)
-        Coefficients of powers of z, from -1 to 1 in the piece.
-    fits : bool
-        Whether they go through the functions: a piece too short to be halved has a jump in it.
-    breaks : bool
-        Whether a function, or its slope, jumps in it or where it begins.
-    """
-
+    # time (s)
     start: float
     length: float
-    powers: np.ndarray
+    powers: np.ndarray  # (count, 6): coefficients of powers of z, from -1 to 1 in the piece
+    # whether they go through the functions: a piece too short to be halved has a jump in it
     fits: bool = True
-    breaks: bool = False
+    breaks: bool = False  # whether a function, or its slope, jumps in it or where it begins
 
 
 def smooth_pieces(
     values: Callable[[float], np.ndarray], begin: float, end: float, count: int
 ) -> Iterator[SmoothPiece]:
-    """Divide functions of time into pieces that polynomials of degree 5 go through.
-
-    A piece is halved until it is a polynomial to rounding, also at those of 1000 places that lie
-    in it.
-    """
+    """Divide functions of time into pieces that polynomials of degree 5 go through."""
+    # A piece is halved until it is a polynomial to rounding, also at those of 1000 places
+    # that lie in it.
     if not count:
         yield SmoothPiece(start=begin, length=end - begin, powers=np.zeros((0, PIECE_DEGREE + 1)))
         return
@@ -63,8 +51,8 @@ def smooth_pieces(
         def at(z: np.ndarray, a: float = a, b: float = b) -> np.ndarray:
             return np.array([values(float(t)) for t in 0.5 * ((b - a) * z + (a + b))]).T
 
-        found, between = at(_NODES), at(_BETWEEN)
-        powers, scale = found @ _POWERS.T, np.maximum(scale, np.abs(found).max(axis=1))
+        at_nodes, between = at(_NODES), at(_BETWEEN)
+        powers, scale = at_nodes @ _POWERS.T, np.maximum(scale, np.abs(at_nodes).max(axis=1))
         inside = slice(*np.searchsorted(places, (a, b)))
         z = np.concatenate((_BETWEEN, 2.0 * (places[inside] - a) / (b - a) - 1.0))
         guessed = powers @ np.vander(z, PIECE_DEGREE + 1, increasing=True).T
@@ -74,9 +62,9 @@ def smooth_pieces(
             middle = 0.5 * (a + b)
             left += [(middle, b, halvings + 1), (a, middle, halvings + 1)]
             continue
-        made = SmoothPiece(start=a, length=b - a, powers=powers, fits=fits)
+        piece = SmoothPiece(start=a, length=b - a, powers=powers, fits=fits)
         before = replace(
-            made, breaks=not fits or (before is not None and _apart(before, made, scale))
+            piece, breaks=not fits or (before is not None and _apart(before, piece, scale))
         )
         yield before
 

@@ -70,7 +70,6 @@ class TransportDelay:
     varying: Callable[[float], float] | None = None
     history: Callable[[float], Any] | None = None
 
-    states = ()
     feedthrough = False
     supplied = PAST
 
@@ -109,18 +108,18 @@ class TransportDelay:
         if self.varying is None:
             return 0.0
         try:
-            found = float(self.varying(float(t)))
+            longer = float(self.varying(float(t)))
         except Exception as error:
             raise ParameterError(
                 f"TransportDelay needs a varying that is known at t = {t:g} s, but it raises "
                 f"{type(error).__name__}: {error}"
             ) from error
-        if not np.isfinite(found):
+        if not np.isfinite(longer):
             raise ParameterError(
-                f"TransportDelay needs a varying that returns a finite number, got {found:g} at "
+                f"TransportDelay needs a varying that returns a finite number, got {longer:g} at "
                 f"t = {t:g} s"
             )
-        return found
+        return longer
 
     def earlier(self, t: float) -> np.ndarray:
         """Return the signals at a time before the run.
@@ -144,18 +143,18 @@ class TransportDelay:
         if self.history is None:
             return np.full(count, self.before)
         try:
-            found = np.asarray(self.history(float(t)), dtype=float).reshape(-1)
+            values = np.asarray(self.history(float(t)), dtype=float).reshape(-1)
         except Exception as error:
             raise ParameterError(
                 f"TransportDelay needs a history that is known at t = {t:g} s, but it raises "
                 f"{type(error).__name__}: {error}"
             ) from error
-        if found.size not in (1, count) or not np.all(np.isfinite(found)):
+        if values.size not in (1, count) or not np.all(np.isfinite(values)):
             raise ParameterError(
                 f"TransportDelay needs a history that returns {counted(count, 'finite number')}, "
-                f"got {found.tolist()} at t = {t:g} s"
+                f"got {values.tolist()} at t = {t:g} s"
             )
-        return np.broadcast_to(found, (count,)).astype(float)
+        return np.broadcast_to(values, (count,)).astype(float)
 
     @staticmethod
     def output(t: float, x: Any, u: Any, p: Any) -> Any:

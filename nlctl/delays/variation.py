@@ -16,38 +16,29 @@ _APART = 1e-9  # of the largest value: what jumps by more over 40 halvings is no
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """The variation V(t) of a delay over a run, piece by piece.
+    """The variation V(t) of a delay over a run, piece by piece."""
 
-    Attributes
-    ----------
-    starts, lengths : ndarray of shape (pieces,)
-        Times (s).
-    powers : ndarray of shape (pieces, 6)
-        Coefficients (s) of powers of z, from -1 to 1 in each piece.
-    kinks : ndarray of shape (kinks,)
-        Times (s) at which a derivative of V jumps.
-    """
-
+    # (pieces,): times (s)
     starts: np.ndarray
     lengths: np.ndarray
-    powers: np.ndarray
-    kinks: np.ndarray
+    powers: np.ndarray  # (pieces, 6): coefficients (s) of powers of z, from -1 to 1 in each piece
+    kinks: np.ndarray  # (kinks,): times (s) at which a derivative of V jumps
 
     def extreme(self, order: int, sign: int) -> tuple[float, float]:
         """Return where V, or its slope, is greatest or least, and how large it is there."""
-        own = self.powers
+        rows = self.powers
         if order:
-            own = own[:, 1:] * np.arange(1, own.shape[1]) * (2.0 / self.lengths)[:, None]
-        own = sign * own
-        ends = np.stack([own @ np.power(z, np.arange(own.shape[1])) for z in (-1.0, 1.0)])
+            rows = rows[:, 1:] * np.arange(1, rows.shape[1]) * (2.0 / self.lengths)[:, None]
+        rows = sign * rows
+        ends = np.stack([rows @ np.power(z, np.arange(rows.shape[1])) for z in (-1.0, 1.0)])
         side, k = np.unravel_index(int(ends.argmax()), ends.shape)
         best = (self.starts[k] + side * self.lengths[k], ends[side, k])
-        most = own[:, 0] + np.abs(own[:, 1:]).sum(axis=1)
+        most = rows[:, 0] + np.abs(rows[:, 1:]).sum(axis=1)
         for k in np.flatnonzero(most > best[1]):  # where it may be larger between the ends
-            roots = polynomial.polyroots(polynomial.polytrim(polynomial.polyder(own[k])))
+            roots = polynomial.polyroots(polynomial.polytrim(polynomial.polyder(rows[k])))
             for z in roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1)]:
                 here = self.starts[k] + 0.5 * (z + 1) * self.lengths[k]
-                best = max(best, (here, polynomial.polyval(z, own[k])), key=lambda point: point[1])
+                best = max(best, (here, polynomial.polyval(z, rows[k])), key=lambda point: point[1])
         return float(best[0]), float(sign * best[1])
 
 
@@ -56,24 +47,24 @@ def variation(spec: Any, begin: float, end: float, path: str) -> Variation | Non
     if spec.varying is None:
         return None
     try:
-        found = list(smooth_pieces(lambda t: np.array([spec.varied(t)]), begin, end, 1))
+        pieces = list(smooth_pieces(lambda t: np.array([spec.varied(t)]), begin, end, 1))
     except ParameterError as error:
         raise ParameterError(f"{error} (block '{path}')") from None
-    made = Variation(
-        starts=np.array([piece.start for piece in found]),
-        lengths=np.array([piece.length for piece in found]),
-        powers=np.array([_powers(spec, piece) for piece in found]),
-        kinks=np.array([piece.start for piece in found if piece.breaks]),
+    whole = Variation(
+        starts=np.array([piece.start for piece in pieces]),
+        lengths=np.array([piece.length for piece in pieces]),
+        powers=np.array([_powers(spec, piece) for piece in pieces]),
+        kinks=np.array([piece.start for piece in pieces if piece.breaks]),
     )
-    _check_continuous(made, np.array([piece.fits for piece in found]), path)
-    t, steepest = made.extreme(1, 1)
+    _check_continuous(whole, np.array([piece.fits for piece in pieces]), path)
+    t, steepest = whole.extreme(1, 1)
     if not steepest < 1:
         raise ParameterError(
             "TransportDelay needs a delay that grows by less than 1 s per second, so that signals "
             f"arrive in the order in which they were sent, got {steepest:g} at t = {t:g} s "
             f"(block '{path}')"
         )
-    return made
+    return whole
 
 
 def _powers(spec: Any, piece: SmoothPiece) -> np.ndarray:
@@ -84,27 +75,25 @@ def _powers(spec: Any, piece: SmoothPiece) -> np.ndarray:
     return np.array([0.5 * (low + high), 0.5 * (high - low), *np.zeros(PIECE_DEGREE - 1)])
 
 
-def _check_continuous(made: Variation, fits: np.ndarray, path: str) -> None:
+def _check_continuous(whole: Variation, fits: np.ndarray, path: str) -> None:
     """Refuse a jump from piece to piece, or in one that is too short to be halved."""
-    low, high = made.powers @ (-1.0) ** np.arange(PIECE_DEGREE + 1), made.powers.sum(axis=1)
+    low, high = whole.powers @ (-1.0) ** np.arange(PIECE_DEGREE + 1), whole.powers.sum(axis=1)
     inside = np.where(fits, low, high)
     before = np.concatenate((low[:1], high[:-1]))
     for after in (low, inside):
-        apart = np.abs(after - before) > _APART * (1.0 + np.abs(made.powers[:, 0]).max())
+        apart = np.abs(after - before) > _APART * (1.0 + np.abs(whole.powers[:, 0]).max())
         if apart.any():
             k = int(apart.argmax())
             raise ParameterError(
                 f"TransportDelay needs a continuous variation, got a jump from {before[k]:g} s to "
-                f"{after[k]:g} s at t = {made.starts[k]:g} s (block '{path}')"
+                f"{after[k]:g} s at t = {whole.starts[k]:g} s (block '{path}')"
             )
 
 
-def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> None:
-    """Refuse delays that a variation makes 0 or negative.
-
-    Shapes: `delays` (lanes,).
-    """
-    t, least = (0.0, 0.0) if made is None else made.extreme(0, -1)
+def check_positive(whole: Variation | None, delays: np.ndarray, path: str) -> None:
+    """Refuse delays that a variation makes 0 or negative."""
+    # Shapes: `delays` (lanes,).
+    t, least = (0.0, 0.0) if whole is None else whole.extreme(0, -1)
     if not delays.min() + least > 0:
         raise ParameterError(
             f"TransportDelay needs delay + varying(t) > 0, got {delays.min() + least:g} s at "
@@ -112,18 +101,18 @@ def check_positive(made: Variation | None, delays: np.ndarray, path: str) -> Non
         )
 
 
-def variation_table(made: list[Variation | None]) -> dict[str, np.ndarray]:
+def variation_table(variations: list[Variation | None]) -> dict[str, np.ndarray]:
     """Return the variations of all lines as arrays of an integration."""
-    most = max([1, *(one.starts.size for one in made if one)])
-    kinks = max([1, *(one.kinks.size + 1 for one in made if one)])
+    most = max([1, *(one.starts.size for one in variations if one)])
+    kinks = max([1, *(one.kinks.size + 1 for one in variations if one)])
     table = {
-        "varied": np.zeros(len(made), dtype=np.int64),
-        "vary_t": np.zeros((most, len(made))),
-        "vary_h": np.ones((most, len(made))),
-        "vary": np.zeros((most, len(made), PIECE_DEGREE + 1)),
-        "kinks": np.full((len(made), kinks), np.inf),
+        "varied": np.zeros(len(variations), dtype=np.int64),
+        "vary_t": np.zeros((most, len(variations))),
+        "vary_h": np.ones((most, len(variations))),
+        "vary": np.zeros((most, len(variations), PIECE_DEGREE + 1)),
+        "kinks": np.full((len(variations), kinks), np.inf),
     }
-    for i, one in enumerate(made):
+    for i, one in enumerate(variations):
         if one is not None:
             n = table["varied"][i] = one.starts.size
             table["vary_t"][:n, i], table["vary_h"][:n, i] = one.starts, one.lengths

@@ -286,24 +286,7 @@ def _check_orders(systems: Sequence[ct.InputOutputSystem], sources: Mapping[str,
 
 
 def reconnected(before: Any, parts: Sequence[Any], maps: Any, dt: Any) -> ct.InterconnectedSystem:
-    """Return parts connected by maps, to replace a diagram: with its signals and parameters.
-
-    Parameters
-    ----------
-    before : control.InterconnectedSystem
-        It stays as it is.
-    parts : sequence of control.InputOutputSystem
-        In the places of its own, others behind them.
-    maps : tuple of ndarray
-        ``connect_map``, ``input_map`` and ``output_map``.
-    dt : float, bool or None
-        Timebase.
-
-    Returns
-    -------
-    control.InterconnectedSystem
-        With the name, signals and parameters of `before`.
-    """
+    """Return parts connected by maps, to replace a diagram: with its signals and parameters."""
     diagram = ct.InterconnectedSystem(
         parts,
         inputs=list(before.input_labels) or 0,

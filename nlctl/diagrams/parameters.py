@@ -24,43 +24,12 @@ if TYPE_CHECKING:
 
 
 def check_read(system: System, params: Mapping[str, Any] | None) -> None:
-    """Refuse parameters that nothing in a diagram reads.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-    params : mapping or None
-        Overrides by name.
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError
-        The nearest name is given.
-    """
+    """Refuse parameters that nothing in a diagram reads."""
     divided(system, params)
 
 
 def override(system: Any, params: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Let a system's equations have a user's overrides from now on; None for its own values.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block; of a run the one that is its own, see `apart`.
-    params : mapping or None
-        Overrides by name.
-
-    Returns
-    -------
-    dict
-        What python-control is given of them.
-
-    Raises
-    ------
-    UnknownNameError, AmbiguousNameError, ParameterError
-        If a name or a value is refused.
-    """
+    """Let a system's equations have a user's overrides from now on; None for its own values."""
     parts = divided(system, params)
     blocks = [within(leaf.system) for leaf in leaves(system)]
     for leaf_block in blocks:
@@ -100,34 +69,12 @@ def overridden(system: System, params: Mapping[str, Any] | None = None) -> Any:
 
 
 def parameter_names(system: ct.InputOutputSystem) -> list[str]:
-    """Return the qualified names of all parameters in `system`.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-
-    Returns
-    -------
-    list of str
-        In the order of `all_parameter_rows`.
-    """
+    """Return the qualified names of all parameters in `system`."""
     return [row.name for row in all_parameter_rows(system)]
 
 
 def all_parameter_rows(system: ct.InputOutputSystem) -> list[ParameterRow]:
-    """Return the parameter table of a diagram, with the values of a run without overrides.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-
-    Returns
-    -------
-    list of ParameterRow
-        In the order of the blocks, those of sampling behind them.
-    """
+    """Return the parameter table of a diagram, with the values of a run without overrides."""
     if isinstance(system, ct.NonlinearIOSystem):
         system = apart(system).system
         set_parameters(system, None)
@@ -165,18 +112,7 @@ def _third_party_rows(system: Any, path: str) -> list[ParameterRow]:
 
 
 def samplings(system: Any) -> list[tuple[Any, Any]]:
-    """Return what says how blocks are sampled, each once, behind the path of its parameters.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-
-    Returns
-    -------
-    list of (str, object)
-        Path and owner of the parameters, one for each clock.
-    """
+    """Return what says how blocks are sampled, each once, behind the path of its parameters."""
     every = [sampling_of(leaf.system) for leaf in leaves(system)]
     by_identity: dict[int, Any] = {
         id(sampling): sampling for sampling in every if sampling is not None

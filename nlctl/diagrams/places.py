@@ -38,22 +38,7 @@ class Place:
 def places(
     system: System, parent: Place | None = None, position: int = 0, offset: int = 0
 ) -> Iterator[Place]:
-    """Yield a system's place and then, in the order of the state vector, those of its parts.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-    parent : Place, optional
-        That of the diagram around it; none for the outermost.
-    position, offset : int, optional
-        Its position in the ``syslist`` around it, and where its states begin.
-
-    Yields
-    ------
-    Place
-        The system itself first, parts in the order of ``syslist``.
-    """
+    """Yield a system's place and then, in the order of the state vector, those of its parts."""
     nested = isinstance(system, ct.InterconnectedSystem)
     outer, outer_parameters = ("", "") if parent is None else (parent.path, parent.parameter_path)
     name = "" if nested and parent is None else system.name
@@ -96,25 +81,7 @@ def _is_scoped(diagram: ct.InterconnectedSystem) -> bool:
 
 
 def supplied_blocks(system: Any, how: Supplied | None = None) -> list[Block]:
-    """Return the blocks of a diagram whose outputs are supplied, in its order; each is there once.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block.
-    how : Supplied, optional
-        Only those that are supplied in this way.
-
-    Returns
-    -------
-    list of Block
-        Transport delays and ideal relays, for example.
-
-    Raises
-    ------
-    DiagramError
-        If one is in discrete time, is sampled, or stands in the diagram twice.
-    """
+    """Return the blocks whose outputs are supplied, in the order of the diagram, each once."""
     supplied: dict[int, Block] = {}
     for leaf in leaves(system):
         inner = within(leaf.system)
@@ -138,25 +105,7 @@ def _a(noun: str) -> str:
 
 
 def known_system(who: str, system: System) -> Any:
-    """Return a block or diagram; of a compiled diagram that which was compiled.
-
-    Parameters
-    ----------
-    who : str
-        Who asks, for the error.
-    system : control.InputOutputSystem or Compiled
-        What was given.
-
-    Returns
-    -------
-    control.InputOutputSystem
-        The same object, or that which a `Compiled` was made of.
-
-    Raises
-    ------
-    ParameterError
-        If it is neither.
-    """
+    """Return a block or diagram; of a compiled diagram that which was compiled."""
     inner = system.system if isinstance(system, StandIn) else system
     if not isinstance(inner, ct.InputOutputSystem):
         raise ParameterError(not_a_system(who, system))
@@ -164,20 +113,7 @@ def known_system(who: str, system: System) -> Any:
 
 
 def not_a_system(who: str, thing: object) -> str:
-    """Return the sentence that refuses what is neither a block nor a diagram.
-
-    Parameters
-    ----------
-    who : str
-        Who asks.
-    thing : object
-        What was given.
-
-    Returns
-    -------
-    str
-        It says how a block is made of a record.
-    """
+    """Return the sentence that refuses what is neither a block nor a diagram."""
     return (
         f"{who} needs a block or diagram, got {type(thing).__name__}: nlctl.block makes a block of "
         "a record"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import CodeType, FunctionType, MethodType
 from typing import Any
 
@@ -96,55 +96,23 @@ class _Watched(dict):  # type: ignore[type-arg]
         self.asked: set[Any] = set()
         self.every = False
 
-    def __getitem__(self, key: object) -> Any:
-        self.asked.add(key)
-        return super().__getitem__(key)
 
-    def get(self, key: object, default: Any = None) -> Any:
-        """Return a value, and note the key."""
-        self.asked.add(key)
-        return super().get(key, default)
+def _noting(name: str, *, one: bool) -> Callable[..., Any]:
+    """Return a method of a dict that notes which key it is asked for, or that it is all."""
+    method = getattr(dict, name)
 
-    def __contains__(self, key: object) -> bool:
-        self.asked.add(key)
-        return super().__contains__(key)
+    def noted(self: _Watched, *given: Any) -> Any:
+        self.asked.update(given[:1] if one else ())
+        self.every |= not one
+        return method(self, *given)
 
-    def pop(self, key: object, *default: Any) -> Any:  # type: ignore[override]
-        """Take a value out, and note the key."""
-        self.asked.add(key)
-        return super().pop(key, *default)
+    return noted
 
-    def __iter__(self) -> Iterator[Any]:
-        self.every = True
-        return super().__iter__()
 
-    def keys(self) -> Any:
-        """Return all keys."""
-        self.every = True
-        return super().keys()
-
-    def values(self) -> Any:
-        """Return all values."""
-        self.every = True
-        return super().values()
-
-    def items(self) -> Any:
-        """Return all pairs."""
-        self.every = True
-        return super().items()
-
-    def copy(self) -> Any:
-        """Return a plain copy: what is asked of that is not seen."""
-        self.every = True
-        return dict(super().items())
-
-    def __or__(self, other: Any) -> Any:
-        self.every = True
-        return super().__or__(other)
-
-    def __ror__(self, other: Any) -> Any:
-        self.every = True
-        return dict(other) | dict(super().items())
+for _name in ("__getitem__", "__contains__", "get", "pop"):
+    setattr(_Watched, _name, _noting(_name, one=True))
+for _name in ("__iter__", "keys", "values", "items", "copy", "__or__", "__ror__"):
+    setattr(_Watched, _name, _noting(_name, one=False))
 
 
 def _reads(function: Any, block: System, key: str) -> bool:

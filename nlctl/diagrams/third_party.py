@@ -68,10 +68,10 @@ class Named(_TakesADict):
 
     @params.setter
     def params(self, values: Mapping[str, Any]) -> None:
-        self.nlctl_own = self.taken(values or {})
+        self.nlctl_own = self._taken(values or {})
         set_parameters(self, None)
 
-    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+    def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read: its own values, overridden."""
         values, prefix = dict(self.nlctl_own), f"{self.name}."
         for name, value in [*params.items(), *vars(self).get("nlctl_overrides", {}).items()]:
@@ -80,15 +80,9 @@ class Named(_TakesADict):
 
 
 class Overridden(_TakesADict):
-    """A third-party block of a run of its own, see `apart`.
+    """A third-party block of a run of its own, see `apart`."""
 
-    Attributes
-    ----------
-    nlctl_overrides : dict
-        What it alone reads in place of what python-control gives it.
-    """
-
-    def taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
+    def _taken(self, params: Mapping[str, Any]) -> dict[str, Any]:
         """Return what its functions read."""
         values = {**self.params, **params}
         for name, value in self.nlctl_overrides.items():
@@ -215,18 +209,7 @@ class Apart:
 
 
 def apart(system: System) -> Apart:
-    """Return a copy of a diagram, with copies of its blocks.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        A diagram or a block; its functions, matrices and records are those of the copy.
-
-    Returns
-    -------
-    Apart
-        The copy, and which block stands for which.
-    """
+    """Return a copy of a diagram, with copies of its blocks."""
     copies = Apart(system=None, pairs={})
 
     def copied(old: Any) -> Any:

@@ -79,26 +79,7 @@ class _Edge:
 
 
 def signal_graph(diagram: ct.InterconnectedSystem) -> tuple[tuple[_Block, ...], tuple[_Edge, ...]]:
-    """Read the blocks of a diagram and the signals between them.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-        As in `draw`.
-
-    Returns
-    -------
-    blocks : tuple of Block
-        In the order of ``diagram.syslist``; edges refer to blocks by index.
-    edges : tuple of Edge
-        One per pair of blocks that are connected.  Those between blocks hold exactly the non-zero
-        entries of ``connect_map``, those from the outside ``input_map``, to it ``output_map``.
-
-    Raises
-    ------
-    TypeError
-        If `diagram` is not an interconnection of blocks.
-    """
+    """Read the blocks of a diagram and the signals between them."""
     if not isinstance(diagram, ct.InterconnectedSystem):
         raise TypeError(
             f"cannot draw a {type(diagram).__name__}: pass a diagram (InterconnectedSystem), for "
@@ -160,18 +141,7 @@ def _edges(gains: np.ndarray, sources: Sequence[Any], targets: Sequence[Any]) ->
 
 
 def lay_out(diagram: ct.InterconnectedSystem) -> Layout:
-    """Place a diagram on paper, in points; `draw` paints exactly this.
-
-    Parameters
-    ----------
-    diagram : control.InterconnectedSystem
-        As in `draw`.
-
-    Returns
-    -------
-    Layout
-        ``boxes`` in the order of ``diagram.syslist``, ``routes``, branching ``dots``.
-    """
+    """Place a diagram on paper, in points; `draw` paints exactly this."""
     blocks, edges = signal_graph(diagram)
     outside: dict[tuple[str, int | None], Sequence[str]] = {}
     targets: dict[tuple[int, Sequence[str]], list[int]] = {}

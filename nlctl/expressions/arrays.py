@@ -25,6 +25,28 @@ class Special:
         raise Untraceable(f"{name} of {type(self).__name__}")
 
 
+class Computed(Special):
+    """What has the operators of arithmetic, by its operations."""
+
+    __array_ufunc__ = None
+    __hash__ = None  # type: ignore[assignment]
+    graph: Graph
+
+
+def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
+    def method(self: Computed, *other: Any) -> Any:
+        return self.operation(self.graph, name, (*other, self) if reflected else (self, *other))
+
+    return method
+
+
+for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
+    setattr(Computed, f"__{_name}__", _operator(_op))
+    setattr(Computed, f"__r{_name}__", _operator(_op, reflected=True))
+for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
+    setattr(Computed, f"__{_name}__", _operator(_op))
+
+
 def is_complex(value: object) -> bool:
     """Whether a value is a complex number or an array of them."""
     return isinstance(value, complex | np.complexfloating) or (

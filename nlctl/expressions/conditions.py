@@ -9,16 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable
 
-from .graph import Expr, Graph, needed
+from .graph import ORDERS, Expr, Graph, needed
 
-_ORDERS = ("lt", "le", "gt", "ge")
-_OF_DIFFERENCES = (*_ORDERS, "minimum", "maximum")
+_OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_SIGNS = ("absolute", "sign", "heaviside")
 _OF_SECONDS = ("copysign",)
 _OF_FIRSTS = ("arctan2",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
 _ROOTS = ("sqrt", "hypot")
 _OF_QUOTIENTS = ("remainder", "fmod")
+# functions that jump
+JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
 
 
 def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:

@@ -39,6 +39,28 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
     return _Reader(graph, lambda _: None, {}).partial
 
 
+def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
+    """Return what a linear operation makes of parts, None for one that is 0."""
+    a, b, zero = parts[0], parts[-1], graph.const(0.0)
+    if node.op == "concat":
+        return graph.joined([(p or zero, n) for p, n in zip(parts, node.data, strict=True)])
+    if node.op == "add":
+        return graph.op("add", a, b) if a and b else a or b
+    if node.op == "sub":
+        return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or zero)
+    if a is None:
+        return None
+    if node.op == "item":
+        return graph.item(a, node.data)
+    if node.op == "slice":
+        start, step = node.data
+        return graph.part(a, start, step, node.size or 1)
+    return graph.sum(a, node.args[0].size or 1) if node.op == "sum" else graph.op("neg", a)
+
+
+_LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum")
+
+
 class _Reader:
     """Goes through a graph once; `known` are the derivatives so far."""
 
@@ -80,6 +102,8 @@ class _Reader:
             return None
         if node.op in FUNCTIONS:
             return self._function(node, parts)
+        if node.op in _LINEAR:
+            return linear(self.graph, node, parts)
         return getattr(self, f"_{node.op}")(node, *parts)
 
     def _of_solution(self, node: Expr) -> Expr:
@@ -103,43 +127,23 @@ class _Reader:
     def _zero_if_none(self, tangent: Expr | None) -> Expr:
         return self.graph.const(0.0) if tangent is None else tangent
 
-    def _add(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
-        return self.graph.op("add", a, b) if a and b else a or b
-
-    def _sub(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
-        if a and b:
-            return self.graph.op("sub", a, b)
-        return a or self.graph.op("neg", self._zero_if_none(b))
-
-    def _neg(self, node: Expr, a: Expr) -> Expr:
-        return self.graph.op("neg", a)
-
     def _mul(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         left = self.graph.op("mul", a, node.args[1]) if a else None
         right = self.graph.op("mul", node.args[0], b) if b else None
-        return self._add(node, left, right)
+        return self.graph.op("add", left, right) if left and right else left or right
 
     def _div(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr:
         """(a / b)' = (a' - (a / b) b') / b."""
-        change = self._sub(node, a, self.graph.op("mul", node, b) if b else None)
-        return self.graph.op("div", self._zero_if_none(change), node.args[1])
+        change = self.graph.op("mul", node, b) if b else None
+        if a and change:
+            change = self.graph.op("sub", a, change)
+        else:
+            change = a or self.graph.op("neg", self._zero_if_none(change))
+        return self.graph.op("div", change, node.args[1])
 
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:
         yes, no = self._zero_if_none(a), self._zero_if_none(b)
         return self.graph.op("select", node.args[0], yes, no)
-
-    def _item(self, node: Expr, a: Expr) -> Expr:
-        return self.graph.item(a, node.data)
-
-    def _slice(self, node: Expr, a: Expr) -> Expr:
-        start, step = node.data
-        return self.graph.part(a, start, step, node.size or 1)
-
-    def _concat(self, node: Expr, *parts: Expr | None) -> Expr:
-        return self.graph.joined(list(zip(map(self._zero_if_none, parts), node.data, strict=True)))
-
-    def _sum(self, node: Expr, a: Expr) -> Expr:
-        return self.graph.sum(a, node.args[0].size or 1)
 
     def _function(self, node: Expr, parts: list[Expr | None]) -> Expr | None:
         change: Expr | None = None

@@ -27,6 +27,7 @@ BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
 # operations that make integers of integers
 INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remainder")
 
+ORDERS = ("lt", "le", "gt", "ge")
 SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from .arrays import Special, Tracer, traced
+from .arrays import Computed, Special, Tracer, traced
 from .graph import Graph, Untraceable
 from .operators import elementwise, total
 
 
-class Masked(Special):
+class Masked(Computed):
     """``x[x > 0]``: the whole array, and where its elements count."""
 
     def __init__(self, whole: Tracer, mask: Tracer) -> None:
         if mask.shape != whole.shape:
             raise Untraceable("a mask of another shape")
-        self.whole, self.mask = whole, mask
+        self.graph, self.whole, self.mask = whole.graph, whole, mask
 
     def whole_for(self, mask: Tracer) -> Tracer:
         """Return the whole array, for the places of the same mask."""
@@ -63,7 +63,6 @@ class Masked(Special):
         raise Untraceable("elements that a mask chooses, whose number only the run knows")
 
     __len__ = __iter__ = __getitem__ = __bool__ = __str__ = __repr__ = _text
-    __hash__ = None  # type: ignore[assignment]
 
 
 class MaskedPlaces(Special):
@@ -79,24 +78,10 @@ class MaskedPlaces(Special):
     size = property(count)
 
 
-def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
-    def method(self: Masked, *other: Any) -> Any:
-        operands = (*other, self) if reflected else (self, *other)
-        return self.operation(self.whole.graph, name, operands)
-
-    return method
-
-
 def _power(self: Masked, exponent: Any) -> Masked:
     if isinstance(exponent, Tracer | np.ndarray) and exponent.ndim:
         raise Untraceable("an array next to elements that a mask chooses")
     return Masked(self.whole**exponent, self.mask)  # type: ignore[operator]
 
 
-Masked.__array_ufunc__ = None  # type: ignore[attr-defined]
 Masked.__pow__ = _power  # type: ignore[attr-defined]
-for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
-    setattr(Masked, f"__{_name}__", _operator(_op))
-    setattr(Masked, f"__r{_name}__", _operator(_op, reflected=True))
-for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
-    setattr(Masked, f"__{_name}__", _operator(_op))

@@ -6,15 +6,16 @@ passes as it is.  Where a condition begins it, `Latch` remembers since when that
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ..actuators.memories import RELAXATION
 from ..equations import equation
-from ..errors import ParameterError
-from ..functions import noise_spectrum, noise_value
+from ..functions import noise_value
 from ..params import param, record
+from ..references import NoiseBand
 
 NEVER = 1e12
 """A time in s that no run reaches: as an onset, a fault that does not begin."""
@@ -40,6 +41,19 @@ def is_present(t, u, p):
     return 0 <= age(t, u, p) < p.duration
 
 
+def while_present(faulty: Callable[..., Any]) -> Callable[..., Any]:
+    """Make the output equation of a fault from what the signal is while it lasts."""
+    faulty = equation(faulty)
+
+    @equation
+    def output(t, x, u, p):
+        if is_present(t, u, p):
+            return (faulty(t, x, u, p),)
+        return (u[0],)
+
+    return output
+
+
 @record
 class _Effect:
     """What all faults share: when they are present.
@@ -55,16 +69,9 @@ class _Effect:
     has_condition: bool = False
 
     outputs = ("faulty",)
-    states = ()
-    feedthrough = True
     vector = True
+    inputs = property(lambda self: ("signal", "on", "since") if self.has_condition else ("signal",))
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The signal, and what the latch says."""
-        return ("signal", "on", "since") if self.has_condition else ("signal",)
-
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """Beginning and end of the fault."""
@@ -78,13 +85,7 @@ class Bias(_Effect):
 
     value: float = param(0.0, unit="1", meaning="offset, in the unit of the signal")
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, with the offset while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + p.value,)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + p.value)
 
 
 @record
@@ -93,13 +94,7 @@ class DriftFault(_Effect):
 
     value: float = param(0.0, unit="1/s", meaning="rate of the offset")
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, with the growing offset while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + p.value * age(t, u, p),)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + p.value * age(t, u, p))
 
 
 @record
@@ -108,55 +103,28 @@ class LossOfEffectiveness(_Effect):
 
     value: float = param(1.0, unit="1", meaning="factor")
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, times the factor while the fault lasts."""
-        if is_present(t, u, p):
-            return (p.value * u[0],)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: p.value * u[0])
 
 
 @record
-class Noise(_Effect):
+class Noise(NoiseBand, _Effect):
     """Band-limited noise, a fixed function of time: see `nlctl.references.BandLimitedNoise`."""
 
     value: float = param(0.0, unit="1", meaning="root mean square of the noise", at_least=0)
-    low: float = param(0.0, unit="rad/s", meaning="lower end of the band", at_least=0)
-    high: float = param(50.0, unit="rad/s", meaning="upper end of the band", above=0)
-    seed: int = param(0, unit="1", meaning="seed of frequencies and phases", at_least=0)
-    components: int = param(32, unit="1", meaning="number of sines", at_least=1)
-
-    def check(self) -> None:
-        """A band has two ends."""
-        if not self.low < self.high:
-            raise ParameterError(f"Noise needs low < high, got {self.low:g} and {self.high:g}")
 
     def derived(self) -> dict[str, Any]:
         """Frequencies and phases, those of `nlctl.references.BandLimitedNoise` with one signal."""
-        omega, phase = noise_spectrum(self.low, self.high, [self.seed, 0], self.components)
-        return {"omega": omega, "phase": phase}
+        omega, phase = self.spectrum(1)
+        return {"omega": omega[0], "phase": phase[0]}
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, with noise while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[0] + noise_value(t, p.value, p.omega, p.phase),)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[0] + noise_value(t, p.value, p.omega, p.phase))
 
 
 @record
 class Outage(_Effect):
     """Nothing arrives: 0 while it lasts (dropout), or for ever (disconnection)."""
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, 0 while the fault lasts."""
-        if is_present(t, u, p):
-            return (0.0 * u[0],)  # NaN travels
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: 0.0 * u[0])  # NaN travels
 
 
 @record
@@ -165,13 +133,7 @@ class StuckAt(_Effect):
 
     value: float = param(0.0, unit="1", meaning="what it is stuck at, in the unit of the signal")
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, the value while the fault lasts."""
-        if is_present(t, u, p):
-            return (p.value + 0.0 * u[0],)  # NaN travels
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: p.value + 0.0 * u[0])  # NaN travels
 
 
 @record
@@ -183,13 +145,7 @@ class Late(_Effect):
         """The signal, what the latch says, and the signal as it was earlier."""
         return (*super().inputs, "late")
 
-    @staticmethod
-    @equation
-    def output(t, x, u, p):
-        """The signal, the earlier one while the fault lasts."""
-        if is_present(t, u, p):
-            return (u[-1],)
-        return (u[0],)
+    output = while_present(lambda t, x, u, p: u[-1])
 
 
 @record
@@ -205,7 +161,6 @@ class LockInPlace(_Effect):
     states = ("held", "caught")
     memory = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Relaxation: the held value follows until it is caught."""
@@ -214,7 +169,6 @@ class LockInPlace(_Effect):
             return 0.0, RELAXATION * (begun - x[1])
         return SHARPER * RELAXATION * (u[0] - x[0]), RELAXATION * (begun - x[1])
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """Catch the signal once, at the onset."""
@@ -222,7 +176,6 @@ class LockInPlace(_Effect):
             return u[0], 1.0
         return x[0], x[1]
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The signal, what was caught while the fault lasts."""
@@ -269,13 +222,11 @@ class Latch:
         """Signs of the condition, for the equations."""
         return {"magnitude": int(self.is_magnitude), "sign": -1.0 if self.is_below else 1.0}
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """By how much the condition is met."""
         return (excess(u, p),)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Relaxation: `on` rises while the condition is met, until then `since` follows t."""
@@ -285,7 +236,6 @@ class Latch:
         met = 1.0 if excess(u, p) > 0 else 0.0
         return RELAXATION * (met - on), SHARPER * RELAXATION * (t - since)
 
-    @staticmethod
     @equation
     def commit(t, x, u, p):
         """Remember the first time at which the condition is met."""
@@ -294,9 +244,7 @@ class Latch:
             return 1.0, t
         return on, since
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """What is remembered."""
         on, since = x
         return on, since

@@ -12,7 +12,7 @@ from ..arguments import a_function
 from ..controllers.filtered_error import is_hurwitz
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import param, record
+from ..params import Floats, param, record
 from .signals import estimate_names, set_names
 
 
@@ -55,7 +55,7 @@ class HighGainObserver:
     measured: str = "y"
     known: tuple[str, ...] = ()
     model: Callable[[Any, Any], Any] = nothing_known
-    alpha: tuple[float, ...] = param(
+    alpha: Floats = param(
         (2.0, 1.0), unit="1", meaning="coefficients alpha_1, ..., alpha_n", above=0
     )
     epsilon: float = param(0.1, unit="s", meaning="time scale of the observer", above=0)
@@ -82,16 +82,8 @@ class HighGainObserver:
                 "one"
             )
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the known inputs and of the output."""
-        return (*self.known, self.measured)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.alpha))
-
+    inputs = property(lambda self: (*self.known, self.measured))
+    states = property(lambda self: estimate_names(len(self.alpha)))
     outputs = states
 
     def derived(self) -> dict[str, Any]:
@@ -110,8 +102,6 @@ class HighGainObserver:
 
         return update
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The estimates."""
         return x.copy()

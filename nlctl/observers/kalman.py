@@ -13,7 +13,7 @@ from ..equations import equation
 from ..errors import ParameterError
 from ..expressions.graph import Untraceable
 from ..expressions.jacobian_source import jacobian_function
-from ..params import as_numbers, nested_tuple, param, record
+from ..params import Matrix, as_numbers, nested_tuple, param, record
 from .signals import estimate_names, set_names
 
 _SIZES = ("states", "known inputs")
@@ -79,12 +79,8 @@ class ExtendedKalmanFilter:
     h: Callable[[Any], Any] = first_state
     x0: Sequence[float] = ()
     P0: Sequence[Sequence[float]] = ()
-    Q: tuple[tuple[float, ...], ...] = param(
-        ((0.1, 0.0), (0.0, 0.1)), unit="1/s", meaning="intensity of the noise in x'"
-    )
-    R: tuple[tuple[float, ...], ...] = param(
-        ((0.1,),), unit="s", meaning="intensity of the noise in y"
-    )
+    Q: Matrix = param(((0.1, 0.0), (0.0, 0.1)), unit="1/s", meaning="intensity of the noise in x'")
+    R: Matrix = param(((0.1,),), unit="s", meaning="intensity of the noise in y")
 
     feedthrough = False
     vector = True
@@ -114,20 +110,9 @@ class ExtendedKalmanFilter:
                 )
         self.jacobians  # noqa: B018 (it is refused here if there are none)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the known inputs and of the outputs."""
-        return (*self.known, *self.measured)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.Q))
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """The estimates, and the upper triangle P11, P12, ..., Pnn of the covariance."""
-        return (*self.outputs, *(f"P{i + 1}{j + 1}" for i, j in self.places))
+    inputs = property(lambda self: (*self.known, *self.measured))
+    outputs = property(lambda self: estimate_names(len(self.Q)))
+    states = property(lambda self: (*self.outputs, *(f"P{i + 1}{j + 1}" for i, j in self.places)))
 
     @property
     def places(self) -> list[tuple[int, int]]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import of_type
 from ..equations import equation
 from ..errors import ParameterError
-from ..params import param, record
+from ..params import Matrix, param, record
 from ..wording import counted
 from .signals import estimate_names, set_names
 
@@ -43,21 +43,13 @@ class LuenbergerObserver:
 
     known: tuple[str, ...] = ("u",)
     measured: tuple[str, ...] = ("y",)
-    A: tuple[tuple[float, ...], ...] = param(
-        ((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant"
-    )
-    B: tuple[tuple[float, ...], ...] = param(
+    A: Matrix = param(((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant")
+    B: Matrix = param(
         ((0.0,), (1.0,)), unit="1/s", meaning="matrix B of the plant", may_be_empty=True
     )
-    C: tuple[tuple[float, ...], ...] = param(
-        ((1.0, 0.0),), unit="1", meaning="matrix C of the plant"
-    )
-    D: tuple[tuple[float, ...], ...] = param(
-        ((0.0,),), unit="1", meaning="matrix D of the plant", may_be_empty=True
-    )
-    L: tuple[tuple[float, ...], ...] = param(
-        ((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer"
-    )
+    C: Matrix = param(((1.0, 0.0),), unit="1", meaning="matrix C of the plant")
+    D: Matrix = param(((0.0,),), unit="1", meaning="matrix D of the plant", may_be_empty=True)
+    L: Matrix = param(((3.0,), (2.0,)), unit="1/s", meaning="gain of the observer")
 
     feedthrough = False
     vector = True
@@ -78,19 +70,10 @@ class LuenbergerObserver:
         set_names(self, "known", m, at_least=0)
         set_names(self, "measured", k)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the plant's inputs and outputs."""
-        return (*self.known, *self.measured)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names x1_hat, ..., xn_hat."""
-        return estimate_names(len(self.A))
-
+    inputs = property(lambda self: (*self.known, *self.measured))
+    states = property(lambda self: estimate_names(len(self.A)))
     outputs = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The plant's equation, corrected by what its output is off."""
@@ -98,10 +81,8 @@ class LuenbergerObserver:
         known, y = u[:m], u[m:]
         return p.A @ x + p.B @ known + p.L @ (y - p.C @ x - p.D @ known)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The estimates."""
         return x.copy()
 
 

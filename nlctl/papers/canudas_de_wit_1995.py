@@ -53,16 +53,13 @@ class PositionControl:
     inputs = ("position", "velocity", "wanted")
     outputs = ("applied",)
     states = ("integral",)
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The integral of the error."""
         position, _, desired = u
         return (position - desired,)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The force."""

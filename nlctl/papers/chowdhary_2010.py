@@ -83,20 +83,17 @@ class Pendulum:
     outputs = ("y", "x1", "x2", "x2_dot")
     states = ("x1", "x2")
     initial = {"x1": 1.0, "x2": 1.0}
-    feedthrough = True
 
     f = staticmethod(pendulum_acceleration)
     d = staticmethod(still)
     update = staticmethod(integrator_chain(pendulum_acceleration, still))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The angle, the state, and the acceleration."""
         x1, x2 = x
         return x1, x1, x2, pendulum_acceleration((x1, x2), u[0], p)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break point of |x2|."""
@@ -118,16 +115,12 @@ class PendulumRegressor:
 
     inputs = ("x1", "x2")
     outputs = regressor_names(3)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The functions of `Pendulum`."""
         return regressor(u)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break point of |x2|."""

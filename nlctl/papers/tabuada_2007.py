@@ -39,8 +39,6 @@ class RelativeThreshold:
     sigma: float = param(0.03, unit="1", meaning="error that is allowed, of |x|", above=0)
 
     outputs = ("u", "trigger")
-    states = ()
-    feedthrough = True
     vector = True
 
     @property
@@ -49,7 +47,6 @@ class RelativeThreshold:
         numbers = range(1, len(self.K) + 1)
         return (*(f"x{i}" for i in numbers), *(f"w{i}" for i in numbers))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The control input, and how far the error is from what is allowed."""

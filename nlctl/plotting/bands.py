@@ -33,12 +33,10 @@ def bands(
     groups: Sequence[str] = (),
     figure: Figure | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Draw bands that hold all, 90 % and 50 % of the runs, and single runs as lines.
-
-    `signals` are samples of shape (runs, m) by name, NaN after a run has ended, `lines` single
-    runs by label with samples of shape (m,) by name.  With `groups`, the kind of each run, each
-    kind has a band of its own.  A figure that is given is empty; its size is set.
-    """
+    """Draw bands that hold all, 90 % and 50 % of the runs, and single runs as lines."""
+    # `signals` are samples of shape (runs, m) by name, NaN after a run has ended, `lines`
+    # single runs by label with samples of shape (m,) by name. With `groups`, the kind of each
+    # run, each kind has a band of its own. A figure that is given is empty; its size is set.
     height = 1.9 if len(signals) > 1 else 2.6
     figure, axes = stacked_axes(rows=len(signals), height=height, figure=figure)
     nodes = np.unique(np.linspace(0, time.size - 1, STRETCHES + 1).astype(int))
@@ -150,20 +148,16 @@ def quantile(samples: np.ndarray, part: float, missing: float) -> np.ndarray:
 
 
 def upper_envelope(y: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return values at some samples so that the lines between them lie nowhere below `y`.
-
-    Shapes: `y` (m,), `nodes` (k,).
-    """
+    """Return values at some samples so that the lines between them lie nowhere below `y`."""
+    # Shapes: `y` (m,), `nodes` (k,).
     most = np.maximum.reduceat(y, nodes[:-1])
     most[-1] = max(most[-1], y[-1])
     return np.maximum(np.append(most[0], most), np.append(most, most[-1]))
 
 
 def _range(samples: np.ndarray, limits: Sequence[float]) -> tuple[float, float]:
-    """Return the range that is drawn: of all samples, unless few of them lie far outside.
-
-    Limits are in it, unless they lie so far away that the samples would be a line.
-    """
+    """Return the range that is drawn: of all samples, unless few of them lie far outside."""
+    # Limits are in it, unless they lie so far away that the samples would be a line.
     finite = samples[np.isfinite(samples)]
     if not finite.size:
         return -1.0, 1.0

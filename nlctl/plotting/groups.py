@@ -24,17 +24,11 @@ _CLOSE = 1e-9  # of the largest value: sums are rounded
 
 @dataclass(frozen=True, kw_only=True)
 class Wires:
-    """Where the outputs of a diagram come from.
+    """Where the outputs of a diagram come from."""
 
-    Attributes
-    ----------
-    blocks : mapping
-        By output, the block of the diagram whose signal it is.
-    pairs : tuple of (str, str)
-        What goes into an actuator, and what comes out of it, where both are outputs.
-    """
-
+    # by output, the block of the diagram whose signal it is
     blocks: Mapping[str, str] = field(default_factory=dict)
+    # what goes into an actuator, and what comes out of it, where both are outputs
     pairs: tuple[tuple[str, str], ...] = ()
 
 
@@ -67,10 +61,8 @@ def _pairs(system: Any, offsets: np.ndarray, shown: Mapping[int, str]) -> Iterat
 
 
 def _is_actuator(part: Any) -> bool:
-    """Whether a block has one input and one output, in one unit as far as one can know.
-
-    That is a block from u to v, and a function without states that is not linear.
-    """
+    """Whether a block has one input and one output, in one unit as far as one can know."""
+    # That is a block from u to v, and a function without states that is not linear.
     if (part.ninputs, part.noutputs) != (1, 1) or isinstance(part, ct.StateSpace):
         return False
     inner = within(part)
@@ -82,10 +74,8 @@ def _is_actuator(part: Any) -> bool:
 
 
 def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list[str]]:
-    """Return rows of at most four names, in the order of their first signals, by their titles.
-
-    A row is called after its block, or after its signals where these are of one kind.
-    """
+    """Return rows of at most four names, in the order of their first signals, by their titles."""
+    # A row is called after its block, or after its signals where these are of one kind.
     kind = {name: name for name in signals}
 
     def join(names: Sequence[str]) -> None:
@@ -109,11 +99,9 @@ def groups_of(signals: Mapping[str, np.ndarray], wires: Wires) -> dict[str, list
 
 
 def _sums(signals: Mapping[str, np.ndarray], wires: Wires) -> Iterator[list[str]]:
-    """Yield names of signals that are equal but for their sign, or sum and summands.
-
-    Of what is constant only an input may be one, a reference after a step: others may be equal
-    by chance.
-    """
+    """Yield names of signals that are equal but for their sign, or sum and summands."""
+    # Of what is constant only an input may be one, a reference after a step: others may be
+    # equal by chance.
     first = next(iter(signals.values()), np.zeros(1))
     at = np.unique(np.linspace(0, first.size - 1, _SAMPLES).astype(int))
     given = {n: y[at] for n, y in signals.items() if np.all(np.isfinite(y)) and np.any(y[at])}

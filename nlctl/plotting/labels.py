@@ -11,10 +11,8 @@ _LONGEST = 30
 
 
 def plain(name: object) -> str:
-    """Return a name as text that the font can draw, cut to a length that fits a figure.
-
-    Use it with ``parse_math=False``.  Tables show names in full.
-    """
+    """Return a name as text that the font can draw, cut to a length that fits a figure."""
+    # Use it with ``parse_math=False``. Tables show names in full.
     text = "".join(_drawn(character) for character in str(name))
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 12]}…{text[-11:]}"
 

@@ -19,10 +19,8 @@ def rows_figure(
     rows: Mapping[str, Sequence[str]],
     figure: Figure | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Draw samples of shape (m,) by name in rows of names, with a title each, above each other.
-
-    A figure that is given is empty; its size is set.
-    """
+    """Draw samples of shape (m,) by name in rows of names, with a title each, above each other."""
+    # A figure that is given is empty; its size is set.
     height = 1.7 if len(rows) > 1 else 2.4
     figure, axes = stacked_axes(rows=len(rows), height=height, figure=figure)
     for ax, (title, names) in zip(axes, rows.items(), strict=True):

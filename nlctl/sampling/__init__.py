@@ -1,4 +1,4 @@
-"""Sampled data: controllers on computers, beside plants in continuous time.
+"""Sampled data: controllers on computers, next to plants in continuous time.
 
 `clock` says when a block samples, `parameters` what may be varied of that, `system` makes a sampled
 block of one in discrete time, and `discretised` one in discrete time of one in continuous time.

@@ -71,7 +71,7 @@ class Clock:
         if self.jitter and self.jitter + self.delay >= self.dt:
             raise ParameterError(
                 f"Clock needs jitter + delay < dt, got {self.jitter:g} + {self.delay:g} and "
-                f"{self.dt:g} s: how many samples are on their way would depend on chance"
+                f"{self.dt:g} s: how many samples wait would depend on chance"
             )
 
     @property
@@ -81,60 +81,39 @@ class Clock:
 
 
 class Moment(NamedTuple):
-    """Something that a clock does at certain instants.
+    """Something that a clock does at certain instants."""
 
-    Attributes
-    ----------
-    owner : hashable
-        Whose clock it is: a key of the mapping that says which clock that is.
-    samples : int
-        1 if it samples, 0 if delayed outputs follow.
-    """
-
-    owner: Hashable
-    samples: int
+    owner: Hashable  # whose clock it is: a key of the mapping that says which clock that is
+    samples: int  # 1 if it samples, 0 if delayed outputs follow
 
 
 Clocks = Mapping[Hashable, Clock]
 
 
 class Instants(NamedTuple):
-    """When something happens in a run.
+    """When something happens in a run."""
 
-    Attributes
-    ----------
-    times : ndarray of shape (m,)
-        Increasing (s).
-    which : ndarray of int, shape (m,)
-        Which of `patterns` happens.
-    patterns : tuple of frozenset of Moment
-    """
-
-    times: np.ndarray
-    which: np.ndarray
+    times: np.ndarray  # (m,): increasing (s)
+    which: np.ndarray  # (m,): which of `patterns` happens
     patterns: tuple[frozenset[Moment], ...]
 
 
 def moments(clocks: Clocks) -> list[Moment]:
     """Return all that these clocks do."""
-    found = [Moment(owner, 1) for owner in clocks]
-    return found + [Moment(owner, 0) for owner, clock in clocks.items() if clock.delay]
+    sampling = [Moment(owner, 1) for owner in clocks]
+    return sampling + [Moment(owner, 0) for owner, clock in clocks.items() if clock.delay]
 
 
 def meetings(clocks: Clocks) -> list[frozenset[Moment]]:
     """Return what may happen at one instant: sets of moments whose instants meet."""
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
-    found: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
-    for series, together in alike.items():
-        found += [
+    combined: list[tuple[frozenset[Moment], tuple[_Series, ...]]] = []
+    for series, together in _alike(clocks).items():
+        combined += [
             (what | together, (*others, series))
-            for what, others in found
+            for what, others in combined
             if all(_meet(series, other) for other in others)
         ] + [(together, (series,))]
-    return [what for what, _ in found]
+    return [what for what, _ in combined]
 
 
 def _meet(one: _Series, other: _Series) -> bool:
@@ -148,10 +127,7 @@ def instants(
 ) -> Instants:
     """Return what happens from `begin` on, and before `end`."""
     patterns = {pattern: i for i, pattern in enumerate(known)}
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
+    alike = _alike(clocks)
     if len(alike) == 1:  # nothing else can happen at these times
         ((series, together),) = alike.items()
         times = _times(series, begin, end)
@@ -167,15 +143,9 @@ def instants(
 
 
 def schedules(clocks: Clocks) -> list[tuple[tuple[int, int, int], frozenset[Moment]]]:
-    """Return begin, step and scale of each series of instants (begin + k step) / scale, and what.
-
-    Clocks with a jitter have none.
-    """
-    alike: dict[_Series, frozenset[Moment]] = {}
-    for moment in moments(clocks):
-        series = _series(moment, clocks)
-        alike[series] = alike.get(series, frozenset()) | {moment}
-    return [(_integers(series), together) for series, together in alike.items()]
+    """Return begin, step and scale of each series of instants (begin + k step) / scale."""
+    # Clocks with a jitter have none.
+    return [(_integers(series), together) for series, together in _alike(clocks).items()]
 
 
 def common_period(clocks: Sequence[Clock]) -> tuple[float, float, float]:
@@ -206,6 +176,15 @@ class _Series(NamedTuple):
     dt: Fraction
     jitter: float
     seed: int
+
+
+def _alike(clocks: Clocks) -> dict[_Series, frozenset[Moment]]:
+    """Return what happens together, by when it does."""
+    alike: dict[_Series, frozenset[Moment]] = {}
+    for moment in moments(clocks):
+        series = _series(moment, clocks)
+        alike[series] = alike.get(series, frozenset()) | {moment}
+    return alike
 
 
 def _series(moment: Moment, clocks: Clocks) -> _Series:

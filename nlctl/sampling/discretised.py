@@ -71,26 +71,26 @@ def with_equations(who: str, system: Any) -> Any:
     return system
 
 
-def _check_equations(who: str, made: Any) -> None:
+def _check_equations(who: str, block: Any) -> None:
     """Refuse a block whose equations are not those of states that it has."""
-    if sampling_of(made) is not None:
+    if sampling_of(block) is not None:
         raise ParameterError(
-            f"'{made.name}' is sampled already: give {who} the block that it samples, .inner"
+            f"'{block.name}' is sampled already: give {who} the block that it samples, .inner"
         )
-    if not isinstance(made, ct.StateSpace | ct.NonlinearIOSystem):
-        raise ParameterError(f"'{made.name}' is a {type(made).__name__}, which has no equations")
+    if not isinstance(block, ct.StateSpace | ct.NonlinearIOSystem):
+        raise ParameterError(f"'{block.name}' is a {type(block).__name__}, which has no equations")
     for kind in ("inputs", "outputs", "states"):
-        if getattr(made, f"n{kind}") is None:
+        if getattr(block, f"n{kind}") is None:
             raise ParameterError(
-                f"'{made.name}' does not say how many {kind} it has: give {kind}=... to ct.nlsys"
+                f"'{block.name}' does not say how many {kind} it has: give {kind}=... to ct.nlsys"
             )
 
 
 def _discretised(system: Any, dt: float, method: str) -> Any:
     if not (system.nstates or 0):
-        made = system.copy(name=system.name)
-        made.dt = dt
-        return made
+        copied = system.copy(name=system.name)
+        copied.dt = dt
+        return copied
     if system.dt not in (0, None):
         raise ParameterError(f"'{system.name}' is in discrete time already (dt = {system.dt})")
     if isinstance(system, ct.StateSpace):
@@ -113,9 +113,9 @@ def _discretised(system: Any, dt: float, method: str) -> Any:
             f"'{system.name}' has a memory, '{name}', that is a state in continuous time only: "
             "leave the block outside of what is sampled"
         )
-    made = system.copy(name=system.name)
-    made.dt, made.updfcn = dt, _euler(system.updfcn, float(dt))
-    return made
+    copied = system.copy(name=system.name)
+    copied.dt, copied.updfcn = dt, _euler(system.updfcn, float(dt))
+    return copied
 
 
 def _euler(f: Any, dt: float) -> Any:

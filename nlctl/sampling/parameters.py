@@ -21,7 +21,7 @@ class Sampling:
     Parameters
     ----------
     waiting : int, optional
-        How many samples may be on their way at a time; 0 without a delay.
+        How many samples may wait at a time; 0 without a delay.
     converts_inputs, converts_outputs : bool, optional
         Whether they are rounded.
     own_time : bool, optional
@@ -93,11 +93,9 @@ class Sampling:
         )
 
     def derived(self) -> dict[str, Any]:
-        """How many samples are on their way, as a number."""
+        """How many samples wait, as a number."""
         return {"pending": float(self.clock.pending)}
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """It has no signals."""
         return ()

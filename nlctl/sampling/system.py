@@ -38,13 +38,11 @@ _HAPPENING: ContextVar[Happening | None] = ContextVar("nlctl_happening", default
 
 @contextmanager
 def happening(what: Happening = frozenset()) -> Iterator[None]:
-    """Say what happens at the instant at which a diagram with sampled blocks is evaluated.
-
-    Inside, derivatives of states of sampled blocks that nothing happens to are 0: between samples
-    they stand still.  Of those that sample now they are the next states, and their outputs are
-    the new ones.  Outside python-control is refused the derivatives: it would integrate over the
-    samples without a word.
-    """
+    """Say what happens at the instant at which a diagram with sampled blocks is evaluated."""
+    # Inside, derivatives of states of sampled blocks that nothing happens to are 0: between
+    # samples they stand still. Of those that sample now they are the next states, and their
+    # outputs are the new ones. Outside python-control is refused the derivatives: it would
+    # integrate over the samples without a word.
     token = _HAPPENING.set(what)
     try:
         yield
@@ -55,7 +53,7 @@ def happening(what: Happening = frozenset()) -> Iterator[None]:
 class Sampled(Around):
     """A block in discrete time, in a diagram of continuous time; made by `sampled`.
 
-    Its states are those of the block, the outputs that are on their way, the first to come last,
+    Its states are those of the block, the outputs that wait, the first to come last,
     and the outputs that it holds.
 
     Attributes
@@ -138,11 +136,11 @@ class Sampled(Around):
 
     def default_state(self) -> np.ndarray:
         """The block's own initial state; what it holds is 0 until its first sample."""
-        own = default_state(self.inner)
-        return np.concatenate([own, np.zeros(self.nstates - own.size)])
+        start = default_state(self.inner)
+        return np.concatenate([start, np.zeros(self.nstates - start.size)])
 
     def parts(self, x: Any) -> tuple[Any, Any, Any]:
-        """Divide states into the block's own, outputs that are on their way, held outputs."""
+        """Divide states into the block's own, outputs that wait, held outputs."""
         n, m = self.inner.nstates or 0, self.noutputs or 0
         return x[:n], x[n : len(x) - m], x[len(x) - m :]
 
@@ -170,7 +168,7 @@ class Sampled(Around):
         set_parameters(self.inner, theirs)
 
     def rates(self, t: float, x: Any, u: Any) -> np.ndarray:
-        """Return what becomes of its states; see `happening`."""
+        """Return the rates of its states, or the next ones; see `happening`."""
         now = _HAPPENING.get()
         if now is None:
             raise UsageError(
@@ -181,40 +179,38 @@ class Sampled(Around):
                 "from sample to sample"
             )
         x = np.array(x, dtype=float)
-        own, _, _ = self.parts(x)
+        state, _, _ = self.parts(x)
         if not self.acts(now):
             return np.zeros(x.size)
         p = current_parameters(self.sampling)
 
         def computed() -> tuple[Any, Any]:
             given = self.converted(rounded, np.asarray(u, dtype=float), p, 0)
-            following = rates_now(self.inner, t, own, given) if own.size else own
+            following = rates_now(self.inner, t, state, given) if state.size else state
             if self.euler:
-                following = own + p.dt * following
-            return following, self._new(t, own, given, p)
+                following = state + p.dt * following
+            return following, self._new(t, state, given, p)
 
         return np.concatenate(self.after(now, x, self.oldest(oldest, x, p), computed))
 
-    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its outputs; see `happening`."""
         x = np.asarray(x, dtype=float)
-        own, _, held = self.parts(x)
+        state, _, held = self.parts(x)
         now, p = _HAPPENING.get() or frozenset(), current_parameters(self.sampling)
         if self.answers(now):
-            return self._new(t, own, self.converted(rounded, np.asarray(u, dtype=float), p, 0), p)
+            return self._new(t, state, self.converted(rounded, np.asarray(u, dtype=float), p, 0), p)
         return self.oldest(oldest, x, p) if self.releases(now) else held
 
     def after(
         self, now: Happening, x: Any, due: Any, computed: Callable[[], tuple[Any, Any]]
     ) -> list[Any]:
-        """Return the parts of the states after what happens, one behind the other.
-
-        Shapes: `x` (nstates,), `due` (noutputs,).
-        """
-        own, waiting, held = self.parts(x)
+        """Return the parts of the states after what happens, one behind the other."""
+        # Shapes: `x` (nstates,), `due` (noutputs,).
+        state, waiting, held = self.parts(x)
         held = due if self.releases(now) else held
         if not self.samples(now):
-            return [own, waiting, held]
+            return [state, waiting, held]
         following, y = computed()
         if not self.delays:
             return [following, y]
@@ -230,22 +226,22 @@ class Sampled(Around):
         name = self.converters[which]
         return function(values, getattr(p, name)) if name and len(values) else values
 
-    def _new(self, t: float, own: np.ndarray, u: np.ndarray, p: Any) -> np.ndarray:
-        y = outputs_now(self.inner, t, own, u).astype(float)
+    def _new(self, t: float, state: np.ndarray, u: np.ndarray, p: Any) -> np.ndarray:
+        y = outputs_now(self.inner, t, state, u).astype(float)
         return self.converted(rounded, y, p, 1)
 
 
 def clocks_of(blocks: Iterable[Any]) -> dict[Any, Clock]:
     """Return the clocks of blocks, among them sampled ones, with the parameters of now."""
-    samplings = [made.sampling for made in blocks if isinstance(made, Sampled)]
+    samplings = [one.sampling for one in blocks if isinstance(one, Sampled)]
     return {sampling: sampling.current_spec.clock for sampling in samplings}
 
 
 def _alone(spec: Sampling, sampled: Any) -> Any:
     """Return the sampling of a single block, whose parameters have that block's name in front."""
-    made = block(spec, "sampling")
-    made.name = _own_name(sampled.name)  # no diagram has this block, so that it may have a dot
-    return made
+    sampling = block(spec, "sampling")
+    sampling.name = _own_name(sampled.name)  # no diagram has this block, so that it may have a dot
+    return sampling
 
 
 def _own_name(block_name: str) -> str:
@@ -267,10 +263,10 @@ def rounded(values: Any, quantum: Any) -> Any:
 def oldest(waiting: Any, size: int, pending: Any) -> Any:
     """Return those of the outputs that wait that a number of samples have come after."""
     count = len(waiting) // size
-    found = waiting[len(waiting) - size :]
+    outputs = waiting[len(waiting) - size :]
     for i in range(count - 1):
-        found = np.where(pending == i + 1.0, waiting[i * size : (i + 1) * size], found)
-    return found
+        outputs = np.where(pending == i + 1.0, waiting[i * size : (i + 1) * size], outputs)
+    return outputs
 
 
 @as_annotated
@@ -287,7 +283,7 @@ def sampled(
     method: str | None = None,
     waiting: int | None = None,
 ) -> Any:
-    """Put a block or diagram in discrete time beside continuous ones: a computer's program.
+    """Put a block or diagram in discrete time next to continuous ones: a computer's program.
 
     At t = offset + k dt it samples its inputs, computes, and holds its outputs until the next
     sample (zero-order hold).  Blocks that sample at one instant see each other's new outputs,
@@ -319,7 +315,7 @@ def sampled(
         How one in continuous time becomes one in discrete time, as in `discretise`; by default it
         is refused.
     waiting : int, optional
-        How many samples may be on their way to the outputs, if the delay is to be varied; by
+        How many samples may wait for their outputs, if the delay is to be varied; by
         default as many as `delay` needs.
 
     Returns
@@ -365,15 +361,15 @@ def sampled(
     _refuse_guards(system)
     euler = method == "euler" and system.dt in (0, None)
     if method is not None and system.dt in (0, None):
-        made = discretise(system, number("sampled", "dt", dt, above=0), method)
-        system = system if euler else made
-    own = _own_time(system, dt, euler)
-    period = number("sampled", "dt", own or dt, above=0)
+        discrete = discretise(system, number("sampled", "dt", dt, above=0), method)
+        system = system if euler else discrete
+    own_time = _own_time(system, dt, euler)
+    period = number("sampled", "dt", own_time or dt, above=0)
     spec = Sampling(
         dt=period, offset=offset, delay=delay, jitter=0.0 if jitter is None else jitter, seed=seed,
         input_quantum=0.0 if input_quantum is None else input_quantum,
         output_quantum=0.0 if output_quantum is None else output_quantum,
-        waiting=_waiting(dt=period, delay=delay, waiting=waiting), own_time=own,
+        waiting=_waiting(dt=period, delay=delay, waiting=waiting), own_time=own_time,
         converts_inputs=input_quantum is not None, converts_outputs=output_quantum is not None,
     )  # fmt: skip
     return _sampled(system, spec, euler)
@@ -385,7 +381,7 @@ def _refuse_guards(system: Any) -> None:
         if isinstance(leaf.system, Block) and hasattr(leaf.system.spec, "guard"):
             raise UsageError(
                 f"block '{leaf.path or leaf.system.name}' has a guard, which falls in continuous "
-                "time, and is sampled: say in update what becomes of it at a sample"
+                "time, and is sampled: say in update how it changes at a sample"
             )
 
 
@@ -402,14 +398,14 @@ def _sampled(system: System, spec: Sampling, euler: bool) -> Any:
     def each(part: Any) -> Sampled:
         return Sampled(part, sampling, euler=euler and bool(part.nstates))
 
-    made = rebuilt(system, each, dt=0)
-    first = _through(made.input_labels, "input_stage", sampling, before)
-    last = _through(made.output_labels, "output_stage", sampling, behind, delays)
-    return staged(made, first if before else None, last if delays or behind else None)
+    whole = rebuilt(system, each, dt=0)
+    first = _through(whole.input_labels, "input_stage", sampling, before)
+    last = _through(whole.output_labels, "output_stage", sampling, behind, delays)
+    return staged(whole, first if before else None, last if delays or behind else None)
 
 
 def _waiting(dt: float, delay: float, waiting: int | None) -> int:
-    """Return how many samples may be on their way."""
+    """Return how many samples may wait."""
     least = Clock(dt=dt, delay=delay).pending
     if waiting is None:
         return least
@@ -427,9 +423,9 @@ def _through(
 
 def _own_time(system: System, dt: float | None, euler: bool) -> float:
     """Return the sampling time that a system has of its own, 0 if it has none."""
-    own = system.dt if isinstance(system.dt, int | float) and system.dt is not True else None
+    time = system.dt if isinstance(system.dt, int | float) and system.dt is not True else None
     untold = system.dt is None and not isinstance(system, Block)  # of a record nlctl knows
-    if not own and system.dt is not True and (system.nstates or 0) > 0 and not euler:
+    if not time and system.dt is not True and (system.nstates or 0) > 0 and not euler:
         why = "says nothing of its time, dt=None" if untold else "is in continuous time"
         raise ParameterError(
             f"'{system.name}' {why}, and a sampled block is in discrete time: "
@@ -437,10 +433,10 @@ def _own_time(system: System, dt: float | None, euler: bool) -> float:
             "give ct.sample_system(system, dt) of a linear one"
             + (", or its dt if it returns x[k+1]" if untold else "")
         )
-    if dt is None and not own:
+    if dt is None and not time:
         raise ParameterError(f"'{system.name}' has no sampling time of its own: give dt in s")
-    if dt is not None and own and not np.isclose(own, dt, rtol=1e-12, atol=0):
+    if dt is not None and time and not np.isclose(time, dt, rtol=1e-12, atol=0):
         raise ParameterError(
-            f"'{system.name}' has a sampling time of {own:g} s and cannot be sampled every {dt} s"
+            f"'{system.name}' has a sampling time of {time:g} s and cannot be sampled every {dt} s"
         )
-    return float(own or 0.0)
+    return float(time or 0.0)

@@ -7,8 +7,6 @@ import numpy as np
 from ..equations import equation
 from ..params import param, record
 
-__all__ = ["TriggeredHold"]
-
 
 @record
 class TriggeredHold:
@@ -50,41 +48,29 @@ class TriggeredHold:
 
     feedthrough = False
     vector = True
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """u1, ..., un and the trigger."""
-        return (*(f"u{i + 1}" for i in range(self.n)), "trigger")
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """w1, ..., wn and the interval between the last two samples."""
-        return (*(f"w{i + 1}" for i in range(self.n)), "interval")
+    inputs = property(lambda self: (*(f"u{i + 1}" for i in range(self.n)), "trigger"))
+    outputs = property(lambda self: (*(f"w{i + 1}" for i in range(self.n)), "interval"))
 
     @property
     def states(self) -> tuple[str, ...]:
         """What is held, the last interval, the time since the last sample, and the start."""
         return (*(f"held{i + 1}" for i in range(self.n)), "last", "since", "start")
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """What is held stands still; from 0 on `start` falls, until the first sample makes it 1."""
         return np.concatenate([np.zeros(x.size - 2), np.ones(1), x[-1:] - 1.0])
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """What is held, and the last interval."""
         return x[:-2]
 
-    @staticmethod
     @equation
     def guard(t, x, u, p):
         """The trigger, and the start."""
         return np.concatenate([u[-1:], x[-1:]])
 
-    @staticmethod
     @equation
     def reset(t, x, u, p):
         """Take the inputs; the time since the start is not an interval."""

@@ -11,14 +11,14 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..expressions.conditions import is_of_infinity
+from ..expressions.conditions import JUMPING, is_of_infinity
 from ..expressions.graph import Expr, Graph, needed
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
 _QUOTIENTS = {"remainder": "floor", "fmod": "trunc"}
 _FAR = 1e300
-_JUMPS = (*_ORDERS, *_WHOLE, *_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
+_JUMPS = (*_ORDERS, *JUMPING)
 
 
 @dataclass(frozen=True, kw_only=True)

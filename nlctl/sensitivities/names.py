@@ -110,9 +110,8 @@ def declared_bounds(owner: Any, name: str) -> tuple[float, float]:
     declared = declared_params(owner.system.spec).get(field)
     if declared is None:
         return -np.inf, np.inf
-    low = [v for v in (declared.above, declared.at_least) if v is not None]
-    high = [v for v in (declared.below, declared.at_most) if v is not None]
-    return max(low, default=-np.inf), min(high, default=np.inf)
+    (low, _), (high, _) = declared.ends
+    return low, high
 
 
 def _checked(what: str, names: Any) -> list[str]:
@@ -139,37 +138,16 @@ class StatePlaces:
         """Return where the derivatives by quantity `j` begin."""
         return self.states * (1 + j)
 
-    @property
-    def kept(self) -> int:
-        """Where the sides begin that are kept."""
-        return self.states * (1 + self.by)
-
-    @property
-    def together(self) -> int:
-        """When two conditions were first met at one instant, by different derivatives."""
-        return self.kept + self.branches
-
-    @property
-    def grazing(self) -> int:
-        """When a condition was first met at a rate of 0."""
-        return self.together + 1
-
-    @property
-    def jumped(self) -> int:
-        """When something first jumped at a time that moves."""
-        return self.together + 2
-
-    @property
-    def last(self) -> int:
-        """When a block last jumped, at a guard or a clock."""
-        return self.together + 3
-
-    @property
-    def at_reset(self) -> int:
-        """When a guard and a condition were first met at one instant."""
-        return self.together + 4
-
-    @property
-    def size(self) -> int:
-        """Number of all states."""
-        return self.together + 5
+    # where the sides begin that are kept
+    kept = property(lambda self: self.states * (1 + self.by))
+    # when two conditions were first met at one instant, by different derivatives
+    together = property(lambda self: self.kept + self.branches)
+    # when a condition was first met at a rate of 0
+    grazing = property(lambda self: self.together + 1)
+    # when something first jumped at a time that moves
+    jumped = property(lambda self: self.together + 2)
+    # when a block last jumped, at a guard or a clock
+    last = property(lambda self: self.together + 3)
+    # when a guard and a condition were first met at one instant
+    at_reset = property(lambda self: self.together + 4)
+    size = property(lambda self: self.together + 5)  # number of all states

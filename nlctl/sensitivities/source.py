@@ -21,7 +21,7 @@ from ..expressions.arrays import Tracer
 from ..expressions.conditions import conditions, switching_function
 from ..expressions.continuity import may_jump
 from ..expressions.evaluate import evaluate_expressions
-from ..expressions.graph import COMPARISONS, Expr, Graph, Untraceable, needed
+from ..expressions.graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled
 from ..native.diagram.nodes import Node
@@ -219,7 +219,6 @@ def _behind(graph: Graph, pieces: Sequence[SomeRows], first: int) -> list[SomeRo
     return rest_of_pieces
 
 
-_ORDERS = ("lt", "le", "gt", "ge")
 _POINTS = 256
 _TRUTHS = "truths"  # the array of values that say whether other conditions hold
 _NEAR = 0.1  # of a parameter
@@ -228,7 +227,7 @@ _SAME = 1e-12
 
 def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
     """Return whether nothing that expressions are made of jumps at a condition."""
-    if condition.op not in _ORDERS or condition.size is not None:
+    if condition.op not in ORDERS or condition.size is not None:
         return False
     one, other = map(graph.number, condition.args)
     on_it = {one: other} if one.varies else {other: one}

@@ -311,7 +311,7 @@ class Runs:
         """Return what gains are worth, with differences of runs towards the middle of the box."""
         problem, count = self.problem, len(self.problem.margins)
         every = (part for parts in problem.parts for part in parts)
-        parts = tuple(_Part(metric=part, key=f"part {i}") for i, part in enumerate(every))
+        parts = tuple(_Part.of(part, f"part {i}") for i, part in enumerate(every))
         steps = np.where(cube < 0.5, _STEP, -_STEP)
         points = np.vstack([cube, cube + np.diag(steps)])
         here, *moved = self._tables(points, (*problem.metrics, *parts))
@@ -330,24 +330,18 @@ class Runs:
 class _Part:
     """A metric under another name."""
 
-    metric: MetricLike
     key: str
+    start: float
+    end: float
+    signals: Sequence[str]
+    function: Any
 
-    @property
-    def start(self) -> float:
-        return self.metric.start
-
-    @property
-    def end(self) -> float:
-        return self.metric.end
-
-    @property
-    def signals(self) -> Sequence[str]:
-        return self.metric.signals
-
-    @property
-    def function(self) -> Any:
-        return self.metric.function
+    @classmethod
+    def of(cls, metric: MetricLike, key: str) -> _Part:
+        return cls(
+            key=key, start=metric.start, end=metric.end, signals=metric.signals,
+            function=metric.function,
+        )  # fmt: skip
 
 
 def _graded(margins: np.ndarray) -> np.ndarray:

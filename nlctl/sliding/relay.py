@@ -40,7 +40,7 @@ def relay_mode(u, mode, p):
     """1 or -1 on a side; 0 while it slides, that is where u' leads back from both sides."""
     above, below = rates_beside(u, p)
     kept = kept_mode(mode)
-    here = np.where(u[0] == 0, kept, np.sign(u[0]))  # both lead away from u = 0: it goes on
+    here = np.where(u[0] == 0, kept, np.sign(u[0]))  # both lead away from u = 0: it continues
     down = np.where((above <= 0) & (below < 0), -1.0, here)
     through = np.where((above > 0) & (below >= 0), 1.0, down)
     crossing = np.where((above < 0) & (below > 0), 0.0, through) + 0.0 * (above + below)
@@ -56,7 +56,7 @@ class IdealRelay:
             -(a + rate u) / b              it slides: u' = a + b v leads to u = 0 from both sides
 
     a and b are those of the whole diagram, by exact derivatives of its equations.  Where
-    a + b height < 0 < a - b height at u = 0, no solution in the usual sense goes on; Filippov's
+    a + b height < 0 < a - b height at u = 0, no solution in the usual sense continues; Filippov's
     goes along u = 0, with the one v of [-height, height] that keeps u' = 0: what Utkin calls the
     equivalent control (the books of both were not read; of a hysteresis whose width tends to 0 it
     is the mean output).  It ends where |v| reaches the height.  Entry and end are events.
@@ -99,7 +99,7 @@ class IdealRelay:
      [1.  1.  0.5 0.5]]
     """
 
-    height: float = param(1.0, unit="1", meaning="output |v| beside u = 0", above=0)
+    height: float = param(1.0, unit="1", meaning="output |v| next to u = 0", above=0)
     rest: float = param(1e-6, unit="1", meaning="input up to which it may slide", above=0)
     rate: float = param(1.0, unit="1/s", meaning="rate at which u decays in sliding", at_least=0)
     rest_rate: float = param(
@@ -114,33 +114,27 @@ class IdealRelay:
     supplied = SLIDING
     no_split = "its output jumps at u = 0: |v| = height for all u, so |v| <= k u + eps has no k"
 
-    @staticmethod
     @equation
     def update(t: float, x: Any, u: Any, p: Any) -> Any:
         """The mode changes at events only."""
         return (0.0,)
 
-    @staticmethod
     @equation
     def output(t: float, x: Any, u: Any, p: Any) -> Any:
-        """Beside u = 0 the side, with its height; on it what keeps u' = 0.
-
-        A mode beyond 1 counts as it stands: it jumps, and nothing carries it along.
-        """
+        """Next to u = 0 the side, with its height; on it what keeps u' = 0."""
+        # A mode beyond 1 counts unchanged: it jumps, and nothing pushes it.
         (mode,) = x
         _, drift, gain = u
         keeping = np.where(gain == 0, 0.0, -(drift + p.rate * u[0]) / gain)
         beside = p.height * kept_mode(mode) * np.maximum(1.0, np.abs(mode))
         return (np.where(kept_mode(mode) == 0, keeping, beside),)
 
-    @staticmethod
     @equation
     def commit(t: float, x: Any, u: Any, p: Any) -> Any:
         """The mode."""
         (mode,) = x
         return (relay_mode(u, mode, p),)
 
-    @staticmethod
     @equation
     def switching(t: float, x: Any, u: Any, p: Any) -> Any:
         """Where u is 0; while it slides, where it jumps away and where one rate leads away."""

@@ -81,11 +81,10 @@ def _rates_of_parts(system: Any, t: float, x: np.ndarray, inputs: np.ndarray) ->
 def _signals_now(
     system: Any, t: float, x: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs and outputs of all parts: python-control's, or ours where it finds none.
-
-    python-control's first pass has inputs of 0, and it multiplies every output by every element of
-    its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls a loop.
-    """
+    """Return inputs and outputs of all parts: python-control's, or ours where it finds none."""
+    # python-control's first pass has inputs of 0, and it multiplies every output by every
+    # element of its maps: 0/0 in one part makes every signal 0 * NaN for good, which it calls
+    # a loop.
     signals = _settled_signals(system, t, x, u)
     if signals is not None:
         return signals
@@ -110,10 +109,8 @@ def _settled_signals(
     answer: Callable[[Any, float, np.ndarray, np.ndarray], np.ndarray | None] = _outputs_if_settled,
     product: Callable[[Any, Any], np.ndarray] = np.matmul, equal_nan: bool = False,
 ) -> tuple[np.ndarray, np.ndarray] | None:  # fmt: skip
-    """Return what the passes of ``_compute_static_io`` come to, None where they come to no end.
-
-    Parts whose inputs are as they were a pass before are not asked again.
-    """
+    """Return what the passes of ``_compute_static_io`` come to, None where they come to no end."""
+    # Parts whose inputs are as they were a pass before are not asked again.
     outside = product(system.input_map, u)
     inputs, places = outside, [*_places_of_parts(system)]
     count, outputs = system.connect_map.shape[1], np.zeros(sum(system.connect_map.shape))
@@ -162,29 +159,23 @@ def parts_now(
 
 
 class OwnParameters(ct.NonlinearIOSystem):
-    """A system that makes what its equations get of the overrides that python-control has.
-
-    Attributes
-    ----------
-    reads_a_dict : bool
-        Whether that is a dict: of a third-party system.
-    """
+    """A system that makes what its equations get of the overrides that python-control has."""
 
     reads_a_dict = False
 
-    def taken(self, params: Mapping[str, Any]) -> Any:
+    def _taken(self, params: Mapping[str, Any]) -> Any:
         """Return what the equations get, of the overrides of a run."""
         raise NotImplementedError
 
-    def answer(self, t: float, x: Any, u: Any) -> Any:
+    def _answer(self, t: float, x: Any, u: Any) -> Any:
         """Return its outputs, with the parameters that it has now."""
         return super()._out(t, x, u)
 
     def _update_params(self, params: Mapping[str, Any] | None) -> None:
-        self._current_params = type(self).taken(self, params or {})
+        self._current_params = type(self)._taken(self, params or {})
 
     def _out(self, t: float, x: Any, u: Any) -> Any:
-        return type(self).answer(self, t, x, u)  # an object of others may have one of its own
+        return type(self)._answer(self, t, x, u)  # an object of others may have one of its own
 
 
 class Around(ct.NonlinearIOSystem):
@@ -200,7 +191,7 @@ class Around(ct.NonlinearIOSystem):
         """Return its derivatives."""
         raise NotImplementedError
 
-    def answer(self, t: float, x: Any, u: Any) -> np.ndarray:
+    def _answer(self, t: float, x: Any, u: Any) -> np.ndarray:
         """Return its outputs."""
         raise NotImplementedError
 
@@ -223,7 +214,7 @@ class Around(ct.NonlinearIOSystem):
         return self.rates(t, x, u)
 
     def _out(self, t: float, x: Any, u: Any) -> np.ndarray:
-        return self.answer(t, x, u)
+        return self._answer(t, x, u)
 
 
 class StandIn(ct.InputOutputSystem):

@@ -9,18 +9,7 @@ import numpy as np
 
 
 class System(Protocol):
-    """A block or a diagram: a `control.NonlinearIOSystem`, and whatever answers as it does.
-
-    Attributes
-    ----------
-    name : str
-    dt : float, bool or None
-        Timebase.
-    ninputs, noutputs, nstates : int
-    input_labels, output_labels, state_labels : list of str
-    input_index, output_index, state_index : dict
-        Number of each signal by its label.
-    """
+    """A block or a diagram: a `control.NonlinearIOSystem`, and whatever answers as it does."""
 
     input_labels: Any  # properties that are made by a call, of which type checkers know nothing
     output_labels: Any
@@ -45,17 +34,7 @@ class System(Protocol):
 
 
 class SystemResponse(Protocol):
-    """A response of one: `control.TimeResponseData`, and what nlctl makes of it.
-
-    Attributes
-    ----------
-    time : ndarray of shape (m,)
-        In s.
-    outputs, states, inputs : ndarray
-    output_labels, state_labels, input_labels : list of str
-    sysname : str
-        Name of the system.
-    """
+    """A response of one: `control.TimeResponseData`, and what nlctl makes of it."""
 
     @property
     def time(self) -> np.ndarray: ...

@@ -280,6 +280,19 @@ def liar(**changes):
     return nlctl.record(type("Liar", (), {k: v for k, v in body.items() if v is not None}))()
 
 
+def test_what_goes_without_saying():
+    """Equations of a record are static; without an update there are no states."""
+    record = liar(feedthrough=None, states=None, update=None, output=squared)
+    assert (record.feedthrough, record.states) == (True, ())
+    assert nlctl.block(record, "b").output(0, [], [3.0]) == 9.0
+
+
+@nlctl.equation
+def squared(t, x, u, p):
+    """The square of the input."""
+    return (u[0] ** 2,)
+
+
 @each_row(
     ("changes", "told"),
     [
@@ -289,7 +302,7 @@ def liar(**changes):
         ({"states": ("x", "w")}, "returns 1 value from update, needs 2: x, w"),
         ({"update": staticmethod(lambda t, x, u, p: (u[0], 0.0))}, "returns 2 values from update"),
         ({"outputs": None}, "is not a block: it lacks outputs"),
-        ({"inputs": None, "feedthrough": None}, "is not a block: it lacks inputs, feedthrough"),
+        ({"inputs": None, "output": None}, "is not a block: it lacks inputs, output"),
         ({"update": None}, "is not a block: it lacks update"),
         ({"output": None}, "is not a block: it lacks output"),
     ],

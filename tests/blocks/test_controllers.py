@@ -255,12 +255,12 @@ class TestJoined:
     def test_the_number_of_nodes_must_fit(self):
         """Weights for other nodes than the basis has: the missing signal is named."""
         weights = nlctl.controllers.AdaptiveWeights(nodes=28)
-        with pytest.raises(nlctl.errors.ParameterError, match="nodes=28 for 27 centres"):
+        with pytest.raises(nlctl.errors.ParameterError, match="nodes=28 for 27"):
             nlctl.adaptive_neural(2, weights=weights)
         basis = nlctl.block(
             nlctl.controllers.GaussianBasis(), "basis"
         )  # a system's centres are not looked at
         with pytest.raises(nlctl.errors.DiagramError, match=r"'weights' takes .* 'psi\[27\]'"):
             nlctl.adaptive_neural(2, basis=basis, weights=nlctl.block(weights, "weights"))
-        with pytest.raises(nlctl.errors.ParameterError, match="nodes=26 for 27 centres"):
+        with pytest.raises(nlctl.errors.ParameterError, match="nodes=26 for 27"):
             nlctl.adaptive_neural(2, weights=nlctl.controllers.AdaptiveWeights(nodes=26))

@@ -48,7 +48,7 @@ ROOMS = (  # where these hold; and in what no room has, such as nlctl/blocks.py 
     *(f"nlctl/native/{name}" for name in ("codegen", "diagram", "enclosures", "equations")),
     *(f"nlctl/native/{name}" for name in ("machine", "opaque", "purity", "rounding", "stepping")),
     *("campaign", "docs", "nlctl/native/tubes", "nlctl/plotting", "nlctl/sensitivities"),
-    "nlctl/upstream",
+    *(f"nlctl/{name}" for name in ("delays", "sampling", "sliding", "native/taylor", "upstream")),
 )
 VAGUE = {"each", "found", "made", "own", "told", "wanted"}  # a variable names the thing
 OFFERED = {  # keywords of functions that users call

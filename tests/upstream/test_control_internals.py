@@ -82,7 +82,7 @@ def test_a_system_that_stands_for_another_one_is_taken_for_it():
 class Doubled(internals.OwnParameters):
     """Its equations get twice what python-control has."""
 
-    def taken(self, params):
+    def _taken(self, params):
         return {"k": 2.0 * params.get("k", 1.0)}
 
 
@@ -96,7 +96,7 @@ class Opposite(internals.Around):
     def rates(self, t, x, u):
         return -internals.rates_now(self.inner, t, x, u)
 
-    def answer(self, t, x, u):
+    def _answer(self, t, x, u):
         return -internals.outputs_now(self.inner, t, x, u)
 
 

@@ -23,22 +23,18 @@ class HeldRelay:
     inputs, outputs, states, feedthrough = ("u",), ("v",), ("side",), False
     memory, initial = ("side",), {"side": -1.0}
 
-    @staticmethod
     @nlctl.equation
     def commit(t, x, u, p):
         return (np.where(u[0] >= 0.5, 1.0, np.where(u[0] <= -0.5, -1.0, x[0])),)
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         return (1e3 * (np.where(u[0] >= 0.5, 1.0, np.where(u[0] <= -0.5, -1.0, x[0])) - x[0]),)
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return (1.0 * x[0],)
 
-    @staticmethod
     @nlctl.equation
     def switching(t, x, u, p):
         return u[0] - 0.5, u[0] + 0.5

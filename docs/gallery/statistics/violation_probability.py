@@ -20,12 +20,10 @@ class Decay:
     inputs, outputs, states, feedthrough = (), ("y",), ("x",), False
     initial = {"x": 1.0}
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         return (-p.a * x[0],)
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return (x[0],)

@@ -21,12 +21,10 @@ class Oscillator:
     D: float = nlctl.param(0.5, unit="1", meaning="damping", above=0)
     inputs, outputs, states, feedthrough = (), ("y",), ("x1", "x2"), False
 
-    @staticmethod
     @nlctl.equation
     def update(t, x, u, p):
         return x[1], 1 - x[0] - 2 * p.D * x[1]
 
-    @staticmethod
     @nlctl.equation
     def output(t, x, u, p):
         return (x[0],)

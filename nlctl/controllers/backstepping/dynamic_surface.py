@@ -8,12 +8,12 @@ import control as ct
 import numpy as np
 
 from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
+from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
-from ..mrac import ModelReferenceLaw
+from ..mrac.laws import ModelReferenceLaw
 from ..rbf import AdaptiveWeights, GaussianBasis, diagonal_centres, fitting_network
 
 
@@ -55,15 +55,14 @@ class DynamicSurface:
     -0.4
     """
 
-    c: tuple[float, ...] = param(
+    c: Floats = param(
         (2.0, 4.0), unit="1/s", meaning="gains c_1, ..., c_n; their number is the order n", above=0
     )
-    tau: tuple[float, ...] = param(
+    tau: Floats = param(
         (0.02,), unit="s", meaning="time constants tau_2, ..., tau_n of the filters", above=0
     )
 
     outputs = ("e", "r", "nu", "nu_e")
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -74,28 +73,14 @@ class DynamicSurface:
                 f"tau and {len(self.c)} of c"
             )
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.c)
+    plant_order = property(lambda self: len(self.c))
+    inputs = property(lambda self: (*coordinate_names(len(self.c)), "yd", "yd1"))
+    states = property(lambda self: tuple(f"a{i}" for i in range(2, len(self.c) + 1)))
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd, yd1."""
-        return (*coordinate_names(len(self.c)), "yd", "yd1")
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names a2, ..., an."""
-        return tuple(f"a{i}" for i in range(2, len(self.c) + 1))
-
-    @staticmethod
     @equation
     def update(t, x, u, p):
-        """The filters."""
         return surfaces(x, u, p)[1]
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The tracking error, the last surface, and the wanted x_n' in its two parts."""
@@ -156,9 +141,8 @@ def dynamic_surface_control(
     regressor, weights = fitting_network("dynamic_surface_control", basis, weights, AdaptiveWeights)
     pieces = {"surface": surface, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
-    systems = [as_system(piece, key) for key, piece in pieces.items()]
     return interconnect(
-        systems,
+        pieces,
         inputs=[*coordinate_names(order), "yd", "yd1"],
         outputs=["e", "r", "u", "W_norm"],
         name=name,

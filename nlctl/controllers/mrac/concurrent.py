@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import param, record
+from ...params import param, record, set_integer
 from ..rbf import NetworkWeights, network_output, regressor_names, weight_inputs
 
 
@@ -71,29 +70,16 @@ class HistoryStack:
     def check(self) -> None:
         """A network has nodes, and a record room."""
         for name in ("nodes", "points"):
-            value = integer("HistoryStack", name, getattr(self, name), at_least=1)
-            object.__setattr__(self, name, value)
+            set_integer(self, name, at_least=1)
 
     def derived(self) -> dict[str, int]:
         """The number of points, for the equation."""
         return {"points": self.points}
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[l-1], x_n', u."""
-        return (*regressor_names(self.nodes), self.derivative, "u")
+    inputs = property(lambda self: (*regressor_names(self.nodes), self.derivative, "u"))
+    outputs = property(lambda self: ("count", *sum_names(self.nodes)))
+    states = property(lambda self: (*self.outputs, *(f"last[{i}]" for i in range(self.nodes))))
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names count, z[0], ..., Omega[0,0], ..."""
-        return ("count", *sum_names(self.nodes))
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """The outputs, and the point that was recorded last."""
-        return (*self.outputs, *(f"last[{i}]" for i in range(self.nodes)))
-
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Record the point, or leave all as it is."""
@@ -104,7 +90,6 @@ class HistoryStack:
         change = np.append(np.append(np.ones(1), sums_of_point(psi, Delta)), psi - last)
         return x + ((1.0 if taken else 0.0) + 0.0 * (distance + size + count)) * change  # NaN stays
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """How many points, and the sums over them."""
@@ -135,12 +120,8 @@ class ConcurrentWeights(NetworkWeights):
     nodes: int = 6
     Gamma: float = param(5.0, unit="1", meaning="adaptation gain, Gamma I", above=0)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names r, psi[0], ..., psi[l-1], z[0], ..., Omega[0,0], ..."""
-        return (*weight_inputs(self.nodes), *sum_names(self.nodes))
+    inputs = property(lambda self: (*weight_inputs(self.nodes), *sum_names(self.nodes)))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law, row by row of Omega."""
@@ -150,7 +131,6 @@ class ConcurrentWeights(NetworkWeights):
             learned = learned - u[(2 + j) * n + 1 : (3 + j) * n + 1] * W_hat[j]
         return p.Gamma * learned
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """As `AdaptiveWeights`."""

@@ -8,7 +8,7 @@ from typing import Any
 import control as ct
 
 from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
+from ...diagrams import interconnect
 from ...errors import ParameterError
 from ...plants import coordinate_names
 from ..rbf import AdaptiveWeights, fitting_network
@@ -83,9 +83,8 @@ def mrac(
     )
     pieces = {"model": model, "error": error, "basis": regressor, "weights": weights}
     pieces["law"] = ModelReferenceLaw() if law is None else law
-    systems = [as_system(piece, key) for key, piece in pieces.items()]
     return interconnect(
-        systems,
+        pieces,
         inputs=[*coordinate_names(order), "yd"],
         outputs=["e", "r", "u", "W_norm", *model_state_names(order)],
         name=name,

@@ -32,10 +32,7 @@ class ConstrainedLaw:
 
     inputs = ("W_psi",)
     outputs = ("u", "du")
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The law, and its deficit."""
@@ -43,10 +40,8 @@ class ConstrainedLaw:
         allowed = clip(desired, -p.u_max, p.u_max)
         return allowed, allowed - desired
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The limits."""
         return u[0] - p.u_max, u[0] + p.u_max
 
 
@@ -83,12 +78,8 @@ class ConstrainedError(WeightedError):
         order = len(self.K)
         return (*coordinate_names(order), *model_state_names(order), "du")
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names E_d1, ..., E_dn, beta_hat."""
-        return (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat")
+    states = property(lambda self: (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat"))
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The error that is due to the deficit, and the estimate of the input gain."""
@@ -98,7 +89,6 @@ class ConstrainedError(WeightedError):
         driven = beta_hat * du - np.sum(p.K * E_d)
         return np.append(np.append(E_d[1:], driven), p.gamma_d * r * du)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """E_1, and what a law sees of E - E_d."""

@@ -9,10 +9,10 @@ import control as ct
 import numpy as np
 
 from ...annotations import as_annotated
-from ...diagrams import as_system, interconnect
+from ...diagrams import interconnect
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from ..rbf import fitting_network
@@ -39,7 +39,7 @@ class StatePredictor:
     [2.25]
     """
 
-    a: tuple[float, ...] = param(
+    a: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
     )
     gain: float = param(1.0, unit="1", meaning="input gain of the plant")
@@ -53,23 +53,16 @@ class StatePredictor:
         check_hurwitz("StatePredictor", "a", self.a)
         check_input_gain("StatePredictor", self.gain)
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn."""
-        return model_state_names(len(self.a))
-
+    states = property(lambda self: model_state_names(len(self.a)))
     outputs = states
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The plant with the estimates."""
         return np.append(x[1:], p.gain * u[0] + u[1] - np.sum(p.a * x))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """Its state."""
         return x.copy()
 
 
@@ -101,17 +94,13 @@ class FilteredLaw:
         """An input that has an effect."""
         check_input_gain("FilteredLaw", self.gain)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
-        """The filter."""
         yd, W_psi = u
         return (-p.omega * (x[0] - (p.b * yd - W_psi) / p.gain),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """Its state."""
         return (x[0],)
 
 
@@ -178,9 +167,8 @@ def l1_adaptive(
     )
     error = ModelError(K=predictor.a, Q=(1.0,) * order) if error is None else error
     pieces = {"predictor": predictor, "error": error, "basis": regressor, "weights": weights}
-    systems = [as_system(piece, key) for key, piece in {**pieces, "law": law}.items()]
     return interconnect(
-        systems,
+        {**pieces, "law": law},
         inputs=[*coordinate_names(order), "yd"],
         outputs=["e", "r", "u", "W_norm", *model_state_names(order)],
         name=name,

@@ -34,17 +34,13 @@ class ModelReferenceLaw:
 
     inputs = ("nu", "nu_e", "W_psi")
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
     def check(self) -> None:
         """An input that has an effect."""
         check_input_gain("ModelReferenceLaw", self.gain)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The law."""
         nu, nu_e, W_psi = u
         return ((nu + nu_e - W_psi) / p.gain,)
 
@@ -67,11 +63,7 @@ class DirectLaw:
 
     inputs = ("W_psi",)
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The law."""
         return (-u[0],)

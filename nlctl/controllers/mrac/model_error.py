@@ -9,7 +9,7 @@ import numpy as np
 
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 from ..filtered_error import check_hurwitz
 from .reference_model import model_state_names
@@ -32,12 +32,11 @@ def seen_error(E, p):
 class WeightedError:
     """What errors of adaptive loops share: their gains, and the matrix P that weights them."""
 
-    K: tuple[float, ...] = param(
+    K: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="gains of the error; their number is the order n"
     )
-    Q: tuple[float, ...] = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
+    Q: Floats = param((1.0, 1.0), unit="1", meaning="diagonal of Q", above=0)
 
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -47,10 +46,7 @@ class WeightedError:
             raise ParameterError(f"{who} needs as many Q as K, got {len(Q)} of Q and {len(K)} of K")
         check_hurwitz(who, "K", K)
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.K)
+    plant_order = property(lambda self: len(self.K))
 
     @property
     def lyapunov_matrix(self) -> np.ndarray:
@@ -81,7 +77,6 @@ class ModelError(WeightedError):
     [ 2.   0.5 -4.   2. ]
     """
 
-    states = ()
     outputs = ("e", "r", "nu_e", "E_norm")
 
     @property
@@ -89,7 +84,6 @@ class ModelError(WeightedError):
         """Names x1, ..., xn, xm1, ..., xmn."""
         return (*coordinate_names(len(self.K)), *model_state_names(len(self.K)))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, b^T P E, the feedback of the error, and its norm."""

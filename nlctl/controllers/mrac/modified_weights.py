@@ -37,14 +37,11 @@ class EModifiedWeights(NetworkWeights):
 
     sigma: float = param(0.5, unit="1", meaning="e-modification of W_hat", at_least=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
-        """Adaptation law."""
         r, psi, W_hat = u[0], u[1:], x
         return p.Gamma * (r * psi - p.sigma * np.absolute(r) * W_hat)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break point of |r|."""
@@ -86,7 +83,6 @@ class ProjectedWeights(NetworkWeights):
     W_max: float = param(4.0, unit="1", meaning="radius of the ball", above=0)
     width: float = param(0.1, unit="1", meaning="width of the layer, of W_max^2", above=0)
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """Adaptation law; where f > 0, |W|^2 is at least W_max^2 / (1 + width)."""
@@ -97,7 +93,6 @@ class ProjectedWeights(NetworkWeights):
         f = np.maximum(boundary_function(W_hat, p), 0.0)
         return p.Gamma * (y - f * outwards / size * W_hat)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The inner boundary of the layer, and where y = r psi turns outwards in it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations import equation
-from ...params import param, record
+from ...params import Floats, param, record
 from ..filtered_error import check_hurwitz
 
 
@@ -38,36 +38,26 @@ class ReferenceModel:
     [0.5 0.  0. ]
     """
 
-    a: tuple[float, ...] = param(
+    a: Floats = param(
         (4.0, 2.0), unit="s^-(n+1-i)", meaning="coefficients a_1, ..., a_n; their number is n"
     )
     b: float = param(4.0, unit="s^-n", meaning="gain of the command")
 
     inputs = ("yd",)
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
         """The roots must lie in the open left half plane."""
         check_hurwitz("ReferenceModel", "a", self.a)
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn."""
-        return model_state_names(len(self.a))
+    states = property(lambda self: model_state_names(len(self.a)))
+    outputs = property(lambda self: (*self.states, "nu"))
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names xm1, ..., xmn, nu."""
-        return (*self.states, "nu")
-
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The model in controller form."""
         return np.append(x[1:], model_rate(x, u[0], p))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """Its state, and the derivative of the last one."""

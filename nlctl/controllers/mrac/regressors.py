@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import record
+from ...params import record, set_integer
 from ...plants import coordinate_names, wing_rock_regressor
 from ..rbf import regressor_names
 
@@ -23,24 +22,14 @@ class _StateRegressor:
 
     order: int = 1
 
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
         """An order."""
-        order = integer(type(self).__name__, "an order", self.order, at_least=1)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn."""
-        return coordinate_names(self.order)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names psi[0], ..., psi[n]."""
-        return regressor_names(self.order + 1)
+    inputs = property(lambda self: coordinate_names(self.order))
+    outputs = property(lambda self: regressor_names(self.order + 1))
 
 
 @record
@@ -49,11 +38,6 @@ class AffineRegressor(_StateRegressor):
 
         psi = (x_1, ..., x_n, 1)
 
-    Parameters
-    ----------
-    order : int, optional
-        Order n >= 1 of the plant.
-
     Examples
     --------
     >>> regressor = nlctl.block(nlctl.controllers.AffineRegressor(order=2), "basis")
@@ -61,10 +45,8 @@ class AffineRegressor(_StateRegressor):
     [0.1 0.2 1. ]
     """
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The states, and 1."""
         return np.append(u, 1.0)
 
 
@@ -74,11 +56,6 @@ class LinearRegressor(_StateRegressor):
 
         psi = (x_1, ..., x_n, yd)
 
-    Parameters
-    ----------
-    order : int, optional
-        Order n >= 1 of the plant.
-
     Examples
     --------
     >>> regressor = nlctl.block(nlctl.controllers.LinearRegressor(order=2), "basis")
@@ -86,15 +63,10 @@ class LinearRegressor(_StateRegressor):
     [0.1 0.2 5. ]
     """
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd."""
-        return (*coordinate_names(self.order), "yd")
+    inputs = property(lambda self: (*coordinate_names(self.order), "yd"))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The signals themselves."""
         return np.copy(u)
 
 
@@ -113,16 +85,12 @@ class WingRockRegressor:
 
     inputs = ("x1", "x2")
     outputs = regressor_names(6)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The functions of `WingRock`."""
         return wing_rock_regressor(u)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
         """The break points of |x1| and |x2|."""

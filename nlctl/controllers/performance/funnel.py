@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arguments import integer
 from ...equations import equation
-from ...params import param, record
+from ...params import param, record, set_integer
 from ...plants import coordinate_names
 from ...references import derivative_names
 from .prescribed import performance_bound
@@ -55,26 +54,19 @@ class FunnelControl:
     decay: float = param(2.0, unit="1/s", meaning="rate of decay of the funnel", at_least=0)
 
     outputs = ("e", "u", "rho")
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
         """A relative degree."""
-        order = integer("FunnelControl", "an order", self.order, at_least=1)
-        object.__setattr__(self, "order", order)
+        set_integer(self, "order", at_least=1)
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants of class (1) that it is made for."""
-        return self.order
+    plant_order = property(lambda self: self.order)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names x1, ..., xn, yd, ..., yd^(n-1)."""
         return (*coordinate_names(self.order), *derivative_names(self.order - 1))
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, the control input, and the half width of the funnel."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...equations import equation
 from ...errors import ParameterError
-from ...params import param, record
+from ...params import Floats, param, record
 from ...plants import coordinate_names
 
 
@@ -56,16 +56,14 @@ class PrescribedPerformance:
     nan
     """
 
-    k: tuple[float, ...] = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
-    rho_0: tuple[float, ...] = param((3.0, 6.0), unit="1", meaning="bounds at t = 0", above=0)
-    rho_inf: tuple[float, ...] = param((0.1, 1.0), unit="1", meaning="bounds at last", above=0)
-    decay: tuple[float, ...] = param(
+    k: Floats = param((1.0, 8.0), unit="1", meaning="gains k_i", above=0)
+    rho_0: Floats = param((3.0, 6.0), unit="1", meaning="bounds at t = 0", above=0)
+    rho_inf: Floats = param((0.1, 1.0), unit="1", meaning="bounds at last", above=0)
+    decay: Floats = param(
         (1.0, 1.0), unit="1/s", meaning="rates of decay of the bounds", at_least=0, symbol="l"
     )
 
     outputs = ("e", "u", "rho")
-    states = ()
-    feedthrough = True
     vector = True
 
     def check(self) -> None:
@@ -78,17 +76,9 @@ class PrescribedPerformance:
                 f"value for each state of the plant, got {counted}"
             )
 
-    @property
-    def plant_order(self) -> int:
-        """Order n of the plants that it is made for."""
-        return len(self.k)
+    plant_order = property(lambda self: len(self.k))
+    inputs = property(lambda self: (*coordinate_names(len(self.k)), "yd"))
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd."""
-        return (*coordinate_names(len(self.k)), "yd")
-
-    @staticmethod
     @equation
     def output(t, x, u, p):
         """The error, the control input, and the bound of the error."""

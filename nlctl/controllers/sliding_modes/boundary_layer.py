@@ -38,20 +38,14 @@ class SlidingModeLaw:
 
     inputs = ("r",)
     outputs = ("u",)
-    states = ()
-    feedthrough = True
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The law."""
         (r,) = u
         return (-p.K * clip(r / p.phi, -1.0, 1.0),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The edges of the layer."""
         (r,) = u
         return r + p.phi, r - p.phi
 
@@ -89,13 +83,11 @@ def sliding_mode(
     >>> sliding_mode().output_labels
     ['e', 'r', 'u']
     """
-    blocks = {
-        "filtered_error": FilteredError() if filtered_error is None else filtered_error,
-        "law": SlidingModeLaw() if law is None else law,
-    }
-    systems = [as_system(piece, key) for key, piece in blocks.items()]
-    signals = systems[0].input_labels
-    return interconnect(systems, inputs=signals, outputs=["e", "r", "u"], name=name)
+    first = as_system(
+        FilteredError() if filtered_error is None else filtered_error, "filtered_error"
+    )
+    blocks = {"filtered_error": first, "law": SlidingModeLaw() if law is None else law}
+    return interconnect(blocks, inputs=first.input_labels, outputs=["e", "r", "u"], name=name)
 
 
 @record
@@ -126,26 +118,20 @@ class SuperTwistingLaw:
     inputs = ("r",)
     outputs = ("u",)
     states = ("w",)
-    feedthrough = True
 
-    @staticmethod
     @equation
     def update(t, x, u, p):
         """The integral of the sign."""
         (r,) = u
         return (-p.k_2 * r / np.maximum(np.absolute(r), p.phi),)
 
-    @staticmethod
     @equation
     def output(t, x, u, p):
-        """The law."""
         (w,) = x
         (r,) = u
         return (w - p.k_1 * r / np.sqrt(np.maximum(np.absolute(r), p.phi)),)
 
-    @staticmethod
     @equation
     def switching(t, x, u, p):
-        """The edges of the layer."""
         (r,) = u
         return r + p.phi, r - p.phi

@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 
 from .. import arrays
-from ..arrays import Special, Tracer, traced
+from ..arrays import Computed, Special, Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise, product, total
 from .table import enter
 
 
-class ComplexPair(Special):
+class ComplexPair(Computed):
     """An array of complex numbers: the real and the imaginary parts."""
-
-    __array_ufunc__ = None
-    __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, graph: Graph, real: Any, imag: Any) -> None:
         self.graph = graph
@@ -187,21 +184,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "eq": lambda g, a, b: (a.real == b.real) & (a.imag == b.imag),
     "ne": lambda g, a, b: (a.real != b.real) | (a.imag != b.imag),
 }
-
-
-def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
-    def method(self: ComplexPair, *other: Any) -> Any:
-        operands = (*other, self) if reflected else (self, *other)
-        return self.operation(self.graph, name, operands)
-
-    return method
-
-
-for _name, _op in {"add": "add", "sub": "sub", "mul": "mul", "truediv": "div"}.items():
-    setattr(ComplexPair, f"__{_name}__", _operator(_op))
-    setattr(ComplexPair, f"__r{_name}__", _operator(_op, reflected=True))
-for _name, _op in {"neg": "neg", "abs": "absolute", "eq": "eq", "ne": "ne"}.items():
-    setattr(ComplexPair, f"__{_name}__", _operator(_op))
 
 
 ComplexPair.__matmul__ = lambda self, other: paired_product(self.graph, self, other)  # type: ignore[attr-defined]

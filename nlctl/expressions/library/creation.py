@@ -160,10 +160,8 @@ def linspace(graph: Graph, start: Any, stop: Any, num: int = 50, endpoint: bool 
     """Return numbers at equal distances."""
     parts = num - 1 if endpoint else num
     start, stop = traced(graph, start), traced(graph, stop)
-    step = elementwise(graph, "div", elementwise(graph, "sub", stop, start), float(parts))
-    places = elementwise(
-        graph, "add", elementwise(graph, "mul", traced(graph, np.arange(float(num))), step), start
-    )
+    step = (stop - start) / float(parts)
+    places = traced(graph, np.arange(float(num))) * step + start
     if endpoint and num > 1:
         places[-1] = stop
     return places

@@ -17,12 +17,6 @@ from .table import ARRAY_METHODS, Facade, formula, of
 __all__: list[str] = []
 
 
-@formula(np.square)
-def square(np: Facade, x: Any) -> Any:
-    """x^2."""
-    return x * x
-
-
 @formula(np.sinc)
 def sinc(np: Facade, x: Any) -> Any:
     """sin(pi x) / (pi x)."""
@@ -43,27 +37,6 @@ def parts_of_number(np: Facade, x: Any) -> Any:
     whole = np.trunc(x)
     rest = np.where(np.isinf(x), 0.0, x - whole)
     return rest, whole
-
-
-@formula(np.logaddexp2)
-def logaddexp2(np: Facade, x: Any, y: Any) -> Any:
-    """log2(2^x + 2^y)."""
-    two = math.log(2.0)
-    return np.logaddexp(x * two, y * two) / two
-
-
-def _of_two(name: str) -> Any:
-    def written(graph: Graph, a: Any, b: Any) -> Tracer:
-        a, b = traced(graph, a), traced(graph, b)
-        both = elementwise(graph, name, a, b)
-        without_nan_in_a = elementwise(graph, "select", elementwise(graph, "ne", a, a), b, both)
-        return elementwise(graph, "select", elementwise(graph, "ne", b, b), a, without_nan_in_a)
-
-    return written
-
-
-of(np.fmax)(_of_two("maximum"))
-of(np.fmin)(_of_two("minimum"))
 
 
 @formula(np.round, np.around)
@@ -131,11 +104,7 @@ def select(graph: Graph, conditions: Any, choices: Any, default: Any = 0) -> Any
     chosen = traced(graph, default)
     for condition, choice in reversed(list(zip(conditions, choices, strict=True))):
         chosen = elementwise(graph, "select", condition, choice, chosen)
-    return _as_floats(graph, chosen)
-
-
-def _as_floats(graph: Graph, array: Tracer) -> Tracer:
-    return elementwise(graph, "add", array, 0.0)
+    return chosen + 0.0
 
 
 @of(np.piecewise)
@@ -150,10 +119,10 @@ def piecewise(
     result = traced(graph, np.zeros(x.shape))
     values = [f(x, *given, **named) if callable(f) else f for f in functions]
     if len(values) == len(conditions) + 1:
-        result = elementwise(graph, "add", result, values.pop())
+        result = result + values.pop()
     for condition, value in zip(conditions, values, strict=True):
         result = elementwise(graph, "select", condition, value, result)
-    return _as_floats(graph, result)
+    return result + 0.0
 
 
 @formula(np.nan_to_num)
@@ -184,8 +153,15 @@ def conj(graph: Graph, values: Tracer) -> Tracer:
 
 ARRAY_METHODS.update(clip=_clip, round=np.round, conj=conj, conjugate=conj)
 
+_TWO = math.log(2.0)
 # what is one expression: of NumPy, of which `np` has the functions, and of numbers
 _FORMULAS = (
+    ((np.square,), lambda np, x: x * x),
+    ((np.fmax,),
+     lambda np, a, b: np.where(b != b, a, np.where(a != a, b, np.maximum(a, b)))),
+    ((np.fmin,),
+     lambda np, a, b: np.where(b != b, a, np.where(a != a, b, np.minimum(a, b)))),
+    ((np.logaddexp2,), lambda np, x, y: np.logaddexp(x * _TWO, y * _TWO) / _TWO),
     ((np.reciprocal,), lambda np, x: 1.0 / x),
     ((np.deg2rad, np.radians, math.radians), lambda np, x: x * (np.pi / 180.0)),
     ((np.rad2deg, np.degrees, math.degrees), lambda np, x: x * (180.0 / np.pi)),

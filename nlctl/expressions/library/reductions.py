@@ -79,16 +79,16 @@ def ignoring_nan(graph: Graph, name: str, a: Expr, b: Expr) -> Expr:
     return graph.op("select", graph.op("ne", b, b), a, without_nan_in_a)
 
 
-_largest = of(np.max, np.amax)(_extreme("maximum"))
-_smallest = of(np.min, np.amin)(_extreme("minimum"))
+of(np.max, np.amax)(_extreme("maximum"))
+of(np.min, np.amin)(_extreme("minimum"))
 of(np.nanmax)(_extreme("maximum", ignores_nan=True))
 of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 
 
-@of(np.ptp)
-def ptp(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+@formula(np.ptp)
+def ptp(np: Facade, values: Any, axis: Axis = None) -> Tracer:
     """Return the distance between the largest and the smallest."""
-    return elementwise(graph, "sub", _largest(graph, values, axis), _smallest(graph, values, axis))
+    return np.max(values, axis) - np.min(values, axis)
 
 
 @of(np.sum)
@@ -115,12 +115,11 @@ def sum_along(
     return total(array, axis)
 
 
-@of(np.nansum)
-def nansum(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+@formula(np.nansum)
+def nansum(np: Facade, values: Any, axis: Axis = None) -> Tracer:
     """Return a sum without what is NaN."""
-    array = traced(graph, values)
-    is_number = elementwise(graph, "eq", array, array)
-    return total(elementwise(graph, "select", is_number, array, 0.0), axis)
+    array = traced(np.graph, values)
+    return np.sum(np.where(array == array, array, 0.0), axis)
 
 
 def _count(array: Tracer, axis: Axis) -> float:
@@ -140,38 +139,35 @@ def mean(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
     return elementwise(graph, "div", sums, _count(array, axis))
 
 
-@of(np.var)
+@formula(np.var)
 def var(
-    graph: Graph, values: Any, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
+    np: Facade, values: Any, axis: Axis = None, *, ddof: float = 0, keepdims: bool = False
 ) -> Tracer:
     """Return a variance."""
-    array = with_counts(traced(graph, values))
-    away = elementwise(graph, "sub", array, mean(graph, array, axis, keepdims=True))
-    squares = elementwise(graph, "mul", away, away)
-    sums = sum_along(graph, squares, axis, keepdims=keepdims)
-    return elementwise(graph, "div", sums, max(_count(array, axis) - ddof, 0.0))
+    array = with_counts(traced(np.graph, values))
+    away = array - np.mean(array, axis, keepdims=True)
+    return np.sum(away * away, axis, keepdims=keepdims) / max(_count(array, axis) - ddof, 0.0)
 
 
-@of(np.std)
-def std(graph: Graph, values: Any, axis: Axis = None, **options: Any) -> Tracer:
+@formula(np.std)
+def std(np: Facade, values: Any, axis: Axis = None, **options: Any) -> Tracer:
     """Return a standard deviation."""
-    return elementwise(graph, "sqrt", var(graph, values, axis, **options))
+    return np.sqrt(np.var(values, axis, **options))
 
 
-@of(np.average)
-def average(graph: Graph, values: Any, axis: Axis = None, weights: Any = None) -> Tracer:
+@formula(np.average)
+def average(np: Facade, values: Any, axis: Axis = None, weights: Any = None) -> Tracer:
     """Return a weighted mean."""
     if weights is None:
-        return mean(graph, values, axis)
-    array, weights = traced(graph, values), traced(graph, weights)
+        return np.mean(values, axis)
+    array, weights = traced(np.graph, values), traced(np.graph, weights)
     if weights.shape != array.shape and axis is not None:
         shape = tuple(n if i == axis % array.ndim else 1 for i, n in enumerate(array.shape))
         weights = weights.reshape(shape)
-    weighed = sum_along(graph, elementwise(graph, "mul", array, weights), axis)
-    ones = elementwise(graph, "add", elementwise(graph, "mul", array, 0.0), 1.0)
+    weighed = np.sum(array * weights, axis)
     if weights.shape != array.shape:
-        weights = elementwise(graph, "mul", ones, weights)
-    return elementwise(graph, "div", weighed, sum_along(graph, weights, axis))
+        weights = (array * 0.0 + 1.0) * weights
+    return weighed / np.sum(weights, axis)
 
 
 @of(np.prod)
@@ -215,8 +211,8 @@ all_of = of(np.all)(_of_truths("and", True))
 def count_nonzero(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
     """Return how many elements are not 0."""
     array = traced(graph, values)
-    return total(elementwise(graph, "ne", array, 0.0) if any(
-        e.kind != "b" for e in array.values.flat) else array, axis)  # fmt: skip
+    are_truths = all(e.kind == "b" for e in array.values.flat)
+    return total(array if are_truths else elementwise(graph, "ne", array, 0.0), axis)
 
 
 # -- orders ----------------------------------------------------------------------------------------
@@ -335,43 +331,36 @@ def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
     return quantiles[0] if not parts.shape else traced(graph, quantiles)
 
 
-@of(np.percentile)
-def percentile(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
+@formula(np.percentile)
+def percentile(np: Facade, values: Any, q: Any, axis: Axis = None) -> Tracer:
     """Return the value below which q per cent lie."""
-    return _quantiles(graph, values, elementwise(graph, "div", q, 100.0), axis)
+    return np.quantile(values, np.divide(q, 100.0), axis)
 
 
-@of(np.nanmean)
-def nanmean(graph: Graph, values: Any, axis: Axis = None) -> Tracer:
+@formula(np.nanmean)
+def nanmean(np: Facade, values: Any, axis: Axis = None) -> Tracer:
     """Return a mean of what is not NaN."""
-    array = traced(graph, values)
-    is_number = elementwise(graph, "eq", array, array)
-    return elementwise(graph, "div", nansum(graph, array, axis), total(is_number, axis))
+    return np.nansum(values, axis) / np.sum(np.equal(values, values), axis)
 
 
-@of(np.cov)
-def cov(graph: Graph, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
+@formula(np.cov)
+def cov(np: Facade, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
     """Return the covariances of rows."""
-    rows = [traced(graph, v) for v in (m, y) if v is not None]
+    rows = [traced(np.graph, v) for v in (m, y) if v is not None]
     flat = [row for r in rows for row in (r if r.ndim == 2 else [r])]
-    away = [elementwise(graph, "sub", r, mean(graph, r)) for r in flat]
+    away = [r - np.mean(r) for r in flat]
     count = float(flat[0].size - (ddof if ddof is not None else 0 if bias else 1))
-    covariances = [[elementwise(graph, "div", total(elementwise(graph, "mul", a, b)), count)
-                    for b in away] for a in away]  # fmt: skip
-    return traced(graph, covariances if len(away) > 1 else covariances[0][0])
+    covariances = [[np.sum(a * b) / count for b in away] for a in away]
+    return traced(np.graph, covariances if len(away) > 1 else covariances[0][0])
 
 
-@of(np.corrcoef)
-def corrcoef(graph: Graph, x: Any, y: Any = None) -> Tracer:
+@formula(np.corrcoef)
+def corrcoef(np: Facade, x: Any, y: Any = None) -> Tracer:
     """Return the correlations of rows."""
-    c = cov(graph, x, y)
-    sizes = [elementwise(graph, "sqrt", c[i, i]) for i in range(len(c))]
-    correlations = [[elementwise(graph, "div", elementwise(graph, "div", c[i, j], sizes[i]),
-                                 sizes[j]) for j in range(len(c))]
-                    for i in range(len(c))]  # fmt: skip
-    low, high = -1.0, 1.0
-    whole = elementwise(graph, "maximum", traced(graph, correlations), low)
-    return elementwise(graph, "minimum", whole, high)
+    c = np.cov(x, y)
+    sizes = [np.sqrt(c[i, i]) for i in range(len(c))]
+    correlations = [[c[i, j] / a / b for j, b in enumerate(sizes)] for i, a in enumerate(sizes)]
+    return np.clip(correlations, -1.0, 1.0)
 
 
 def sorted_in_place(graph: Graph, values: Tracer, axis: int = -1) -> None:
@@ -395,12 +384,6 @@ def norm(np: Facade, x: Any, ord: Any = None, axis: object = None, keepdims: boo
     if not is_euclidean:
         raise Untraceable(f"the norm {ord!r} of this array")
     return np.sqrt(np.sum(x * x, axis=axis, keepdims=keepdims))
-
-
-def norm_of(graph: Graph, values: Any) -> Tracer:
-    """Return the length of a vector."""
-    array = traced(graph, values)
-    return elementwise(graph, "sqrt", total(elementwise(graph, "mul", array, array)))
 
 
 ARRAY_METHODS.update(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -131,7 +130,7 @@ def append(graph: Graph, array: Any, values: Any, axis: object = None) -> Tracer
 def outer(graph: Graph, a: Any, b: Any) -> Tracer:
     """Return all products."""
     a, b = (traced(graph, v).reshape(-1) for v in (a, b))
-    return elementwise(graph, "mul", a[:, None], b)
+    return a[:, None] * b
 
 
 @of(np.diff)
@@ -144,7 +143,7 @@ def diff(graph: Graph, a: Any, n: int = 1, axis: int = -1, **ends: Any) -> Trace
     parts = [traced(graph, v) for v in (before, array, after) if v is not None]
     array = concatenated(graph, [p if p.shape else p.reshape(1) for p in parts])
     for _ in range(n):
-        array = elementwise(graph, "sub", array[1:], array[:-1])
+        array = array[1:] - array[:-1]
     return array
 
 
@@ -155,10 +154,9 @@ def gradient(graph: Graph, f: Any, *spacing: Any) -> Tracer:
     h = traced(graph, spacing[0] if spacing else 1.0)
     if array.ndim != 1 or len(spacing) > 1 or h.shape:
         raise Untraceable("a gradient along several axes, or on an uneven grid")
-    op = functools.partial(elementwise, graph)
-    inner = op("div", op("sub", array[2:], array[:-2]), op("mul", 2.0, h))
-    first = op("div", op("sub", array[1:2], array[:1]), h)
-    last = op("div", op("sub", array[-1:], array[-2:-1]), h)
+    inner = (array[2:] - array[:-2]) / (2.0 * h)
+    first = (array[1:2] - array[:1]) / h
+    last = (array[-1:] - array[-2:-1]) / h
     return concatenated(graph, [first, inner, last])
 
 
@@ -196,7 +194,7 @@ def dot(graph: Graph, a: Any, b: Any) -> Any:
         return paired_product(graph, a, b)
     a, b = traced(graph, a), traced(graph, b)
     if not (a.shape and b.shape):
-        return elementwise(graph, "mul", a, b)
+        return a * b
     return product(a, b)
 
 

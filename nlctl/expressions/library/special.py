@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, concatenated, traced
+from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
 from .linear_algebra import of_cholesky, of_triangle, of_triangles
-from .reductions import norm_of, prod, sum_along
+from .reductions import prod, sum_along
 from .shapes import by_moving
-from .table import WRITTEN, Facade, enter, of
+from .table import WRITTEN, Facade, enter, formula, of
 
 
 @functools.cache
@@ -23,7 +23,7 @@ def enter_scipy() -> None:
     """Enter functions of SciPy, as soon as somebody uses one."""
     from scipy import integrate, linalg, special
 
-    enter([integrate.cumulative_trapezoid], cumulative_trapezoid)
+    formula(integrate.cumulative_trapezoid)(cumulative_trapezoid)
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
@@ -31,7 +31,7 @@ def enter_scipy() -> None:
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
     for name, formula_of in _FORMULAS.items():
-        enter([getattr(special, name)], _with_facade(formula_of))
+        formula(getattr(special, name))(formula_of)
     for name in ("erf", "erfc"):
         enter([getattr(special, name)], functools.partial(_elementwise, name))
     for name in ("log1p", "expm1", "exp2", "cbrt"):
@@ -40,22 +40,15 @@ def enter_scipy() -> None:
 
 
 def cumulative_trapezoid(
-    graph: Graph, y: Any, x: Any = None, dx: Any = 1.0, axis: int = -1, initial: Any = None
+    np: Facade, y: Any, x: Any = None, dx: Any = 1.0, axis: int = -1, initial: Any = None
 ) -> Tracer:
     """Return the integrals from the first place to each."""
-    array = traced(graph, y)
-    if array.ndim != 1 or axis not in (0, -1):
+    y = traced(np.graph, y)
+    if y.ndim != 1 or axis not in (0, -1):
         raise Untraceable("integrals along one axis of several")
-    width = dx if x is None else elementwise(graph, "sub", *(traced(graph, x)[s] for s in _SHIFTED))
-    both = elementwise(graph, "add", *(array[s] for s in _SHIFTED))
-    areas = elementwise(graph, "div", elementwise(graph, "mul", width, both), 2.0)
-    sums = WRITTEN[np.cumsum](graph, areas)
-    if initial is None:
-        return sums
-    return concatenated(graph, [traced(graph, [initial]), sums])
-
-
-_SHIFTED = (slice(1, None), slice(None, -1))
+    width = dx if x is None else np.diff(traced(np.graph, x))
+    sums = np.cumsum(width * (y[1:] + y[:-1]) / 2.0)
+    return sums if initial is None else np.concatenate([[initial], sums])
 
 
 def _of_linalg(name: str) -> Any:
@@ -77,10 +70,6 @@ _HOW = ("assume_a", "check_finite", "overwrite_a", "overwrite_b")  # how, not wh
 
 def _elementwise(name: str, graph: Graph, x: Any) -> Tracer:
     return elementwise(graph, name, x)
-
-
-def _with_facade(written: Any) -> Any:
-    return lambda graph, *rest, **named: written(Facade(graph), *rest, **named)
 
 
 def softmax(np: Facade, x: Any, axis: object = None) -> Any:
@@ -157,10 +146,11 @@ of(math.ceil)(_whole("ceil"))
 of(math.trunc)(_whole("trunc"))
 
 
-@of(math.dist)
-def dist(graph: Graph, p: Any, q: Any) -> Tracer:
+@formula(math.dist)
+def dist(np: Facade, p: Any, q: Any) -> Tracer:
     """Return the distance of two points."""
-    return norm_of(graph, elementwise(graph, "sub", traced(graph, p), traced(graph, q)))
+    apart = np.subtract(traced(np.graph, p), traced(np.graph, q))
+    return np.sqrt(np.sum(apart * apart))
 
 
 @of(math.fsum)
@@ -175,28 +165,20 @@ def _product(graph: Graph, values: Any, *, start: Any = 1) -> Tracer:
     return elementwise(graph, "mul", start, prod(graph, list(values)))
 
 
-@of(math.remainder)
-def ieee_remainder(graph: Graph, x: Any, y: Any) -> Tracer:
+@formula(math.remainder)
+def ieee_remainder(np: Facade, x: Any, y: Any) -> Tracer:
     """Return what the nearest multiple of y leaves of x; of two equally far the even one."""
-    op = functools.partial(elementwise, graph)
-    size = op("absolute", y)
-    rest = op("fmod", x, size)
-    half = op("mul", 0.5, size)
-    odd = op("ne", op("fmod", x, op("mul", 2.0, size)), rest)
-    above = op("or", op("gt", rest, half), op("and", op("eq", rest, half), odd))
-    below = op("or", op("lt", rest, op("neg", half)), op("and", op("eq", rest, op("neg", half)),
-                                                         odd))  # fmt: skip
-    remainder = op("select", above, op("sub", rest, size), rest)
-    remainder = op("select", below, op("add", rest, size), remainder)
-    return op("select", op("eq", size, math.inf), x, remainder)
+    size = np.abs(y)
+    rest, half = np.fmod(x, size), 0.5 * size
+    odd = np.fmod(x, 2.0 * size) != rest
+    remainder = np.where((rest > half) | ((rest == half) & odd), rest - size, rest)
+    remainder = np.where((rest < -half) | ((rest == -half) & odd), rest + size, remainder)
+    return np.where(size == math.inf, x, remainder)
 
 
-@of(math.isclose)
-def _isclose(graph: Graph, a: Any, b: Any, *, rel_tol: Any = 1e-9, abs_tol: Any = 0.0) -> Any:
+@formula(math.isclose)
+def _isclose(np: Facade, a: Any, b: Any, *, rel_tol: Any = 1e-9, abs_tol: Any = 0.0) -> Any:
     """Return whether a is next to b."""
-    op = functools.partial(elementwise, graph)
-    scale = op("maximum", op("absolute", a), op("absolute", b))
-    near = op("le", op("absolute", op("sub", a, b)), op("maximum", op("mul", rel_tol, scale),
-                                                        abs_tol))  # fmt: skip
-    finite = op("lt", scale, math.inf)
-    return op("or", op("and", near, finite), op("eq", a, b))
+    scale = np.maximum(np.abs(a), np.abs(b))
+    near = np.abs(np.subtract(a, b)) <= np.maximum(rel_tol * scale, abs_tol)
+    return (near & (scale < math.inf)) | np.equal(a, b)

@@ -30,9 +30,8 @@ class Impure(Exception):  # noqa: N818 (it is what a walk finds)
 
     def __init__(self, reason: str, advice: str) -> None:
         super().__init__(reason)
-        # file and line
-        # what it does, and what to do instead
-        self.reason, self.advice, self.place = reason, advice, ""
+        self.reason, self.advice = reason, advice  # what it does, and what to do instead
+        self.place = ""  # file and line
 
 
 @dataclass(frozen=True)
@@ -85,9 +84,8 @@ class Instance:
     """An object of somebody's class that the call has made."""
 
     def __init__(self, cls: type) -> None:
-        # how often something new was learnt
-        # what is known of each, whenever it was written
-        self.cls, self.attributes, self.version = cls, {}, 0
+        self.cls, self.version = cls, 0  # how often something new was learnt
+        self.attributes: dict[str, KnownValue] = {}  # what is known of each, whenever written
 
     def learn(self, name: str, value: KnownValue) -> None:
         """Note that an attribute is written."""

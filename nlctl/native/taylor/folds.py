@@ -21,25 +21,14 @@ _AT_ONCE = 8  # sums in registers
 
 @dataclass(frozen=True, kw_only=True)
 class SeriesLayout:
-    """Where things lie.
+    """Where things lie."""
 
-    Attributes
-    ----------
-    rows : int
-        Of the coefficients of one order.
-    at : dict
-        Rows of `c` from which on the arrays ``"w"``, ``"o"``, ``"a"`` and ``"q"`` lie, and the rows
-        ``"order"``, ``"rtol"`` and ``"atol"`` with the settings.
-    lanes : int
-        Number of members.
-    size : int
-        Rows of `c`.
-    """
-
-    rows: int
+    rows: int  # of the coefficients of one order
+    # rows of `c` from which on the arrays ``"w"``, ``"o"``, ``"a"`` and ``"q"`` lie, and the
+    # rows ``"order"``, ``"rtol"`` and ``"atol"`` with the settings
     at: dict[str, int]
-    lanes: int
-    size: int
+    lanes: int  # number of members
+    size: int  # rows of `c`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +40,31 @@ class _Sum:
     steps: tuple[int, int]
     array: str
     target: int
+
+
+class Turns:
+    """A loop in IR, with what it carries from turn to turn, given as what that is at first."""
+
+    def __init__(self, b: Body, first: Sequence[Value], only_if: str = "") -> None:
+        self.b, self.first = b, first
+        self.loop, self.after, self.before = b.label("turns"), b.label("after"), b.block
+        otherwise = f"i1 {only_if}, label %{self.loop}, label %{self.after}"
+        b.write(f"br {otherwise if only_if else f'label %{self.loop}'}")
+        b.begin(self.loop)
+        self._head = len(b.lines)
+        b.lines += [""] * len(first)  # where the values come from is known at the end
+        self.carried = [
+            Value(f"%carried{i}.{self.loop}", v.width, v.kind) for i, v in enumerate(first)
+        ]
+
+    def end(self, more: Value, following: Sequence[Value]) -> None:
+        """End a turn: whether there are more, and what is carried on."""
+        rows = zip(self.carried, self.first, following, strict=True)
+        for i, (value, first, new) in enumerate(rows, self._head):
+            ways = f"[{first.text}, %{self.before}], [{new.text}, %{self.b.block}]"
+            self.b.lines[i] = f"{value.text} = phi {value.type} {ways}"
+        self.b.write(f"br i1 {more.text}, label %{self.loop}, label %{self.after}")
+        self.b.begin(self.after)
 
 
 def taylor_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
@@ -131,10 +145,8 @@ def _sums_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
 
 
 def _vectors(fold: Fold, lanes: int) -> list[_Sum]:
-    """Return the vectors of sums: of all members, or of consecutive rows of a single one.
-
-    Those of a single member are padded: what is behind the last rows is read by nobody.
-    """
+    """Return the vectors of sums: of all members, or of consecutive rows of a single one."""
+    # Those of a single member are padded: what is behind the last rows is read by nobody.
     step = 1 if lanes > 1 else WIDE
     return [
         _Sum(
@@ -151,14 +163,10 @@ def _vectors(fold: Fold, lanes: int) -> list[_Sum]:
 def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
     """Write a loop over j that adds up some sums, and what writes them."""
     width = lanes if lanes > 1 else WIDE
-    loop, after, before = b.label("sum"), b.label("summed"), b.block
     zero = constant(0.0, width)
-    b.write(f"br i1 %any, label %{loop}, label %{after}")
-    b.begin(loop)
-    totals = [Value(f"%s{i}.{loop}", width) for i in range(len(sums))]
-    head = len(b.lines)
-    b.lines += [""] * (3 + len(sums))
-    left, right, index = f"%left.{loop}", f"%right.{loop}", f"%j.{loop}"
+    first = [Value("%first", 0, "p"), Value("%last", 0, "p"), Value("0", 0, "i")]
+    turns = Turns(b, [*first, *[zero] * len(sums)], only_if="%any")
+    (left, right, index), totals = (v.text for v in turns.carried[:3]), turns.carried[3:]
     known: dict[tuple[str, int, int], Value] = {}
 
     def factor(pointer: str, at: int, step: int) -> Value:
@@ -173,18 +181,11 @@ def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
         b.add(total, b.mul(factor(left, s.left, s.steps[0]), factor(right, s.right, s.steps[1])))
         for s, total in zip(sums, totals, strict=True)
     ]
-    moved = b.new(f"getelementptr double, ptr {left}, i64 {size}").text
-    back = b.new(f"getelementptr double, ptr {right}, i64 {-size}").text
-    following = b.new(f"add i64 {index}, 1").text
-    more = b.new(f"icmp slt i64 {following}, %end").text
-    b.lines[head] = f"{left} = phi ptr [%first, %{before}], [{moved}, %{loop}]"
-    b.lines[head + 1] = f"{right} = phi ptr [%last, %{before}], [{back}, %{loop}]"
-    b.lines[head + 2] = f"{index} = phi i64 [0, %{before}], [{following}, %{loop}]"
-    for i, (total, new) in enumerate(zip(totals, added, strict=True)):
-        ways = f"[{zero.text}, %{before}], [{new.text}, %{loop}]"
-        b.lines[head + 3 + i] = f"{total.text} = phi {total.type} {ways}"
-    b.write(f"br i1 {more}, label %{loop}, label %{after}")
-    b.begin(after)
+    moved = b.new(f"getelementptr double, ptr {left}, i64 {size}")
+    back = b.new(f"getelementptr double, ptr {right}, i64 {-size}")
+    following = b.new(f"add i64 {index}, 1")
+    turns.end(b.new(f"icmp slt i64 {following.text}, %end"), [moved, back, following, *added])
+    before, loop = turns.before, turns.loop
     results = [
         b.new(f"phi {new.type} [{zero.text}, %{before}], [{new.text}, %{loop}]", width)
         for new in added

@@ -38,21 +38,21 @@ def with_taylor(
 ) -> tuple[Any, tuple[int, int]]:
     """Return the task with Taylor's method, and the shape of the coefficients."""
     _check(reading)
-    order, made = order_for(settings.rtol), series(reading, p, p.shape[1])
-    found = [entry(function) for function in made.functions]
-    plain = any(callable(each) for each in found)
+    order, coefficients = order_for(settings.rtol), series(reading, p, p.shape[1])
+    entries = [entry(function) for function in coefficients.functions]
+    plain = any(callable(one) for one in entries)
     taylor = with_fields(
         task.taylor,
         highest=order,
-        functions=np.array(found, dtype=object if plain else np.int64),
-        sides=made.sides,
-        c=made.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
+        functions=np.array(entries, dtype=object if plain else np.int64),
+        sides=coefficients.sides,
+        c=coefficients.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
         cost=_COST * order,
     )
     # the power of the step size in its error; there are no stages at parts of a step
     inside = task.pair.inside * [[0.0], [1.0], [1.0]]
     pair = with_fields(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
-    return with_fields(task, taylor=taylor, pair=pair), (order + 1, made.layout.rows)
+    return with_fields(task, taylor=taylor, pair=pair), (order + 1, coefficients.layout.rows)
 
 
 def _check(reading: Reading) -> None:
@@ -64,9 +64,9 @@ def _check(reading: Reading) -> None:
         )
     memories = [reading.system.state_labels[i] for i in reading.program.memory]
     relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
-    for what, found in (("memory", memories), ("an ideal relay", relays)):
-        if found:
+    for what, places in (("memory", memories), ("an ideal relay", relays)):
+        if places:
             raise ParameterError(
-                f"'{name}' has {what} ('{found[0]}'), which method='taylor' does not integrate: "
+                f"'{name}' has {what} ('{places[0]}'), which method='taylor' does not integrate: "
                 "use method='tsit5'"
             )

@@ -16,7 +16,7 @@ from .steps import GROWN
 
 
 def plain_series(
-    lowered: Lowered, wanted: Recurrences, switching: int, layout: SeriesLayout
+    lowered: Lowered, recurrence: Recurrences, switching: int, layout: SeriesLayout
 ) -> tuple[Callable[..., None], ...]:
     """Return `prepare` and the functions of a step, as `steps` and `folds` have them in IR."""
     prepare, first, following, last = (
@@ -29,7 +29,7 @@ def plain_series(
         highest = len(k) - 1
         for order in range(1, highest):
             w[:] = np.array([[order], [1.0 / order], [float(order == 1)]])
-            for fold in wanted.folds:
+            for fold in recurrence.folds:
                 _summed(fold, order, k, {"a": a, "q": q}[fold.array])
             following(t, x, u, c, v, w, o, k[order - 1], a, q, k[order])
         w[:] = np.array([[highest], [1.0 / highest], [0.0]])
@@ -50,7 +50,7 @@ def plain_series(
         scale = tolerance(np.maximum(np.abs(x), np.abs(x_new)), c)
         largest[0] = np.max(np.abs(h * (dx - slope)) * scale + 0.0 * x_new, axis=0)
         largest[1] = np.max(np.abs(h ** (len(k) - 1) * k[-1, : len(x)]) * scale, axis=0)
-        n, sides = len(x), [row for row, _ in wanted.sides]
+        n, sides = len(x), [row for row, _ in recurrence.sides]
         largest[2] = -1.0
         for row in (*range(n, n + switching), *sides):
             parts = np.abs(k[:-1, row]) * h ** np.arange(len(k) - 1)[:, None]

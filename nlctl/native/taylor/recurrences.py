@@ -13,7 +13,7 @@ differentiated in turn, as sin and cos.
 
 The sums are left to one loop, see `folds`; all else at an order k is a function like any other.
 What is affine in time, as are inputs between two break points, has no sums.  At a kink the side
-counts on which the solution goes on: that of the first coefficient that is not 0.  A function of
+counts on which the solution continues: that of the first coefficient that is not 0.  A function of
 what is so large that it does not depend on it any more, as 1 / cosh(t)^2, is constant: coefficients
 of an argument that overflows are not asked for.
 """
@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 
 from ...expressions.arrays import scalar
 from ...expressions.conditions import at_integers, switching_function
-from ...expressions.derivatives import partials
+from ...expressions.derivatives import linear, partials
 from ...expressions.functions import FUNCTIONS
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
 from ...expressions.stage import Stage
@@ -37,7 +37,7 @@ ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = (
     2,
 )  # rows of "w": k, 1 / k, and 1 for k = 1, otherwise 0
 _WEIGHT_ROWS = 3
-_LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that leaves nothing to tell
+_LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that says nothing more
 ROOM = 8  # rows that sums of vectors take are a multiple of this
 
 
@@ -47,51 +47,32 @@ class NoSeriesError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Fold:
-    """The sums over j = 1..k-1 of left_j right_{k-j}, of consecutive rows.
+    """The sums over j = 1..k-1 of left_j right_{k-j}, of consecutive rows."""
 
-    Attributes
-    ----------
-    left, right : int
-        First rows of the factors.
-    steps : tuple of int
-        1 where a factor has a row for each sum, 0 where it has one for all.
-    array : str
-        Where the sums are written, ``"a"`` or ``"q"``.
-    row, size : int
-        The first row there, and how many.
-    """
-
+    # first rows of the factors
     left: int
     right: int
-    steps: tuple[int, int]
-    array: str
+    steps: tuple[int, int]  # 1 where a factor has a row for each sum, 0 where it has one for all
+    array: str  # where the sums are written, ``"a"`` or ``"q"``
+    # the first row there, and how many
     row: int
     size: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recurrences:
-    """What is written at order 0 and at each order after it.
+    """What is written at order 0 and at each order after it."""
 
-    Attributes
-    ----------
-    first, following, last : list of Store
-        To ``"k"``, the coefficients of an order; at order 0 also to ``"o"``.  At order k they read
-        the coefficients ``"b"`` of order k - 1, the sums ``"a"`` and ``"q"``, and ``"o"``.  At the
-        highest order there are the states' alone, which need no sums.
-    folds : list of Fold
-    rows : mapping
-        Of every array.
-    sides : list of tuple
-        Rows of ``"k"`` for each comparison: the difference of what is compared, and the first of
-        its coefficients that is not 0; the same of what is 0 where `floor` and its like jump.
-    """
-
+    # to ``"k"``, the coefficients of an order; at order 0 also to ``"o"``. At order k they
+    # read the coefficients ``"b"`` of order k - 1, the sums ``"a"`` and ``"q"``, and ``"o"``.
+    # At the highest order there are the states' alone, which need no sums.
     first: list[Store]
     following: list[Store]
     last: list[Store]
     folds: list[Fold]
-    rows: dict[str, int]
+    rows: dict[str, int]  # of every array
+    # rows of ``"k"`` for each comparison: the difference of what is compared, and the first
+    # of its coefficients that is not 0; the same of what is 0 where `floor` and its like jump
     sides: list[tuple[int, int]]
 
 
@@ -99,10 +80,9 @@ def recurrences(
     graph: Graph, stores: Mapping[str, Sequence[Store]], sizes: Mapping[str, int], *,
     packed: bool, overflows: bool = True,
 ) -> Recurrences:  # fmt: skip
-    """Return how the coefficients of a right-hand side follow.
-
-    The first rows of an order are the states, then switching functions, then the right-hand side.
-    """
+    """Return how the coefficients of a right-hand side follow."""
+    # The first rows of an order are the states, then switching functions, then the right-hand
+    # side.
     reader = _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows)
     return reader.read(stores, packed)
 
@@ -112,39 +92,27 @@ _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coeffic
 
 @dataclass(kw_only=True)
 class _Reader:
-    """Goes through a graph.
-
-    Attributes
-    ----------
-    terms : dict
-        The k-th coefficient of each expression, None where it is 0.
-    slopes : dict
-        What an expression that is affine in time changes by, None for nothing; False for others.
-    values, before, sides : dict
-        Rows of "o" that have an expression's value, and rows of "k" that have its coefficients
-        or, of a comparison, its side.
-    distances : dict
-        Of what is compared with 0, its first coefficient that is not 0.
-    sums : dict
-        Which sums there are, by their factors.
-    pairs : list
-        See `Recurrences.sides`.
-    overflows : bool
-        Whether what is flat at arguments that overflow is constant there; not so on boxes.
-    """
+    """Goes through a graph."""
 
     graph: Graph
     n: int
     g: int
+    # whether what is flat at arguments that overflow is constant there; not so on boxes
     overflows: bool
+    # the k-th coefficient of each expression, None where it is 0
     terms: dict[Expr, Expr | None] = field(default_factory=dict)
+    # what an expression that is affine in time changes by, None for nothing; False for others
     slopes: dict[Expr, Expr | bool | None] = field(default_factory=dict)
+    # rows of "o" that have an expression's value, and rows of "k" that have its coefficients
+    # or, of a comparison, its side
     values: dict[Expr, int] = field(default_factory=dict)
     before: dict[Expr, int] = field(default_factory=dict)
     sides: dict[Expr, Expr] = field(default_factory=dict)
+    # of what is compared with 0, its first coefficient that is not 0
     distances: dict[Expr, Expr] = field(default_factory=dict)
+    # which sums there are, by their factors
     sums: dict[tuple[_Key, _Key], Expr] = field(default_factory=dict)
-    pairs: list[tuple[int, int]] = field(default_factory=list)
+    pairs: list[tuple[int, int]] = field(default_factory=list)  # see `Recurrences.sides`
     waiting: list[tuple[Expr, bool]] = field(default_factory=list)
     first: list[Store] = field(default_factory=list)
     following: list[Store] = field(default_factory=list)
@@ -249,7 +217,7 @@ class _Reader:
             return self.graph.op("mul", following, self.weight(RECIPROCAL_ROW))
         if node.op in ("call", "solve"):
             what = "an algebraic loop" if node.op == "solve" else f"the function {node.data[0]}"
-            raise NoSeriesError(f"{what} is solved or called as it stands")
+            raise NoSeriesError(f"{what} is solved or called unchanged")
         if node.op in FUNCTIONS:
             return self._function(node)
         if node.op == "select":
@@ -268,30 +236,15 @@ class _Reader:
         graph, zero = self.graph, self.graph.const(0.0)
         if all(term is None for term in terms):
             return None
-        if node.op == "concat":
-            return graph.joined([(t or zero, n) for t, n in zip(terms, node.data, strict=True)])
         a, b = terms[0], terms[-1]
-        if node.op == "add":
-            return graph.op("add", a, b) if a and b else a or b
-        if node.op == "sub":
-            return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or zero)
         if node.op == "mul":
             other = node.args[0] if a is None else node.args[1]
             return None if other.op == "const" and other.data == 0.0 else graph.op(
                 "mul", other, a or b or zero
             )  # fmt: skip
-        if a is None:
-            return None
         if node.op == "div":
-            return graph.op("div", a, node.args[1])
-        if node.op == "item":
-            return graph.item(a, node.data)
-        if node.op == "slice":
-            start, step = node.data
-            return graph.part(a, start, step, node.size or 1)
-        if node.op == "sum":
-            return graph.sum(a, node.args[0].size or 1)
-        return graph.op("neg", a)
+            return graph.op("div", a, node.args[1]) if a else None
+        return linear(graph, node, terms)
 
     def _product(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         """a_0 b_k + a_k b_0 + sum a_j b_{k-j}; of what is affine there is one term of the sum."""
@@ -310,14 +263,14 @@ class _Reader:
     def _quotient(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         """q = a / b: q_k = (a_k - sum_{j=1}^{k} b_j q_{k-j}) / b_0."""
         graph, under = self.graph, node.args[1]
-        found = a
+        numerator = a
         if b is not None:
             last = graph.op("mul", b, self.value(node))
             inner = graph.op("add", self._sum(b, ("node", node)), last)
             inner = self._unless_flat(inner, under, graph.op("div", node, under))
-            found = graph.op("sub", a, inner) if a else graph.op("neg", inner)
+            numerator = graph.op("sub", a, inner) if a else graph.op("neg", inner)
         reciprocal = self.value(graph.op("div", graph.const(1.0), under))
-        return graph.op("mul", found, reciprocal) if found else None
+        return graph.op("mul", numerator, reciprocal) if numerator else None
 
     def _function(self, node: Expr) -> Expr | None:
         """Return the coefficient of a function of the table, as its row says."""
@@ -329,14 +282,14 @@ class _Reader:
         if isinstance(row, Callable):
             given = [scalar(self.graph, self.graph.number(a)) for a in node.args]
             return self.term(self.stage.copied(row)(*given).only)
-        found: Expr | None = None
+        total: Expr | None = None
         for i, (arg, term) in enumerate(zip(node.args, terms, strict=True)):
             if term is not None:
                 derivative = _steady(self.graph, self.partial(node, i), node)
                 part = self._chained(arg, term, derivative)
                 part = part and self._unless_flat(part, arg, derivative)
-                found = self.graph.op("add", found, part) if found and part else found or part
-        return self.graph.op("mul", found, self.weight(RECIPROCAL_ROW)) if found else None
+                total = self.graph.op("add", total, part) if total and part else total or part
+        return self.graph.op("mul", total, self.weight(RECIPROCAL_ROW)) if total else None
 
     def _chained(self, arg: Expr, term: Expr, derivative: Expr) -> Expr | None:
         """Return k times the coefficient of f(x): the sum over j = 1..k of j x_j d_{k-j}."""
@@ -344,16 +297,16 @@ class _Reader:
         factors, inner = _factors(derivative)
         slope = self.slope(arg)
         if not inner.varies:
-            found = graph.op("mul", graph.op("mul", term, self.weight(ORDER_ROW)), inner)
+            product = graph.op("mul", graph.op("mul", term, self.weight(ORDER_ROW)), inner)
         elif isinstance(slope, Expr):
-            found = graph.op("mul", slope, self.previous(inner))
+            product = graph.op("mul", slope, self.previous(inner))
         else:
             rate = graph.op("mul", term, self.weight(ORDER_ROW))
             last = graph.op("mul", rate, self.value(inner))
-            found = graph.op("add", self._sum(rate, ("node", inner)), last)
+            product = graph.op("add", self._sum(rate, ("node", inner)), last)
         for factor in factors:
-            found = graph.op("mul", factor, found) if factor else graph.op("neg", found)
-        return found
+            product = graph.op("mul", factor, product) if factor else graph.op("neg", product)
+        return product
 
     def _unless_flat(self, part: Expr, arg: Expr, derivative: Expr) -> Expr:
         """Return what follows from an argument, 0 where that is large and nothing follows."""
@@ -361,8 +314,8 @@ class _Reader:
         if not derivative.varies or not self.overflows:
             return part
         large = graph.op("gt", graph.op("absolute", arg), graph.const(_LARGE))
-        tells = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
-        flat = graph.op("and", large, graph.op("not", tells))  # NaN tells nothing: inf * 0
+        says = graph.op("ge", graph.op("absolute", derivative), graph.const(_FLAT))
+        flat = graph.op("and", large, graph.op("not", says))  # NaN says nothing: inf * 0
         zero = graph.const(0.0)
         counts = self.value(graph.op("select", flat, zero, graph.const(1.0)))
         return graph.op("select", graph.op("ne", counts, zero), part, zero)
@@ -383,8 +336,8 @@ class _Reader:
             array = "q" if size else "a"
             room = -(-(size or 1) // ROOM) * ROOM if size else 1  # whole vectors are written
             self.sums[key] = self.graph.leaf(array, self._take(array, room), size)
-        found = self.sums[key]
-        return self.graph.op("neg", found) if turned else found
+        total = self.sums[key]
+        return self.graph.op("neg", total) if turned else total
 
     # -- conditions
 
@@ -401,7 +354,7 @@ class _Reader:
         if node.op in LOGIC or node.op == "select":
             return graph.op(node.op, *(self.side(a) for a in node.args))
         if node.op not in COMPARISONS:
-            raise NoSeriesError(f"it is not known on which side '{node.op}' goes on")
+            raise NoSeriesError(f"it is not known on which side '{node.op}' continues")
         return graph.op(node.op, self._side_of(graph.op("sub", *node.args)), zero)
 
     def _side_of(self, distance: Expr) -> Expr:
@@ -424,7 +377,7 @@ class _Reader:
 
     def _folds(self, packed: bool) -> list[Fold]:
         """Give the factors of sums their rows."""
-        zero, found, pairs, places = self.graph.const(0.0), [], [], {}
+        zero, folds, pairs, places = self.graph.const(0.0), [], [], {}
         for node, term in self.terms.items():
             if node.op == "leaf" and node.data[0] == "x" and node.data[2] < 2:
                 places[term] = node.data[1]  # where the states' own coefficients are
@@ -440,15 +393,15 @@ class _Reader:
             for left, right, total in numbers:
                 for factor, begin in zip((left, right), rows, strict=True):
                     self._later(begin + total.data[1], factor)
-            found.append(Fold(left=rows[0], right=rows[1], steps=(1, 1), array="a", row=0,
+            folds.append(Fold(left=rows[0], right=rows[1], steps=(1, 1), array="a", row=0,
                               size=len(numbers)))  # fmt: skip
         for left, right, total in pairs:
             if not (packed and total.size is None):
                 rows = [self._placed(factor, places) for factor in (left, right)]
                 steps = (int(left.size is not None), int(right.size is not None))
-                found.append(Fold(left=rows[0], right=rows[1], steps=steps, array=total.data[0],
+                folds.append(Fold(left=rows[0], right=rows[1], steps=steps, array=total.data[0],
                                   row=total.data[1], size=total.size or 1))  # fmt: skip
-        return found
+        return folds
 
     def _placed(self, factor: Expr, places: dict[Expr | None, int]) -> int:
         if factor not in places:

@@ -33,26 +33,15 @@ _ONCE = threading.Lock()  # of several threads that need it one compiles
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """Machine code of the coefficients of some members.
-
-    Attributes
-    ----------
-    lowered : Lowered
-    prepare : callable
-        ``prepare(p, c)``.
-    functions : tuple of callable
-        Those of `_STEP_FUNCTIONS`.  The first one fills coefficients `k` of shape (orders, rows,
-        members): the states' are in the first rows, then those of the switching functions.
-    layout : SeriesLayout
-    sides : ndarray of shape (comparisons, 2)
-        See `Recurrences.sides`.
-    """
+    """Machine code of the coefficients of some members."""
 
     lowered: Lowered
-    prepare: Any
+    prepare: Any  # ``prepare(p, c)``
+    # those of `_STEP_FUNCTIONS`. The first one fills coefficients `k` of shape (orders, rows,
+    # members): the states' are in the first rows, then those of the switching functions.
     functions: tuple[Any, ...]
     layout: SeriesLayout
-    sides: np.ndarray
+    sides: np.ndarray  # (comparisons, 2): see `Recurrences.sides`
 
     def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
         """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""
@@ -68,24 +57,24 @@ def series(reading: Reading, p: np.ndarray, width: int) -> Series:
     with _ONCE:
         return reading.cache.found(
             Series,
-            lambda each: each.lowered.lanes == width and each.lowered.holds_for(p),
+            lambda kept: kept.lowered.lanes == width and kept.lowered.holds_for(p),
             lambda: _made(reading, p, width),
         )
 
 
 def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
-    found = reading.equations
-    if not all(p[i, 0] == value for i, value in found.graph.assumptions.items()):
-        found = equations(reading.schedule, reading.program.layout, p[:, 0])
-    lowered, wanted = _lowered(reading, found, width)
+    read = reading.equations
+    if not all(p[i, 0] == value for i, value in read.graph.assumptions.items()):
+        read = equations(reading.schedule, reading.program.layout, p[:, 0])
+    lowered, recurrence = _lowered(reading, read, width)
     layout = _layout(lowered)
-    switching = reading.program.events + found.conditions.rows
+    switching = reading.program.events + read.conditions.rows
     if is_jit_disabled():
-        prepare, *functions = plain_series(lowered, wanted, switching, layout)
+        prepare, *functions = plain_series(lowered, recurrence, switching, layout)
     else:
-        compared = [row for row, _ in wanted.sides]
+        compared = [row for row, _ in recurrence.sides]
         steps = steps_text(lowered.rows["x"], switching, compared, layout)
-        text = "\n".join([lowered.text, taylor_text(wanted.folds, layout), steps])
+        text = "\n".join([lowered.text, taylor_text(recurrence.folds, layout), steps])
         loaded = finished(text, ("prepare", *_STEP_FUNCTIONS))
         prepared = ((lowered.rows["p"], width), (layout.size, width))
         prepare, *functions = (
@@ -95,7 +84,7 @@ def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
             )
             for name, address in loaded.addresses.items()
         )  # fmt: skip
-    sides = np.array(wanted.sides, dtype=np.int64).reshape(-1, 2)
+    sides = np.array(recurrence.sides, dtype=np.int64).reshape(-1, 2)
     return Series(
         lowered=lowered, prepare=prepare, functions=tuple(functions), layout=layout, sides=sides
     )
@@ -109,13 +98,16 @@ def _layout(lowered: Lowered) -> SeriesLayout:
     return SeriesLayout(rows=lowered.rows["k"], at=at, lanes=lowered.lanes, size=row)
 
 
-def _lowered(reading: Reading, found: Any, width: int) -> tuple[Lowered, Recurrences]:
+def _lowered(reading: Reading, read: Any, width: int) -> tuple[Lowered, Recurrences]:
     program, n, m = reading.program, reading.system.nstates or 0, reading.schedule.ninputs
-    asked = stores_of(found, ("dx", "g"))
-    stores, exact, graph = rewritten(found.graph, asked)
+    asked = stores_of(read, ("dx", "g"))
+    stores, exact, graph = rewritten(read.graph, asked)
     try:
-        wanted = recurrences(
-            graph, stores, {"x": n, "g": program.events + found.conditions.rows}, packed=width == 1
+        recurrence = recurrences(
+            graph,
+            stores,
+            {"x": n, "g": program.events + read.conditions.rows},
+            packed=width == 1,
         )
     except NoSeriesError as error:
         raise ParameterError(
@@ -124,14 +116,14 @@ def _lowered(reading: Reading, found: Any, width: int) -> tuple[Lowered, Recurre
         ) from error
     parameters = length(program.layout)
     functions, size = planned(
-        {"first": wanted.first, "following": wanted.following, "last": wanted.last},
+        {"first": recurrence.first, "following": recurrence.following, "last": recurrence.last},
         {"first": _FIRST, "following": _FOLLOWING, "last": _LAST},
         parameters,
     )
-    wanted.rows["k"] = (wanted.rows["k"] + WIDE) // WIDE * WIDE + WIDE
-    rows = {"p": parameters, "t": 1, "x": n, "u": m, "v": m, "c": max(size, 1), **wanted.rows}
+    recurrence.rows["k"] = (recurrence.rows["k"] + WIDE) // WIDE * WIDE + WIDE
+    rows = {"p": parameters, "t": 1, "x": n, "u": m, "v": m, "c": max(size, 1), **recurrence.rows}
     lowered = Lowered(
         functions=functions, exact=exact, calls={}, solvers={}, rows=rows | {"b": rows["k"]},
-        lanes=width, assumed=found.graph.assumptions,
+        lanes=width, assumed=read.graph.assumptions,
     )  # fmt: skip
-    return lowered, wanted
+    return lowered, recurrence

@@ -16,8 +16,9 @@ from collections.abc import Callable, Sequence
 
 from ..codegen.ir.text import Body, Module, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
-from .folds import WIDE, SeriesLayout
+from .folds import WIDE, SeriesLayout, Turns
 
+_ZERO = Value("0", 0, "i")
 GROWN = 4  # coefficients by whose growth a step is chosen
 _Write = Callable[[str, Sequence[Value]], Sequence[Value]]  # of a place and of largest values
 
@@ -74,10 +75,9 @@ class _Function:
     # -- loops
 
     def rows(self, count: int, carried: int, write: _Write) -> list[Value]:
-        """Write what is done with the numbers from a place on; return the largest values.
-
-        The last rows of a single member are taken once more together with those before them.
-        """
+        """Write what is done with the numbers from a place on; return the largest values."""
+        # The last rows of a single member are taken once more together with those before
+        # them.
         width, total = self.width(count), count * self.lanes
         step = width or 1
         zeros = [constant(0.0, width)] * carried
@@ -92,72 +92,44 @@ class _Function:
         return self.lanes if self.lanes > 1 else WIDE if count >= WIDE else 0
 
     def _loop(self, turns: int, step: int, zeros: list[Value], write: _Write) -> list[Value]:
-        b, loop, after, before = self.b, self.b.label("rows"), self.b.label("end"), self.b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        index, first = f"%i.{loop}", len(b.lines)
-        entries = [Value(f"%l{i}.{loop}", z.width) for i, z in enumerate(zeros)]
-        b.lines += [""] * (1 + len(zeros))
-        found = list(write(index, entries))
-        following = b.new(f"add i64 {index}, {step}").text
-        more = b.new(f"icmp slt i64 {following}, {turns * step}").text
-        b.lines[first] = f"{index} = phi i64 [0, %{before}], [{following}, %{b.block}]"
-        for i, (entry, zero, new) in enumerate(zip(entries, zeros, found, strict=True)):
-            ways = f"[{zero.text}, %{before}], [{new.text}, %{b.block}]"
-            b.lines[first + 1 + i] = f"{entry.text} = phi {entry.type} {ways}"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
-        return found
+        b = self.b
+        loop = Turns(b, [_ZERO, *zeros])
+        index, *entries = loop.carried
+        values = list(write(index.text, entries))
+        following = b.new(f"add i64 {index.text}, {step}")
+        loop.end(b.new(f"icmp slt i64 {following.text}, {turns * step}"), [following, *values])
+        return values
+
+    def _countdown(self, turns: Turns, left: Value, following: Sequence[Value]) -> None:
+        """End a loop that has as many turns as `left`, which it carries last."""
+        less = self.b.new(f"add i64 {left.text}, -1")
+        turns.end(self.b.new(f"icmp sgt i64 {less.text}, 0"), [*following, less])
 
     def polynomial(
         self, highest: str, at: str, h: Value, *, slope: bool, magnitudes: bool = False
     ) -> list[Value]:
-        """Return a polynomial's value at h, and its slope: from the highest order downwards.
-
-        With `magnitudes` the terms' magnitudes are added up, for h > 0.
-        """
-        b, loop, after, width = self.b, self.b.label("orders"), self.b.label("value"), h.width
+        """Return a polynomial's value at h, and its slope: from the highest order downwards."""
+        # With `magnitudes` the terms' magnitudes are added up, for h > 0.
+        b, width = self.b, h.width
         top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
         read = self.magnitude if magnitudes else lambda value: value
         start = [read(b.load(top, width))] + [constant(0.0, width)] * slope
-        before = b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        head = len(b.lines)
-        b.lines += [""] * (2 + len(start))
-        entries = [Value(f"%p{i}.{loop}", width) for i in range(len(start))]
-        below = b.new(f"getelementptr double, ptr %c.{loop}, i64 {-self.size}").text
-        found = [b.add(b.mul(entries[0], h), read(b.load(below, width)))]
+        turns = Turns(b, [Value(top, 0, "p"), *start, Value(highest, 0, "i")])
+        place, *entries, left = turns.carried
+        below = b.new(f"getelementptr double, ptr {place.text}, i64 {-self.size}")
+        values = [b.add(b.mul(entries[0], h), read(b.load(below.text, width)))]
         if slope:
-            found.append(b.add(b.mul(entries[1], h), entries[0]))
-        left = b.new(f"add i64 %left.{loop}, -1").text
-        more = b.new(f"icmp sgt i64 {left}, 0").text
-        b.lines[head] = f"%c.{loop} = phi ptr [{top}, %{before}], [{below}, %{loop}]"
-        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
-        for i, (entry, first, new) in enumerate(zip(entries, start, found, strict=True)):
-            ways = f"[{first.text}, %{before}], [{new.text}, %{loop}]"
-            b.lines[head + 2 + i] = f"{entry.text} = phi {entry.type} {ways}"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
-        return found
+            values.append(b.add(b.mul(entries[1], h), entries[0]))
+        self._countdown(turns, left, [below, *values])
+        return values
 
     def power(self, highest: str, h: Value) -> Value:
         """Return h to the power of the highest order."""
-        b, loop, after, before = self.b, self.b.label("power"), self.b.label("known"), self.b.block
-        b.write(f"br label %{loop}")
-        b.begin(loop)
-        head = len(b.lines)
-        b.lines += ["", ""]
-        entry = Value(f"%p.{loop}", h.width)
-        new = b.mul(entry, h)
-        left = b.new(f"add i64 %left.{loop}, -1").text
-        more = b.new(f"icmp sgt i64 {left}, 0").text
-        one = constant(1.0, h.width).text
-        b.lines[head] = f"{entry.text} = phi {entry.type} [{one}, %{before}], [{new.text}, %{loop}]"
-        b.lines[head + 1] = f"%left.{loop} = phi i64 [{highest}, %{before}], [{left}, %{loop}]"
-        b.write(f"br i1 {more}, label %{loop}, label %{after}")
-        b.begin(after)
-        return new
+        turns = Turns(self.b, [constant(1.0, h.width), Value(highest, 0, "i")])
+        so_far, left = turns.carried
+        power = self.b.mul(so_far, h)
+        self._countdown(turns, left, [power])
+        return power
 
     # -- largest values
 
@@ -211,12 +183,12 @@ class _Function:
         def write(at: str, largest: Sequence[Value]) -> list[Value]:
             size = self.magnitude(self.read("x", at, width))
             scale = self.weight(size, tolerances)
-            found = []
+            parts = []
             for order, before in zip(orders, largest, strict=True):
                 where = b.new(f"getelementptr double, ptr {order}, i64 {at}").text
                 part = b.mul(self.magnitude(b.load(where, width)), scale)
-                found.append(self.larger(before, part))
-            return found
+                parts.append(self.larger(before, part))
+            return parts
 
         self.write_largest([self.over_lanes(value) for value in self.rows(n, GROWN, write)])
 
@@ -225,8 +197,8 @@ class _Function:
         highest, h = self.highest(), self.steps(n)
 
         def write(at: str, _: Sequence[Value]) -> list[Value]:
-            found = self.polynomial(highest, at, h, slope=True)
-            for array, value in zip(("x", "slope"), found, strict=True):
+            ends = self.polynomial(highest, at, h, slope=True)
+            for array, value in zip(("x", "slope"), ends, strict=True):
                 self.b.store(value, self.place(array, at))
             return []
 
@@ -239,11 +211,10 @@ class _Function:
         return self.b.wide(h, width) if width else h
 
     def judge(self, n: int, switching: int, compared: Sequence[int]) -> None:
-        """Write h times the defect, and the last term, over the tolerance.
-
-        Both are not finite where a state is not.  A third number is above 0 where something that
-        is compared may change its side, or its polynomial is not to be trusted.
-        """
+        """Write h times the defect, and the last term, over the tolerance."""
+        # Both are not finite where a state is not. A third number is above 0 where
+        # something that is compared may change its side, or its polynomial is not to be
+        # trusted.
         b, width, highest = self.b, self.width(n), self.highest()
         h, tolerances = self.steps(n), self.tolerances(n)
         power, last = self.power(highest, h), self.coefficients(highest)
@@ -259,11 +230,11 @@ class _Function:
             parts = zip(largest, (missed, term), strict=True)
             return [self.larger(before, part) for before, part in parts]
 
-        found = [self.over_lanes(value) for value in self.rows(n, 2, write)]
+        greatest = [self.over_lanes(value) for value in self.rows(n, 2, write)]
         doubts = constant(-1.0, self.lanes if self.lanes > 1 else 0)
         for row, count in runs([*range(n, n + switching), *compared]):
             doubts = self._doubts(row, count, self.below(highest), doubts)
-        self.write_largest([*found, doubts])
+        self.write_largest([*greatest, doubts])
 
     def _doubts(self, row: int, count: int, highest: str, before: Value) -> Value:
         """Return the largest doubt of some rows, or that of rows before."""
@@ -287,9 +258,9 @@ class _Function:
             doubt = b.select(b.compare("ogt", crossing, doubt), crossing, doubt)
             return [b.select(b.compare("ogt", doubt, largest[0]), doubt, largest[0])]
 
-        (found,) = self.rows(count, 1, write)
-        found = self.over_lanes(found)
-        return b.select(b.compare("ogt", found, before), found, before)
+        (most,) = self.rows(count, 1, write)
+        most = self.over_lanes(most)
+        return b.select(b.compare("ogt", most, before), most, before)
 
     def values(self, n: int, count: int) -> None:
         """Write the switching functions' polynomials at h."""
@@ -313,10 +284,10 @@ def runs(rows: Sequence[int]) -> list[tuple[int, int]]:
     >>> runs([7, 3, 4, 5])
     [(3, 3), (7, 1)]
     """
-    found: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     for row in sorted(rows):
-        if found and row == sum(found[-1]):
-            found[-1] = (found[-1][0], found[-1][1] + 1)
+        if pairs and row == sum(pairs[-1]):
+            pairs[-1] = (pairs[-1][0], pairs[-1][1] + 1)
         else:
-            found.append((row, 1))
-    return found
+            pairs.append((row, 1))
+    return pairs

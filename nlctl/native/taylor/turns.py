@@ -35,11 +35,9 @@ _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many 
 
 
 def may_turn(reading: Reading) -> bool:
-    """Whether runs of a diagram may go on by Taylor's method.
-
-    Memories and delays have no coefficients, and where clocks end the steps a run can be resumed
-    at a sample, and knows nothing of the steps before.
-    """
+    """Whether runs of a diagram may continue by Taylor's method."""
+    # Memories and delays have no coefficients, and where clocks end the steps a run can be
+    # resumed at a sample, and knows nothing of the steps before.
     program, lines = reading.program, reading.schedule.lines
     return bool(reading.system.nstates) and not (program.memory or program.sampled or lines)
 
@@ -55,14 +53,14 @@ def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
 
 
 def series_ahead(reading: Reading, p: np.ndarray) -> None:
-    """Make the code of Taylor's method now, where runs with parameters `p` may go on by it."""
+    """Make the code of Taylor's method now, where runs with parameters `p` may continue by it."""
     if may_turn(reading):
         with contextlib.suppress(ParameterError):
             series(reading, p, 1)
 
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
-    """Return a run that goes on by the other method, if it asks for that."""
+    """Return a run that continues by the other method, if it asks for that."""
     lane, fails = run.lanes[0], _fails(run)
     if lane["status"] != METHOD and not fails:
         return run
@@ -92,10 +90,8 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
 
 
 def _fails(run: Run) -> bool:
-    """Whether Taylor's method does not get on, from a place where all is finite.
-
-    Where a guard is NaN it is, at that place: no other method may go on.
-    """
+    """Whether Taylor's method does not get on, from a place where all is finite."""
+    # Where a guard is NaN it is, at that place: no other method may continue.
     if not (run.task.taylor.highest and run.task.taylor.span):
         return False
     here = np.append(run.work.x, run.work.events.g_start)
@@ -103,7 +99,7 @@ def _fails(run: Run) -> bool:
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:
-    """Return a run that goes on by the explicit pair: to be measured, or for longer each time."""
+    """Return a run that continues by the explicit pair: to be measured, or for longer each time."""
     lane, span = run.lanes[0], run.task.taylor.span
     if lane["span"] > FIRST_TURN:
         lane["span"], span = MEASURED, min(2 * span, _MOST)

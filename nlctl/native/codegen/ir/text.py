@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-_KINDS = {"f": "double", "b": "i1", "i": "i64"}
+_KINDS = {"f": "double", "b": "i1", "i": "i64", "p": "ptr"}
 RARELY = "!prof !0"  # the first way of a branch is all but never taken
 
 
@@ -22,7 +22,7 @@ class Value:
 
     text: str  # its name, or a constant
     width: int  # number of elements, 0 for what is not a vector
-    kind: str = "f"  # ``"f"`` float, ``"b"`` truth value, ``"i"`` integer
+    kind: str = "f"  # ``"f"`` float, ``"b"`` truth value, ``"i"`` integer, ``"p"`` pointer
 
     @property
     def type(self) -> str:
