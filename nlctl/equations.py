@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from numba.extending import register_jitable
 
 from .errors import ParameterError
-from .params import MARKED
+from .params import EQUATION
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -50,5 +50,5 @@ def equation(function: _Function) -> _Function:
     if not callable(function):
         raise ParameterError(f"equation needs a function, got {type(function).__name__}")
     if isinstance(function, FunctionType):
-        MARKED.add(function)
+        setattr(function, EQUATION, True)
     return register_jitable(function)

@@ -14,7 +14,6 @@ from collections import namedtuple
 from collections.abc import Callable, Iterator, Mapping
 from types import FunctionType
 from typing import Any, TypeVar, dataclass_transform
-from weakref import WeakSet
 
 import numpy as np
 
@@ -29,7 +28,7 @@ _T = TypeVar("_T")
 _KEY = "nlctl"
 _MADE_BY_CLASS = 1 << 9  # Py_TPFLAGS_HEAPTYPE: not of types such as int
 HIGHEST_ORDER = 100  # of plants and references: a block has a signal for each derivative
-MARKED: WeakSet[Callable[..., Any]] = WeakSet()  # what `nlctl.equation` has marked
+EQUATION = "__equation__"  # what `nlctl.equation` marks functions with
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -221,7 +220,7 @@ def _complete(cls: Any) -> None:
     """Make the equations of a class static methods, and set what goes without saying."""
     fields = {field.name for field in dataclasses.fields(cls)}
     for name, value in list(vars(cls).items()):
-        if name not in fields and isinstance(value, FunctionType) and value in MARKED:
+        if name not in fields and isinstance(value, FunctionType) and hasattr(value, EQUATION):
             setattr(cls, name, staticmethod(value))
     if hasattr(cls, "output"):
         cls.feedthrough = getattr(cls, "feedthrough", True)

@@ -1,6 +1,7 @@
 """The record of a loop changes whenever something changes that its equations reach."""
 
 import json
+import pickle
 import subprocess
 import sys
 
@@ -252,3 +253,21 @@ def test_points_at_which_a_function_raises_are_left_out_and_told():
     assert one["raises"] == other["raises"]
     assert 0 < one["raises"].count("at point") < 6
     assert len([name for name in values_differ(one, other) if name.endswith("'")]) == 1
+
+
+def test_facts_stay_whatever_else_is_declared_or_pickled():
+    """Blocks that are declared later, and pickles, change nothing of a loop."""
+    loop = nlctl.paper.example_1()
+    before = loop_facts(loop)
+
+    @nlctl.record
+    class Later:
+        inputs, outputs = ("u",), ("v",)
+
+        @nlctl.equation
+        def output(t, x, u, p):
+            return (2 * u[0],)
+
+    pickle.dumps(nlctl.DeadZone())
+    nlctl.block(Later(), "later")
+    assert loop_facts(loop) == before

@@ -43,6 +43,7 @@ _MACHINERY = (
     types.GetSetDescriptorType,
     types.WrapperDescriptorType,
 ) + (types.ClassMethodDescriptorType, types.MethodDescriptorType, property)
+_RECORDS = ("nlctl.params", "nlctl.pickles")
 RUNNERS = {"eval", "exec", "__import__"}
 FINDERS = {"globals", "vars", *RUNNERS}
 READERS = {"open", "loadtxt", "genfromtxt", "fromfile", "memmap", "loadmat", "read_csv"} | {
@@ -271,6 +272,8 @@ def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
         keys = () if seen.deep and is_partial else ("__func__", "func", "fget")
         functions = [getattr(part, key, None) for key in keys]
         function = next(filter(None, functions), part)  # of a method, a property
+        if getattr(function, "__module__", "") in _RECORDS:
+            continue  # what every record has of nlctl, and how it is pickled
         if isinstance(_plain(function), types.FunctionType):
             yield name
             yield from _fingerprint(function, seen)
