@@ -17,8 +17,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
-from ..native.sliding.pieces import replaced_parts
 from .branches import bounded
 from .directions import Direction, SomeRows, Taken, rows_replaced
 from .names import StatePlaces

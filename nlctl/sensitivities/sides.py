@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
+from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, needed
-from ..native.sliding.pieces import replaced_parts
 from .branches import Branch, branch_of
 from .directions import SomeRows
 from .source import EquationParts

@@ -89,6 +89,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
             "latex",
             "quotients",
         ],
+        ["bends"],
         ["library"],
         ["merged"],
         ["rewritten"],

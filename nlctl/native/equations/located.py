@@ -6,12 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
+from ...expressions.bends import only_bends
 from ...expressions.conditions import conditions, factors, switching_function
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
 from ..diagram.nodes import Node
+from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
 
 if TYPE_CHECKING:
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 
 _MOST = 256  # switching functions of one diagram; more cost more than they are worth
 _BENDS = ("absolute", "minimum", "maximum")
+_STEEP = ("sqrt", "power", "cbrt", "hypot")  # a rate that has no derivative where it is 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,13 +86,18 @@ def found_conditions(
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
     rows = beyond = 0
+    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps where x is 0 within
+    # tolerances, and there is nothing to locate.
+    steep = any(node.op in _STEEP and node.varies for node in moving)
+    p = _values(reader)
     for condition, node in _undeclared(reader, rates, guards, watched):
         if condition not in inside:
             continue
         if condition in timed:
             of_time[condition] = None
             continue
-        bends, path = condition.op in _BENDS, "" if node is None else node.path
+        path = "" if node is None else node.path
+        bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
         for function in factors(switching_function(reader.graph, condition)):
             key, size = _key(function), function.size or 1
             if key in located:
@@ -106,6 +116,11 @@ def found_conditions(
         located=tuple(sorted(located.values(), key=lambda one: not one.bends)),
         of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
     )  # fmt: skip
+
+
+def _values(reader: Reader) -> np.ndarray:
+    """Return values of parameters: those that are known, and 1 for others."""
+    return np.ones(length(reader.layout)) if reader.p is None else reader.p
 
 
 def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:

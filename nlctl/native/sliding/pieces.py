@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.bends import replaced_parts
 from ...expressions.derivatives import tangents
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, Graph, Untraceable, needed
@@ -29,18 +30,6 @@ _POINTS = 16  # values for which a choice is seen not to jump
 _EQUAL = 1e-9
 
 LeafDerivative = Callable[[Expr], Expr | None]
-
-
-def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, Expr]) -> list[Expr]:
-    """Return expressions with others in the places of some of their parts."""
-    new: dict[Expr, Expr] = {}
-    for node in needed(exprs, instead):
-        args = tuple(new.get(a, a) for a in node.args)
-        if node in instead:
-            new[node] = instead[node]
-        elif args != node.args:
-            new[node] = graph.like(node, *args)
-    return [new.get(e, e) for e in exprs]
 
 
 def affine(expr: Expr, leaf: Expr) -> bool:

@@ -16,9 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ...expressions.bends import replaced_parts
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .pieces import LeafDerivative, affine, bend_places, replaced_parts, unreadable, zero_between
+from .pieces import LeafDerivative, affine, bend_places, unreadable, zero_between
 
 __all__ = ["Limits", "SecondOrder", "second_order"]
 

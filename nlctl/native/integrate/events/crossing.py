@@ -29,6 +29,7 @@ _GROWS = 100.0  # an error that is small by chance
 # of a step with a stage behind a condition: how much is left out
 _CLEARLY, _GAP, _MOST = 3.0, 1e-4, 0.05
 _NOTICED = 0.02  # the same where the step ends at a stop: a little less would be taken for it
+_LEAP = 10.0  # times the fastest rate
 _LEAST = 1e-12  # of the time: shorter steps are taken, by the explicit method, whatever stages see
 
 
@@ -175,6 +176,19 @@ def _costs_too_much(task, lane, w, j):
 
 
 @numba.njit(**INNER)
+def _leaps(task, lane, w, j):
+    """Whether a step has led where none of its rates leads, as a polynomial far behind does."""
+    for i in range(w.x.shape[0]):
+        fastest = 0.0
+        for s in range(w.k.shape[0]):
+            fastest = max(fastest, abs(w.k[s, i, j]))
+        away = abs(w.x_new[i, j] - w.x[i, j])
+        if not away <= _LEAP * lane.step * fastest + task.atol + task.rtol * abs(w.x[i, j]):
+            return True
+    return False
+
+
+@numba.njit(**INNER)
 def left_to_other_side(task, w, i, j):
     """Whether a step leads from where a condition is exactly 0 to where it has not come from."""
     is_condition = task.rows.declared <= i < task.rows.guarded
@@ -231,8 +245,12 @@ def next_try(task, lane, w, bad, j):
     close = _close(task, lane)
     root = _foreseen(task, lane, w, bad, j)
     if lane.high <= 2.0 * close and bad:  # right behind the start
-        lane.across, lane.traces, lane.tries = 1, 0, 0
-        return EVENT if np.isfinite(w.error[j]) else NOTHING
+        if task.fixed == 0.0 and _leaps(task, lane, w, j):
+            lane.whole, lane.misses = lane.high, 0  # what was tried first says nothing
+            close = _close(task, lane)
+        if lane.high <= 2.0 * close:
+            lane.across, lane.traces, lane.tries = 1, 0, 0
+            return EVENT if np.isfinite(w.error[j]) else NOTHING
     near = lane.high - lane.step <= 2.0 * close or 0.0 <= root - lane.step <= close
     if not bad and near:
         lane.traces = lane.tries = 0

@@ -1,0 +1,81 @@
+"""Whether a choice only bends what expressions are, or they jump where it switches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .evaluate import evaluate_expressions
+from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
+
+_POINTS = 256
+_TRUTHS = "truths"  # the array of values that say whether other conditions hold
+_NEAR = 0.1  # of a parameter
+_SAME = 1e-12
+
+
+def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
+    """Return whether nothing that expressions are made of jumps at a condition, with such p."""
+    if condition.op not in (*ORDERS, "sign") or condition.size is not None:
+        return False
+    one, *rest = map(graph.number, condition.args)
+    other = rest[0] if rest else graph.const(0.0)
+    on_it = {one: other} if one.varies else {other: one}
+    free = _free(graph, roots, condition, on_it)
+    sides = [
+        replaced_parts(graph, roots, {**on_it, **free, condition: graph.const(side)})
+        for side in ((True, False) if rest else (1.0, -1.0))
+    ]
+    pairs = [pair for pair in zip(*sides, strict=True) if pair[0] is not pair[1]]
+    exprs = [expr for pair in pairs for expr in pair]
+    try:
+        values = evaluate_expressions(exprs, _at_random(exprs, p))
+    except Untraceable:
+        return False
+    apart = zip(values[::2], values[1::2], strict=True)
+    with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
+        return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
+
+
+def _free(
+    graph: Graph, roots: Sequence[Expr], condition: Expr, on_it: Mapping[Expr, Expr]
+) -> dict[Expr, Expr]:
+    """Return what stands for the other conditions: true or false, whatever they ask for."""
+    # What is met only rarely would not be met by values at random. Only those that parameters alone
+    # decide, where this condition switches, are what they are.
+    others = [n for n in needed(roots) if n.op in COMPARISONS and n is not condition]
+    truths: dict[Expr, Expr] = {}
+    row = 0
+    for node, there in zip(others, replaced_parts(graph, others, on_it), strict=True):
+        leaves = (e for e in needed([there]) if e.op in ("leaf", "call", "solve"))
+        if any(leaf.op != "leaf" or leaf.data[0] != "p" for leaf in leaves):
+            where = (_TRUTHS, row, 1 if node.size else 0)
+            truth = graph.node("leaf", data=where, size=node.size, varies=True)
+            truths[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
+    return truths
+
+
+def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:
+    """Return values for all that expressions read."""
+    rng, rows = np.random.default_rng(1), dict.fromkeys(("t", "x", "u", _TRUTHS), 1)
+    for node in needed(exprs):
+        if node.op == "leaf" and node.data[0] in rows:
+            array, start, step = node.data
+            rows[array] = max(rows[array], start + step * ((node.size or 1) - 1) + 1)
+    arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
+    size = np.where((p == 0.0) | ~np.isfinite(p), 1.0, np.abs(p))[:, None]
+    arrays["p"] = p[:, None] + _NEAR * size * rng.normal(size=(p.size, _POINTS))
+    return arrays
+
+
+def replaced_parts(graph: Graph, exprs: Sequence[Expr], instead: Mapping[Expr, Expr]) -> list[Expr]:
+    """Return expressions with others in the places of some of their parts."""
+    new: dict[Expr, Expr] = {}
+    for node in needed(exprs, instead):
+        args = tuple(new.get(a, a) for a in node.args)
+        if node in instead:
+            new[node] = instead[node]
+        elif args != node.args:
+            new[node] = graph.like(node, *args)
+    return [new.get(e, e) for e in exprs]
