@@ -337,7 +337,10 @@ def _check_has_equations(spec: Any) -> None:
     if isinstance(spec, type):
         raise BlockError(f"{spec.__name__} is a class: make a record of it first")
     if isinstance(spec, str):
-        raise BlockError(f"block needs a record and then its name, got the text {spec!r} first")
+        raise BlockError(
+            f"str is not a block: a record is needed here, got the text {spec!r}; block takes the "
+            "record first, and then its name"
+        )
     needed = ["inputs", "outputs", "states", "feedthrough", "output"]
     needed += ["update"] if getattr(spec, "states", ()) else []
     if hasattr(spec, "guard") != hasattr(spec, "reset"):

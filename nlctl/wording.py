@@ -34,4 +34,8 @@ def nearest(name: str, known: Iterable[str], most: int, cutoff: float) -> list[s
     for option in known:
         plain.setdefault(option.lower(), []).append(option)
     near = difflib.get_close_matches(name.lower(), plain, n=most, cutoff=cutoff)
-    return list(dict.fromkeys(option for text in near for option in plain[text]))[:most]
+
+    def apart(option: str) -> float:
+        return -difflib.SequenceMatcher(a=option, b=name).ratio()
+
+    return [option for text in near for option in sorted(plain[text], key=apart)][:most]

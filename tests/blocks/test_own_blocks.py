@@ -57,7 +57,7 @@ def test_equations_that_cannot_be_called_are_named_with_their_place(equations, t
 
 
 def test_a_name_in_front_and_arguments_without_names_are_refused():
-    with pytest.raises(nlctl.errors.BlockError, match="a record and then its name, got the text"):
+    with pytest.raises(nlctl.errors.BlockError, match="block takes the record first"):
         nlctl.block("zone", nlctl.DeadZone())
     with pytest.raises(
         nlctl.errors.UnknownKeywordError, match=r"by name, DeadZone\(slope_r=\.\.\."

@@ -167,9 +167,9 @@ def test_an_audit_resolves_parameters_once_and_not_at_each_evaluation(
 ):
     """Each evaluation would cost the square of the number of blocks."""
     compiled = nlctl.compile(ring(12, third_party))
-    counted, right = [], kind.taken
+    counted, right = [], kind._taken
     monkeypatch.setattr(
-        kind, "taken", lambda self, params: counted.append(1) or right(self, params)
+        kind, "_taken", lambda self, params: counted.append(1) or right(self, params)
     )
     found = {}
     for wanted in (False, "every run"):

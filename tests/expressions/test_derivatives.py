@@ -309,10 +309,3 @@ def test_the_derivative_of_nan_is_nan():
     compiled = nlctl.compile(half)
     assert compiled.linearize([1.0]).A == -1.0
     assert np.isnan(compiled.linearize([-1.0]).A)
-
-
-def test_one_state_without_an_input_is_refused():
-    """python-control has no such StateSpace, and says so in words about matrices."""
-    decay = ct.nlsys(lambda t, x, u, p: [-x[0]], states=1, inputs=0, name="decay")
-    with pytest.raises(UsageError, match="'decay' has: give the diagram an input"):
-        nlctl.compile(decay).linearize([1.0])

@@ -12,6 +12,7 @@ from nlctl.native import audit
 from nlctl.native.codegen import interpret
 from nlctl.native.codegen.ir import numbers
 from nlctl.native.equations.reader import Reader
+from nlctl.native.purity.captured import CapturedValues
 
 TIMES = np.linspace(0, 1, 11)
 N = 12
@@ -230,7 +231,7 @@ def test_loops_that_python_control_does_not_solve_are_compared_block_by_block(mo
     y, v = run.outputs
     np.testing.assert_allclose(v, 0.5 * y - np.tanh(y), atol=1e-12)
     monkeypatch.setattr(static, "outfcn", lambda t, x, u, params: 0.5 * u + np.tanh(u))
-    object.__setattr__(compiled.schedule, "captured", ())
+    monkeypatch.setattr(CapturedValues, "changed", lambda self: None)
     with pytest.raises(AuditError, match=r"of block '(static|inner\.plant)'"):
         nlctl.input_output_response(compiled, TIMES, 1.0, [1.0], audit="every run")
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numba.core import config
 from scipy.integrate import solve_ivp
+from scipy.special import gammaln
 
 import nlctl
 from nlctl.native import Status, uninterrupted
@@ -313,9 +314,7 @@ class TestWorkPrecision:
 
 def raising(t, x, u, params):
     """It cannot be traced, and raises an error from a certain time on."""
-    value = x[0]
-    while value > 2.0:
-        value = value - 1.0
+    value = x[0] + 0.0 * gammaln(2.0 + abs(x[0]))
     if t > 0.5:
         raise ValueError("too late")
     return [-value]

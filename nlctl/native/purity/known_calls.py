@@ -390,5 +390,7 @@ def _call_functions(walk: Walk, values: Any) -> None:
         thing = value.known
         if isinstance(thing, Unknown | type | Pure):
             continue
-        if isinstance(thing, Local | Bound | OneOf | Instance) or callable(thing):
+        if isinstance(thing, OneOf):  # some of them may be lists
+            _call_functions(walk, thing.choices)
+        elif isinstance(thing, Local | Bound | Instance) or callable(thing):
             walk.call(value, [OUTSIDE] * 8, {})

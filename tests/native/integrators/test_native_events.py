@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numba.core import config
 from scipy.integrate import quad
+from scipy.special import gammaln
 
 import nlctl
 from nlctl.native import Status
@@ -58,9 +59,7 @@ class Hidden(Kink):
 
     @staticmethod
     def output(t, x, u, p):
-        height = float(u[0])
-        while height > 1e9:
-            height = height - 1.0
+        height = float(u[0]) + 0.0 * gammaln(2.0 + abs(u[0]))
         return (height - 1.0 if height > 1.0 else 0.0,)
 
 
