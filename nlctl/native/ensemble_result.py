@@ -159,7 +159,7 @@ class Ensemble:
         """Return the signals that a plot shows."""
         if not self.signals:
             raise ParameterError(
-                "no signal was kept: ensemble_response(..., keep=['y']) keeps the samples of y"
+                "no signal was kept: ensemble_response(..., keep=[...]) keeps outputs of a diagram"
             )
         names = [signals] if isinstance(signals, str) else signals
         names = list(self.signals if names is None else names)

@@ -33,6 +33,7 @@ from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
 from .methods.stiff import UNKNOWN, stiff_attempt
+from .methods.turn import is_to_change
 from .resets import fall
 from .restart import memory_rates, restart
 from .samples import begin_afresh, next_stop, pass_jumps, take_samples
@@ -279,7 +280,7 @@ def advance(rhs, point, along, task, w, rounds):
         if rows.ways.size:
             _note_jumps(task, lanes, w, done)
             _look_at_inputs(task, lanes, w)
-        if lanes[0].status == RUNNING and taylor.is_to_change(task, lanes[0]):
+        if lanes[0].status == RUNNING and is_to_change(task, lanes[0]):
             lanes[0].status = METHOD
             return
 

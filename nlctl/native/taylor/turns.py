@@ -20,7 +20,8 @@ import numpy as np
 from ...errors import ParameterError
 from ..integrate.memory import with_fields
 from ..integrate.methods.tableau import pair_of
-from ..integrate.methods.taylor import FIRST_TURN, MEASURED, OTHER_METHOD, SLOPES, new_terms
+from ..integrate.methods.taylor import OTHER_METHOD, SLOPES, new_terms
+from ..integrate.methods.turn import FIRST_TURN, MEASURED
 from ..integrate.state import DIVERGED, METHOD, RUNNING, STEP_TOO_SMALL
 from ..integrate.workspace import with_stages
 from ..reading import Reading

@@ -522,3 +522,17 @@ def test_parameters_change_without_compiling_again():
         )
         assert np.max(np.abs(found - exact)) < 1e-8
     assert len(compiled.cache.of(Series)) == 1
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_what_is_passed_and_passed_back_in_one_step(rtol):
+    """max(y, 0) with y = (t - 1) (t - 1.4): a step from right behind 1 would end behind 1.4."""
+    kink = ct.nlsys(
+        lambda t, x, u, p: [2 * t - 2.4, max(x[0], 0.0)], lambda t, x, u, p: x, inputs=0,
+        outputs=2, states=2, name="kink",
+    )  # fmt: skip
+    made = nlctl.input_output_response(kink, [0, 3], 0, [1.4, 0.0], method="taylor", rtol=rtol)
+    assert np.allclose(made.events["time"], [1.0, 1.4], rtol=0, atol=100 * rtol)
+    whole = np.polyint([1.0, -2.4, 1.4])
+    area = np.polyval(whole, 1.0) - np.polyval(whole, 1.4) + np.polyval(whole, 3.0)
+    assert abs(made.states[1, -1] - area) < 10 * rtol

@@ -27,9 +27,7 @@ from ..events.location import SMALL_KINK, behind_event, triggered
 from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
 
-FIRST_TURN = 20  # steps after which it is judged whether this method pays
 SLOPES = 2  # slopes at both ends of a step
-MEASURED = 50  # the last explicit steps before that
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
@@ -123,41 +121,6 @@ def _lacks_terms(task, w, j):
         for k in range(2, task.taylor.highest + 1):
             lacks |= not np.isfinite(taylor.terms[k, i, j])
     return lacks
-
-
-@numba.njit(**INNER)
-def is_to_change(task, lane):
-    """Whether a run of the method "auto" is to go on by Taylor's method, or not any more.
-
-    Both are measured in turn, see `nlctl.native.taylor.turns`.
-    """
-    if task.taylor.span == 0:
-        return False
-    if lane.stiff:
-        lane.from_t, lane.from_tried = lane.t, lane.accepted + lane.rejected
-        return False
-    tried = lane.accepted + lane.rejected - lane.from_tried
-    if task.taylor.highest == 0 and lane.span - tried >= MEASURED:
-        lane.from_t, lane.from_accepted = lane.t, lane.accepted
-    if task.taylor.highest and tried % FIRST_TURN == 0:
-        stays = 2 * (lane.accepted - lane.from_accepted) < FIRST_TURN  # at a place
-        lane.from_accepted = lane.accepted
-        if stays:
-            lane.span = FIRST_TURN
-            return True
-    if lane.tries > 0 or lane.cross > 0.0 or tried < lane.span:
-        return False
-    work = task.taylor.cost * tried if task.taylor.highest else min(tried, MEASURED)
-    lane.pace = (lane.t - lane.from_t) / work
-    if task.taylor.highest == 0:
-        if 2 * (lane.accepted - lane.from_accepted) >= MEASURED:
-            return lane.slow == 0
-        lane.from_tried = lane.accepted + lane.rejected  # at a place that it does not leave
-        return False
-    if lane.span > FIRST_TURN or lane.pace < lane.other_pace:
-        return True
-    lane.span = task.taylor.span
-    return False
 
 
 @numba.njit(**INNER)
@@ -256,9 +219,27 @@ def _aim(task, lanes, w):
                 part = _behind(task, lane, i, _root(task, w, i, lane.step, j))
                 if part > _BRIEF or i >= task.rows.declared:
                     first = min(first, part)
+            elif i < task.rows.declared and opposite(w.events.g_start[i, j], w.ahead.g[i, j]):
+                first = min(first, _farthest(task, w, i, lane.step, j))
         if 0.0 < first < 1.0:
             lane.step *= first
             lane.ends = 0
+
+
+@numba.njit(**INNER)
+def _farthest(task, w, i, h, j):
+    """Return the part of a step h at which it is farthest behind the event that it begins with.
+
+    It goes back through that event in the step, which is none of its own from so near to it; 1 if
+    it is behind nowhere.
+    """
+    p, row, start = task.taylor.highest - 1, w.x.shape[0] + i, w.events.g_start[i, j]
+    part, most = 1.0, abs(start) + SMALL_KINK * task.atol
+    for n in range(1, _LOOKS):
+        f = _value_and_slope(p, n / _LOOKS * h, w.taylor.terms, row, j)[0]
+        if abs(f) > most and not opposite(start, f):
+            part, most = n / _LOOKS, abs(f)
+    return part
 
 
 @numba.njit(**INNER)
