@@ -37,7 +37,7 @@ def test_code_that_exports_runs():
     exec(compile(code, "export.md", "exec"), {})
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 def test_the_page_on_fmus_says_what_is_so(tmp_path, monkeypatch):
     """Its command writes the file that it says, for all platforms, and its code runs."""
     needed("fmpy", "export")

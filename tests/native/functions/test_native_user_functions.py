@@ -2,6 +2,7 @@
 
 import pytest
 import user_functions
+from examples import some
 from numba.core import config
 from user_function_checks import GOOD, judged
 from user_function_native import accepted, run
@@ -85,8 +86,8 @@ def size(n):
 @machine_code
 @pytest.mark.parametrize("n", [size(n) for n in user_functions.SIZES])
 def test_traced_functions_in_one_diagram_in_machine_code(n):
-    """Alone, side by side, and in a short run."""
-    found = report("joint", n, accepted(n, opaque=False))
+    """Alone, side by side, and in a short run: a third of them, and once a week all."""
+    found = report("joint", n, some(accepted(n, opaque=False)))
     assert {kind for kind, _ in found.values()} == {"equal"}
 
 
