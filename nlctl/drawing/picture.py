@@ -297,6 +297,11 @@ class Drawing(Figure):
     The same drawing gives the same bytes, so that notebooks under version control stay quiet.
     """
 
+    def set_layout_engine(self, layout: Any = None, **kwargs: Any) -> None:
+        """Choose how axes are arranged; everything has its place, so by default not at all."""
+        # Matplotlib restores "none" as None behind a save, and takes that from its settings.
+        super().set_layout_engine("none" if layout is None else layout, **kwargs)
+
     def _repr_svg_(self) -> str:
         buffer = io.StringIO()
         with mpl.rc_context({"svg.hashsalt": "nlctl", "svg.fonttype": "path"}):

@@ -535,3 +535,12 @@ def test_a_notebook_shows_the_drawing_as_vectors():
     root = ElementTree.fromstring(shown[0]).find("{http://www.w3.org/2000/svg}svg")
     assert root is not None
     assert len(root.findall(".//{http://www.w3.org/2000/svg}path")) > 50
+
+
+@pytest.mark.parametrize("setting", ["figure.constrained_layout.use", "figure.autolayout"])
+def test_settings_that_arrange_axes_move_no_drawing(setting):
+    """Matplotlib takes its settings anew behind each save; a warning is an error here."""
+    with matplotlib.rc_context({setting: True}):
+        figure = nlctl.draw(nlctl.paper.example_1())
+        first = figure._repr_svg_()
+        assert figure._repr_svg_() == first
