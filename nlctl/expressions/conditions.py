@@ -73,13 +73,19 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
     return _at_integers(graph, counted, _OF_INTEGERS.get(op, 0.0))
 
 
-def factors(function: Expr) -> tuple[Expr, ...]:
+def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
+    """Return what changes its sign where a condition switches, of a product each factor."""
+    function = switching_function(graph, condition)
+    return (function,) if at_integers(condition) else _factors(function)
+
+
+def _factors(function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
     if function.op == "neg":
-        return factors(function.args[0])
+        return _factors(function.args[0])
     if function.op != "mul" or function.args[0] is function.args[1]:
         return (function,)
-    parts = [part for arg in function.args if arg.varies for part in factors(arg)]
+    parts = [part for arg in function.args if arg.varies for part in _factors(arg)]
     return tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
 
 

@@ -300,3 +300,28 @@ def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
     assert list(together["status"]) == np.where(abs(c) < 1, "CHATTERING", "OK").tolist()
     for k in (0, 3, 8):
         assert table(c[k : k + 1]).iloc[0].tolist() == together.iloc[k].tolist()
+
+
+@pytest.mark.parametrize("method", [None, "rodas5p", "taylor"])
+def test_a_staircase_is_climbed(method):
+    """Steps of 2^-10 that a ramp meets one after the other are no chattering: 2048 of them."""
+    q = 2.0**-10
+    stairs = ct.nlsys(
+        lambda t, x, u, p: [1.0, p["q"] * np.floor(x[0] / p["q"])], lambda t, x, u, p: x,
+        inputs=0, outputs=2, states=2, params={"q": q}, name="stairs",
+    )  # fmt: skip
+    made = nlctl.input_output_response(stairs, [0, 2], 0, [q / 4, 0.0], method=method)
+    assert np.allclose(made.events["time"], q * (np.arange(1, 2049) - 0.25), rtol=0, atol=1e-8)
+    assert abs(made.states[1, -1] - q**2 * (2047 * 2048 / 2 + 2048 / 4)) < 1e-8
+
+
+def test_a_quantised_sine_runs_to_its_end():
+    """It goes up and down over the same steps, by 2^-12."""
+    q = 2.0**-12
+    loop = ct.nlsys(
+        lambda t, x, u, p: [np.cos(t), p["q"] * np.round(x[0] / p["q"])], lambda t, x, u, p: x,
+        inputs=0, outputs=2, states=2, params={"q": q}, name="loop",
+    )  # fmt: skip
+    made = nlctl.input_output_response(loop, [0, 2 * np.pi], 0, 0)
+    assert len(made.events) == 4 * (2**12)
+    assert abs(made.states[1, -1]) < 1e-7

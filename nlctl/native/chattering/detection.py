@@ -4,7 +4,8 @@ Where the solutions on both sides of a jump lead back to it, there is no step th
 accepts and that leaves it: a run makes ever more of the shortest steps.  Three things together
 tell that from stiffness and from fast oscillations:
 
-* by what it moves in a mean step, a state changes by no more than some tolerances;
+* by what it moves in a mean step, a state changes by no more than some tolerances: the next step of
+  a staircase is farther away;
 * of the last steps tried many contain a jump, of the right-hand side or of what a memory becomes;
 * halving the way across, down to neighbouring numbers, does not make it smaller, and next to it on
   both sides there is none, as there is with rounding;
@@ -113,7 +114,9 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     extent = slopes.max(axis=0) - slopes.min(axis=0)
     scale = task.atol + task.rtol * np.abs(states).max(axis=0)
     step = (run.lanes["t"][j] - attempts[0].t[j]) / len(attempts)
-    if not np.all(step * extent <= _WITHIN * scale):
+    moved = np.ptp(states, axis=0) / np.unique([a.t[j] for a in attempts]).size
+    moved[task.rows.memory] = 0.0  # these jump
+    if not np.all(np.maximum(step * extent, moved) <= _WITHIN * scale):
         return None
     evaluated = _Places(run=run, j=j, c=c)
     weights = np.zeros(extent.size + task.rows.memory.size)

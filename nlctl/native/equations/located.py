@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
-from ...expressions.conditions import conditions, factors, switching_function
+from ...expressions.conditions import conditions, switching_functions
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
 from ..diagram.nodes import Node
@@ -98,7 +98,7 @@ def found_conditions(
             continue
         path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
-        for function in factors(switching_function(reader.graph, condition)):
+        for function in switching_functions(reader.graph, condition):
             key, size = _key(function), function.size or 1
             if key in located:
                 both = bends and located[key].bends
