@@ -38,6 +38,7 @@ PROBE = 200  # steps tried that are looked at, at the end of a window
 _PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
 _JUMPS = 10  # of them with a jump
 _WITHIN = 100.0  # tolerances that a state moves in a mean step
+_FARTHER = 10.0  # times as far in an accepted step
 _SLOW = 0.1  # part of the longest window
 _LONG = 8  # windows after which a run is looked at that has not become slow
 _LEAST = 0.1  # part of the range of the right-hand side that counts as a jump
@@ -114,7 +115,7 @@ def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump
     extent = slopes.max(axis=0) - slopes.min(axis=0)
     scale = task.atol + task.rtol * np.abs(states).max(axis=0)
     step = (run.lanes["t"][j] - attempts[0].t[j]) / len(attempts)
-    moved = np.ptp(states, axis=0) / np.unique([a.t[j] for a in attempts]).size
+    moved = np.ptp(states, axis=0) / (_FARTHER * np.unique([a.t[j] for a in attempts]).size)
     moved[task.rows.memory] = 0.0  # these jump
     if not np.all(np.maximum(step * extent, moved) <= _WITHIN * scale):
         return None
