@@ -300,7 +300,8 @@ class Drawing(Figure):
     def set_layout_engine(self, layout: Any = None, **kwargs: Any) -> None:
         """Choose how axes are arranged; everything has its place, so by default not at all."""
         # Matplotlib restores "none" as None behind a save, and takes that from its settings.
-        super().set_layout_engine("none" if layout is None else layout, **kwargs)
+        chosen: Any = "none" if layout is None else layout
+        super().set_layout_engine(chosen, **kwargs)
 
     def _repr_svg_(self) -> str:
         buffer = io.StringIO()
