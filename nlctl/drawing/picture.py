@@ -10,7 +10,7 @@ import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any
+from typing import Any, cast
 
 import control as ct
 import matplotlib as mpl
@@ -203,7 +203,7 @@ def draw(
     panels = list(_panels(diagram, title or "", "", expand))
     width = max([_WIDTH, *(panel.layout.width + 2 * MARGIN for panel in panels)])
     height = sum(panel.height for panel in panels)
-    figure = Drawing(figsize=(width / 72, height / 72), facecolor="white", layout="none")
+    figure = Drawing(figsize=(width / 72, height / 72), facecolor="white")
     bottom = height
     for panel in panels:
         bottom -= panel.height
@@ -300,7 +300,7 @@ class Drawing(Figure):
     def set_layout_engine(self, layout: Any = None, **kwargs: Any) -> None:
         """Choose how axes are arranged; everything has its place, so by default not at all."""
         # Matplotlib restores "none" as None behind a save, and takes that from its settings.
-        chosen: Any = "none" if layout is None else layout
+        chosen = cast(Any, "none" if layout is None else layout)
         super().set_layout_engine(chosen, **kwargs)
 
     def _repr_svg_(self) -> str:
