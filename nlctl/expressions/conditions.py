@@ -25,15 +25,16 @@ JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arct
 def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions switch at, parts first."""
     roots = list(exprs)
-    always = {node for node in needed(roots, known) if is_of_infinity(node)}
-    nodes = needed(roots, {*known, *always})
-    return tuple(node for node in nodes if node.varies and node not in known and _switches(node))
+    always = (n for n in needed(roots, known) if n.op in ORDERS and _is_of_infinity(n))
+    passed = {*known, *always}  # what has one value, whatever is compared
+    nodes = needed(roots, passed)
+    return tuple(node for node in nodes if node.varies and node not in passed and _switches(node))
 
 
 def _switches(node: Expr) -> bool:
     if node.op in _OF_DIFFERENCES:
         moves = any(arg.varies for arg in node.args)
-        return moves and not _of_truths(node) and not is_of_infinity(node)
+        return moves and not _of_truths(node) and not _is_of_infinity(node)
     return (
         node.op in _OF_SIGNS
         or node.op in _OF_FIRSTS
@@ -47,8 +48,8 @@ def at_integers(node: Expr) -> bool:
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
 
 
-def is_of_infinity(node: Expr) -> bool:
-    """Return whether an operation compares with infinity: with all numbers it gives the same."""
+def _is_of_infinity(node: Expr) -> bool:
+    """Return whether an operation compares with infinity: which is larger never changes."""
     return node.op in _OF_DIFFERENCES and any(
         arg.op == "const" and abs(arg.data) == math.inf for arg in node.args
     )

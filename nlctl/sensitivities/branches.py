@@ -11,8 +11,8 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..expressions.conditions import JUMPING, is_of_infinity
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.conditions import JUMPING, conditions
+from ..expressions.graph import Expr, Graph
 
 _ORDERS = {"gt": 1.0, "ge": 1.0, "lt": -1.0, "le": -1.0}
 _WHOLE = ("floor", "ceil", "trunc", "rint")
@@ -34,11 +34,7 @@ class Branch:
 
 def jumping(exprs: Iterable[Expr]) -> list[Expr]:
     """Return the operations that may jump in expressions, parts first."""
-    nodes = needed(exprs)
-    return [
-        n for n in nodes
-        if n.varies and n.op in _JUMPS and any(a.varies for a in n.args) and not is_of_infinity(n)
-    ]  # fmt: skip
+    return [node for node in conditions(exprs) if node.op in _JUMPS]
 
 
 def branch_of(graph: Graph, op: str, args: Sequence[Expr], kept: Expr) -> Branch:

@@ -301,3 +301,22 @@ def test_a_condition_that_is_always_0_is_no_event():
     made = nlctl.input_output_response(loop, np.linspace(0, 10, 11), 0, 0, engine="native")
     np.testing.assert_allclose(made.states[2], 1.5 * np.linspace(0, 10, 11) ** 2, rtol=1e-8)
     assert made.statistics.accepted + made.statistics.rejected < 500
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize(
+    "bounded",
+    [
+        lambda jump: np.clip(jump, -np.inf, np.inf),
+        lambda jump: np.minimum(jump, np.inf),
+        lambda jump: np.maximum(-np.inf, jump),
+    ],
+    ids=["clip", "minimum", "maximum"],
+)
+def test_what_jumps_within_infinite_bounds_is_located(bounded, method):
+    """x' = 1 until x = 1/4, then 3; the bounds themselves are no conditions."""
+    loop = plain(lambda t, x, u, p: [bounded(np.where(x[0] > 0.25, 3.0, 1.0))], [0.0])
+    compiled = nlctl.compile(loop)
+    made = nlctl.input_output_response(compiled, [0, 1], 0, 0, method=method)
+    assert made.statistics.conditions == len(made.events) == 1
+    assert abs(made.states[0, -1] - (0.25 + 3 * 0.75)) < 1e-9
