@@ -45,9 +45,9 @@ def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | Non
     if node.op == "concat":
         return graph.joined([(p or zero, n) for p, n in zip(parts, node.data, strict=True)])
     if node.op == "add":
-        return graph.op("add", a, b) if a and b else a or b
+        return _sum(graph, a, b)
     if node.op == "sub":
-        return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or zero)
+        return _difference(graph, a, b)
     if a is None:
         return None
     if node.op == "item":
@@ -56,6 +56,14 @@ def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | Non
         start, step = node.data
         return graph.part(a, start, step, node.size or 1)
     return graph.sum(a, node.args[0].size or 1) if node.op == "sum" else graph.op("neg", a)
+
+
+def _sum(graph: Graph, a: Expr | None, b: Expr | None) -> Expr | None:
+    return graph.op("add", a, b) if a and b else a or b
+
+
+def _difference(graph: Graph, a: Expr | None, b: Expr | None) -> Expr:
+    return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or graph.const(0.0))
 
 
 _LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum")
@@ -130,15 +138,11 @@ class _Reader:
     def _mul(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         left = self.graph.op("mul", a, node.args[1]) if a else None
         right = self.graph.op("mul", node.args[0], b) if b else None
-        return self.graph.op("add", left, right) if left and right else left or right
+        return _sum(self.graph, left, right)
 
     def _div(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr:
         """(a / b)' = (a' - (a / b) b') / b."""
-        change = self.graph.op("mul", node, b) if b else None
-        if a and change:
-            change = self.graph.op("sub", a, change)
-        else:
-            change = a or self.graph.op("neg", self._zero_if_none(change))
+        change = _difference(self.graph, a, self.graph.op("mul", node, b) if b else None)
         return self.graph.op("div", change, node.args[1])
 
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:

@@ -17,14 +17,13 @@ from typing import Any
 from .arrays import Tracer, traced
 from .graph import Expr, Graph, Untraceable
 from .library.python import is_of_arrays
-from .merged import Merger, names_of_choices
+from .merged import NAME, Merger, called, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _DIVIDING = ("div", "remainder", "fmod", "power")
 _KEYS = (int, float, bool)
-_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
 
 
@@ -73,13 +72,13 @@ class _Rewriter(ast.NodeTransformer):
             return node
         if any(isinstance(n, ast.Return) for part in node.finalbody for n in ast.walk(part)):
             raise Untraceable("a return within finally")
-        attempt = ast.With([ast.withitem(_called("attempt", []))], node.body)
+        attempt = ast.With([ast.withitem(called("attempt"))], node.body)
         return [ast.copy_location(attempt, node), *node.orelse, *node.finalbody]
 
     def visit_Dict(self, node: ast.Dict) -> Any:
         self.generic_visit(node)
         numbers = [k for k in node.keys if isinstance(k, ast.Constant) and type(k.value) in _KEYS]
-        return _called("numbered", [node]) if node.keys and len(numbers) == len(node.keys) else node
+        return called("numbered", node) if node.keys and len(numbers) == len(node.keys) else node
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -99,12 +98,8 @@ class _Rewriter(ast.NodeTransformer):
         strict = isinstance(test.ops[0], ast.Gt | ast.Lt)
         given = [ast.Name(name, ast.Load()), test.comparators[0], step,
                  ast.Constant(sign), ast.Constant(strict)]  # fmt: skip
-        assigned = ast.Assign([ast.Name(name, ast.Store())], _called("moved", given))
+        assigned = ast.Assign([ast.Name(name, ast.Store())], called("moved", *given))
         return [ast.copy_location(assigned, node), *node.orelse]
-
-
-def _called(name: str, given: list[ast.expr]) -> ast.Call:
-    return ast.Call(ast.Name(_NAME.format(name), ast.Load()), given, [])
 
 
 def _steps(node: ast.While) -> tuple[str, float, ast.Compare, ast.expr] | None:
@@ -138,9 +133,9 @@ def _is(name: str, node: ast.expr) -> bool:
 def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that a rewritten function has."""
     return names_of_choices(graph) | {
-        _NAME.format("numbered"): NumberKeys,
-        _NAME.format("attempt"): functools.partial(_Attempt, graph),
-        _NAME.format("moved"): functools.partial(_moved, graph),
+        NAME.format("numbered"): NumberKeys,
+        NAME.format("attempt"): functools.partial(_Attempt, graph),
+        NAME.format("moved"): functools.partial(_moved, graph),
     }
 
 

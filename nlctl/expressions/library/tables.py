@@ -28,6 +28,11 @@ def _constants(graph: Graph, values: Any, what: str) -> np.ndarray:
     return np.array([e.data for e in elements], dtype=float)
 
 
+def constants(graph: Graph, values: np.ndarray) -> Any:
+    """Return an array of numbers as one of constants."""
+    return np.frompyfunc(lambda v: graph.const(float(v)), 1, 1)(values)
+
+
 def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequence[Expr]) -> Expr:
     """Return the piece of the interval of x: the first below all bounds, by halving."""
     if len(pieces) == 1:

@@ -295,7 +295,7 @@ def vector_stepper(
     [ 0.393469 -0.393469]
     """
     size = integer("vector_stepper", "size", size, at_least=1)
-    given = {"method": method, "max_steps": max_steps, "max_step": max_step, "step": step}
-    settings = {name: value for name, value in given.items() if value is not None}
-    limits = {"rtol": rtol, "atol": atol, "audit": audit}
-    return VectorStepper(as_compiled(system), dt, size, **limits, **settings)
+    return VectorStepper(
+        as_compiled(system), dt, size, method=method, rtol=rtol, atol=atol, max_steps=max_steps,
+        max_step=max_step, step=step, audit=audit,
+    )  # fmt: skip
