@@ -17,7 +17,7 @@ from .arrays import Tracer, scalar, traced
 from .graph import Expr, Graph, Untraceable
 from .operators import elementwise
 
-NAME = "{}@traced"  # of what stands for statements: no name that anybody has
+INSTEAD_NAME = "{}@traced"  # of what stands for statements: no name that anybody has
 _BINDING = (ast.NamedExpr, ast.Yield, ast.YieldFrom, ast.Await)
 _Values = dict[str, tuple[ast.expr, ast.expr]]  # of what is assigned: where, and what
 
@@ -42,7 +42,7 @@ class Merger(ast.NodeTransformer):
         self.generic_visit(node)
         if any(isinstance(n, _BINDING) for n in ast.walk(node)):
             return node
-        return called("choice", _truth(node.test), _later(node.body), _later(node.orelse))
+        return call_instead("choice", _truth(node.test), _later(node.body), _later(node.orelse))
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
@@ -57,7 +57,7 @@ class Merger(ast.NodeTransformer):
         targets = [target for target, _, _ in values]
         branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
         branches = [self.visit(ast.parse(ast.unparse(b), mode="eval").body) for b in branches]
-        chosen = called("choices", node.test, *map(_later, branches))
+        chosen = call_instead("choices", node.test, *map(_later, branches))
         is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
         stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
         whole = [asked, ast.Assign([ast.Name(result, ast.Store())], chosen),
@@ -135,9 +135,9 @@ def _truth(test: ast.expr) -> ast.expr:
     """Return a test whose parts are asked without a decision, where that is possible."""
     if isinstance(test, ast.BoolOp):
         kind = ast.Constant("and" if isinstance(test.op, ast.And) else "or")
-        return called("logic", kind, *(_later(_truth(v)) for v in test.values))
+        return call_instead("logic", kind, *(_later(_truth(v)) for v in test.values))
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        return called("opposite", _truth(test.operand))
+        return call_instead("opposite", _truth(test.operand))
     if isinstance(test, ast.Compare) and len(test.ops) > 1:
         sides = [test.left, *test.comparators]
         pairs = [ast.Compare(a, [op], [b]) for a, op, b in zip(sides, test.ops, sides[1:],
@@ -151,9 +151,9 @@ def _later(value: ast.expr) -> ast.Lambda:
     return ast.Lambda(nothing, value)
 
 
-def called(name: str, *given: ast.expr) -> ast.Call:
+def call_instead(name: str, *given: ast.expr) -> ast.Call:
     """Return the call of what stands for statements."""
-    return ast.Call(ast.Name(NAME.format(name), ast.Load()), list(given), [])
+    return ast.Call(ast.Name(INSTEAD_NAME.format(name), ast.Load()), list(given), [])
 
 
 # -- what is written instead of branches -----------------------------------------------------------
@@ -162,7 +162,7 @@ def called(name: str, *given: ast.expr) -> ast.Call:
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
     functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite}
-    return {NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
+    return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
 def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:

@@ -17,7 +17,7 @@ from typing import Any
 from .arrays import Tracer, traced
 from .graph import Expr, Graph, Untraceable
 from .library.python import is_of_arrays
-from .merged import NAME, Merger, called, names_of_choices
+from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
 
@@ -72,13 +72,15 @@ class _Rewriter(ast.NodeTransformer):
             return node
         if any(isinstance(n, ast.Return) for part in node.finalbody for n in ast.walk(part)):
             raise Untraceable("a return within finally")
-        attempt = ast.With([ast.withitem(called("attempt"))], node.body)
+        attempt = ast.With([ast.withitem(call_instead("attempt"))], node.body)
         return [ast.copy_location(attempt, node), *node.orelse, *node.finalbody]
 
     def visit_Dict(self, node: ast.Dict) -> Any:
         self.generic_visit(node)
         numbers = [k for k in node.keys if isinstance(k, ast.Constant) and type(k.value) in _KEYS]
-        return called("numbered", node) if node.keys and len(numbers) == len(node.keys) else node
+        return (
+            call_instead("numbered", node) if node.keys and len(numbers) == len(node.keys) else node
+        )
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -98,7 +100,7 @@ class _Rewriter(ast.NodeTransformer):
         strict = isinstance(test.ops[0], ast.Gt | ast.Lt)
         given = [ast.Name(name, ast.Load()), test.comparators[0], step,
                  ast.Constant(sign), ast.Constant(strict)]  # fmt: skip
-        assigned = ast.Assign([ast.Name(name, ast.Store())], called("moved", *given))
+        assigned = ast.Assign([ast.Name(name, ast.Store())], call_instead("moved", *given))
         return [ast.copy_location(assigned, node), *node.orelse]
 
 
@@ -133,9 +135,9 @@ def _is(name: str, node: ast.expr) -> bool:
 def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that a rewritten function has."""
     return names_of_choices(graph) | {
-        NAME.format("numbered"): NumberKeys,
-        NAME.format("attempt"): functools.partial(_Attempt, graph),
-        NAME.format("moved"): functools.partial(_moved, graph),
+        INSTEAD_NAME.format("numbered"): NumberKeys,
+        INSTEAD_NAME.format("attempt"): functools.partial(_Attempt, graph),
+        INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
     }
 
 

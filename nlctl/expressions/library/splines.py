@@ -12,7 +12,7 @@ from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .surfaces import surface
 from .table import enter
-from .tables import MOST_PIECES, constants, interval_choice, polynomial
+from .tables import MOST_PIECES, constant_cells, interval_choice, polynomial
 
 
 def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
@@ -252,7 +252,7 @@ def at_grid(graph: Graph, points: Any, values: Any, xi: Any, *rest: Any, **optio
 
 
 def _on_grid(graph: Graph, thing: Any, values: np.ndarray, x: Sequence[Expr]) -> Expr:
-    cells: Any = constants(graph, values)
+    cells: Any = constant_cells(graph, values)
     for axis in range(len(x) - 1, -1, -1):
         places = np.asarray(thing.grid[axis], dtype=float)
         reduced = np.empty(cells.shape[:-1], dtype=object)

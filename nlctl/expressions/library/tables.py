@@ -28,7 +28,7 @@ def _constants(graph: Graph, values: Any, what: str) -> np.ndarray:
     return np.array([e.data for e in elements], dtype=float)
 
 
-def constants(graph: Graph, values: np.ndarray) -> Any:
+def constant_cells(graph: Graph, values: np.ndarray) -> Any:
     """Return an array of numbers as one of constants."""
     return np.frompyfunc(lambda v: graph.const(float(v)), 1, 1)(values)
 
