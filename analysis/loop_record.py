@@ -122,7 +122,7 @@ def _parts(system: System) -> list[Any]:
     if isinstance(system, ct.StateSpace):
         return [[system.A, system.B, system.C, system.D], timebase]
     if isinstance(system, ct.TransferFunction):
-        arrays = system.num_array, system.den_array
+        arrays: Any = system.num_array, system.den_array
         return [*([np.asarray(p).tolist() for p in np.ravel(a)] for a in arrays), timebase]
     functions = [getattr(system, name, None) for name in ("updfcn", "outfcn")]
     signals = [system.input_labels, system.output_labels, system.state_labels]

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 from numba.extending import register_jitable
 
 from .errors import ParameterError
 from .params import EQUATION
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
-def equation(function: _Function) -> _Function:
+# typed as what it is in a record, whose equations are static; elsewhere it is called alike
+def equation(function: Callable[_P, _R]) -> staticmethod[_P, _R]:
     """Mark a function as an equation of a block.
 
     An equation is written once, in plain Python and NumPy, and read by everybody: python-control
@@ -51,4 +53,4 @@ def equation(function: _Function) -> _Function:
         raise ParameterError(f"equation needs a function, got {type(function).__name__}")
     if isinstance(function, FunctionType):
         setattr(function, EQUATION, True)
-    return register_jitable(function)
+    return cast(Any, register_jitable(function))

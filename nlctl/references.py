@@ -84,6 +84,7 @@ class SumOfSines(_Reference):
                 "{}, {} and {}".format(*sizes)
             )
 
+    @staticmethod
     @equation
     def output(t, x, u, p):
         """The k-th derivative of sin is a shift of the phase by k pi / 2."""

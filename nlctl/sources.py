@@ -275,6 +275,7 @@ class Chirp(_Source):
             return {"rate": 0.0}
         return {"rate": float(np.log(self.omega_1 / self.omega_0)) / self.t_1}
 
+    @staticmethod
     @equation
     def output(t, x, u, p):
         """The integral of the frequency, in three parts: before, within and behind the sweep."""

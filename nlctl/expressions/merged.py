@@ -140,8 +140,9 @@ def _truth(test: ast.expr) -> ast.expr:
         return call_instead("opposite", _truth(test.operand))
     if isinstance(test, ast.Compare) and len(test.ops) > 1:
         sides = [test.left, *test.comparators]
-        pairs = [ast.Compare(a, [op], [b]) for a, op, b in zip(sides, test.ops, sides[1:],
-                                                                strict=False)]  # fmt: skip
+        pairs: list[ast.expr] = [
+            ast.Compare(sides[i], [op], [sides[i + 1]]) for i, op in enumerate(test.ops)
+        ]
         return _truth(ast.BoolOp(ast.And(), pairs))
     return test
 

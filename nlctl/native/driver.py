@@ -74,7 +74,8 @@ def trajectory(
         outputs = finish(run)
     reached = replace(made(run, outputs, 0), happened=happened(compiled, run))
     reached = at_its_end(run, reached)
-    give_back(compiled.cache, run.spare)
+    if run.spare is not None:
+        give_back(compiled.cache, run.spare)
     return reached
 
 

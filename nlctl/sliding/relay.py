@@ -114,11 +114,13 @@ class IdealRelay:
     supplied = SLIDING
     no_split = "its output jumps at u = 0: |v| = height for all u, so |v| <= k u + eps has no k"
 
+    @staticmethod
     @equation
     def update(t: float, x: Any, u: Any, p: Any) -> Any:
         """The mode changes at events only."""
         return (0.0,)
 
+    @staticmethod
     @equation
     def output(t: float, x: Any, u: Any, p: Any) -> Any:
         """Next to u = 0 the side, with its height; on it what keeps u' = 0."""
@@ -129,12 +131,14 @@ class IdealRelay:
         beside = p.height * kept_mode(mode) * np.maximum(1.0, np.abs(mode))
         return (np.where(kept_mode(mode) == 0, keeping, beside),)
 
+    @staticmethod
     @equation
     def commit(t: float, x: Any, u: Any, p: Any) -> Any:
         """The mode."""
         (mode,) = x
         return (relay_mode(u, mode, p),)
 
+    @staticmethod
     @equation
     def switching(t: float, x: Any, u: Any, p: Any) -> Any:
         """Where u is 0; while it slides, where it jumps away and where one rate leads away."""

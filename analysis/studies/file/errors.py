@@ -159,7 +159,8 @@ def schema_problems(error: ValidationError, model: type[BaseModel], data: Any) -
             names = _keys_at(model, one["loc"][:-1])
             message = str(unknown("key", str(one["loc"][-1]), names))
             if len(one["loc"]) == 3 and one["loc"][0] == "space" and "." not in str(one["loc"][1]):
-                message += f'; a name with a dot needs quotes: "{".".join(one["loc"][1:])}"'
+                whole = ".".join(map(str, one["loc"][1:]))
+                message += f'; a name with a dot needs quotes: "{whole}"'
         elif one["type"] == "tuple_type":
             message = "needs a list of values"
         elif one["type"] == "missing":

@@ -59,7 +59,7 @@ def pinv(graph: Graph, a: Any, rcond: float = 1e-15) -> Any:
     np_ = Facade(graph)
     rows = _of_lines(np_, columns)
     if len(columns) == 2:
-        rows = _of_two(np_, *columns, rows, rcond)
+        rows = _of_two(np_, columns[0], columns[1], rows, rcond)
     result = traced(graph, rows)
     return result.T if wide else result
 

@@ -98,7 +98,7 @@ class CapturedValues:
         return None
 
 
-def recorded(value: object) -> Any:
+def recorded(value: Any) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()

@@ -30,8 +30,9 @@ class Pool:
         self._ends: list[tuple[Any, ...]] = [()] * self.size
         self.first = np.zeros(self.size, np.int64)
         functions = integrators()
-        self._advance = getattr(functions["advance"], "each", None)
-        self._show = getattr(functions["outputs"], "each", None)
+        # without JIT there is none, and no run is adopted
+        self._advance: Any = getattr(functions["advance"], "each", None)
+        self._show: Any = getattr(functions["outputs"], "each", None)
 
     def _allocate(self, window: Window) -> None:
         """Make the arrays, for windows such as this one."""

@@ -53,7 +53,8 @@ class VectorStepper:
         self.compiled, self.dt, self.size = compiled, dt, size
         self._members = [stepper(compiled, dt, ignore_errors=True, **settings) for _ in range(size)]
         runs = [one.run for one in self._members]
-        self._pool = Pool(runs) if isinstance(runs[0], HeldRun) else None
+        held = [run for run in runs if isinstance(run, HeldRun)]
+        self._pool = Pool(held) if held else None  # of one diagram, hence all or none
         self._y = np.zeros((size, compiled.system.noutputs or 0))
         self.reset()
 
@@ -178,10 +179,11 @@ class VectorStepper:
         """Return which runs are in the middle of a window, in the arrays that they share."""
         if self._pool is None:
             return np.zeros(0, dtype=int)
+        pool = self._pool
         numbers = [
-            i for i, one in enumerate(self._members)
-            if one.success and one.run.k
-            and one.run.k < one.run.window.first + HELD_STEPS and self._pool.adopt(i)
+            i for i, run in enumerate(pool.runs)
+            if self._members[i].success and run.k
+            and run.k < run.window.first + HELD_STEPS and pool.adopt(i)
         ]  # fmt: skip
         return np.array(numbers, dtype=int)
 
