@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
+from functools import reduce
 
+from .edges import domain_edges, have_edges, is_positive, poles
 from .graph import ORDERS, Expr, Graph, needed
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -25,27 +27,52 @@ JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arct
 def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions switch at, parts first."""
     roots = list(exprs)
-    always = (n for n in needed(roots, known) if n.op in ORDERS and _is_of_infinity(n))
+    always = (n for n in needed(roots, known) if n.op in ORDERS and _is_always(n))
     passed = {*known, *always}  # what has one value, whatever is compared
     nodes = needed(roots, passed)
     return tuple(node for node in nodes if node.varies and node not in passed and _switches(node))
 
 
 def _switches(node: Expr) -> bool:
+    if _asks_for_number(node):
+        return True
     if node.op in _OF_DIFFERENCES:
         moves = any(arg.varies for arg in node.args)
         return moves and not _of_truths(node) and not _is_of_infinity(node)
     return (
         node.op in _OF_SIGNS
         or node.op in _OF_FIRSTS
-        or at_integers(node)
+        or (at_integers(node) and not _is_quotient(node.args[0]))
         or (node.op in _OF_SECONDS and node.args[1].varies)
     )
+
+
+def _asks_for_number(node: Expr) -> bool:
+    """Return whether a comparison says whether something is a number, as x != x does."""
+    with_itself = node.op in ("eq", "ne") and node.args[0] is node.args[1]
+    return (with_itself or (node.op in ORDERS and _is_of_infinity(node))) and have_edges(node.args)
+
+
+def _is_always(node: Expr) -> bool:
+    """Return whether a comparison never changes."""
+    return _is_of_infinity(node) and not _asks_for_number(node)
 
 
 def at_integers(node: Expr) -> bool:
     """Return whether an operation jumps where something is an integer, as `floor` and `%` do."""
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
+
+
+def _is_quotient(node: Expr) -> bool:
+    """Return whether a number is (a - fmod(a, b)) / b or one less: an integer but for rounding."""
+    if node.op == "select":
+        return all(map(_is_quotient, node.args[1:]))
+    if node.op == "sub" and node.args[1].op == "const":
+        return _is_quotient(node.args[0])
+    if node.op != "div" or node.args[0].op != "sub":
+        return False
+    a, rest = node.args[0].args
+    return rest.op == "fmod" and rest.args == (a, node.args[1])
 
 
 def _is_of_infinity(node: Expr) -> bool:
@@ -62,22 +89,41 @@ def _of_truths(node: Expr) -> bool:
 def switching_function(graph: Graph, condition: Expr) -> Expr:
     """Return what changes its sign where a condition switches."""
     op, args = condition.op, [graph.number(arg) for arg in condition.args]
+    if _asks_for_number(condition):
+        edges = domain_edges(graph, args)
+        return reduce(lambda a, b: graph.op("minimum", a, b), edges, graph.const(1.0))
     if op in _OF_DIFFERENCES:
         return _difference(graph, *args)
     if op in _OF_SIGNS or op in _OF_FIRSTS:
         return args[0]
     if op in _OF_SECONDS:
         return args[1]
-    counted = args[0]
-    if op in _OF_QUOTIENTS:
-        counted = graph.op("div", *args)
-    return _at_integers(graph, counted, _OF_INTEGERS.get(op, 0.0))
+    return _at_integers(graph, _counted(graph, condition))
+
+
+def _counted(graph: Graph, condition: Expr) -> Expr:
+    """Return what is an integer where a condition of integers switches."""
+    args = [graph.number(arg) for arg in condition.args]
+    counted = graph.op("div", *args) if condition.op in _OF_QUOTIENTS else args[0]
+    shift = _OF_INTEGERS.get(condition.op, 0.0)
+    return graph.op("add", counted, graph.const(shift)) if shift else counted
 
 
 def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
-    """Return what changes its sign where a condition switches, of a product each factor."""
+    """Return what changes its sign where a condition switches.
+
+    Of a product each factor; of what jumps at integers a function for even ones, and one for odd
+    ones: sin(pi z / 2) and -cos(pi z / 2), so that each says what the other one's sign means.
+    """
+    if at_integers(condition):
+        return _at_even_and_odd(graph, _counted(graph, condition))
+    if _asks_for_number(condition):
+        return tuple(domain_edges(graph, condition.args))
     function = switching_function(graph, condition)
-    return (function,) if at_integers(condition) else _factors(function)
+    if condition.op not in ORDERS:
+        return _factors(function)
+    edges = [*domain_edges(graph, condition.args), *poles(graph, condition.args)]
+    return tuple(part for each in (function, *edges) for part in _factors(each))
 
 
 def _factors(function: Expr) -> tuple[Expr, ...]:
@@ -96,6 +142,13 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     # a step could pass through a small circle unseen.
     if a.op == "const" and a.data == 0.0:
         return b
+    for quotient, other in ((a, b), (b, a)):
+        # sign(p / q - c) is that of (p - c q) q, in which there is no pole
+        if quotient.op == "div" and quotient.args[1].varies and not is_positive(quotient.args[1]):
+            p, q = quotient.args
+            less = graph.op("sub", graph.number(p), graph.op("mul", other, graph.number(q)))
+            signed = graph.op("mul", less, graph.number(q))
+            return signed if quotient is a else graph.op("neg", signed)
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
@@ -110,14 +163,32 @@ def _square_of_root(graph: Graph, root: Expr) -> Expr:
     return graph.op("add", *(graph.op("mul", arg, arg) for arg in args))
 
 
-def _at_integers(graph: Graph, counted: Expr, shift: float) -> Expr:
-    """Return what has a simple root where `counted` + shift is an integer."""
+def _at_integers(graph: Graph, z: Expr) -> Expr:
+    """Return what has a simple root where z is an integer."""
     # sin(pi z) = (-1)^n sin(pi (z - n)) with the nearest integer n: rounding of pi z does not move
     # the roots.
-    z = graph.op("add", counted, graph.const(shift)) if shift else counted
     nearest = graph.op("rint", z)
-    half = graph.op("mul", nearest, graph.const(0.5))
-    odd = graph.op("sub", half, graph.op("floor", half))  # 0 or 1/2
-    sign = graph.op("sub", graph.const(1.0), graph.op("mul", graph.const(4.0), odd))
     rest = graph.op("mul", graph.const(math.pi), graph.op("sub", z, nearest))
-    return graph.op("mul", sign, graph.op("sin", rest))
+    return graph.op("mul", _sign(graph, nearest), graph.op("sin", rest))
+
+
+def _at_even_and_odd(graph: Graph, z: Expr) -> tuple[Expr, Expr]:
+    """Return sin(pi z / 2) and -cos(pi z / 2), whose roots rounding does not move either."""
+    one, nearest = graph.const(1.0), graph.op("rint", z)
+    rest = graph.op("mul", graph.const(0.5 * math.pi), graph.op("sub", z, nearest))
+    sine, cosine = graph.op("sin", rest), graph.op("cos", rest)
+    half = graph.op("floor", graph.op("mul", nearest, graph.const(0.5)))
+    odd = graph.op("sub", nearest, graph.op("add", half, half))
+    even, sign = graph.op("sub", one, odd), _sign(graph, half)
+    parts = [graph.op("mul", a, b) for a in (even, odd) for b in (sine, cosine)]
+    return (
+        graph.op("mul", sign, graph.op("add", parts[0], parts[3])),
+        graph.op("mul", sign, graph.op("sub", parts[2], parts[1])),
+    )
+
+
+def _sign(graph: Graph, integer: Expr) -> Expr:
+    """Return (-1)^n."""
+    half = graph.op("mul", integer, graph.const(0.5))
+    odd = graph.op("sub", half, graph.op("floor", half))  # 0 or 1/2
+    return graph.op("sub", graph.const(1.0), graph.op("mul", graph.const(4.0), odd))

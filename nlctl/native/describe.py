@@ -53,7 +53,7 @@ def described(reading: Reading) -> str:
         ]
         own = [each for each in reading.equations.conditions.located if each.block == nodes[i].path]
         if own:
-            lines.append(f"    {'conditions':<12} {sum(each.rows for each in own)}")
+            lines.append(f"    {'conditions':<12} {sum(each.rows for each in own if each.integers >= 0)}")
     return "\n".join(lines)
 
 
@@ -71,7 +71,7 @@ def called(reading: Reading) -> Iterator[str]:
 def _conditions(reading: Reading) -> Iterator[str]:
     """Yield how many conditions of the equations are located, and what may hide others."""
     found = reading.equations.conditions
-    parts = [f"{found.rows} located"] if found.rows else []
+    parts = [f"{found.count} located"] if found.rows else []
     parts += [f"{len(found.of_time)} of t alone, solved before a run"] if found.of_time else []
     parts += [f"{found.beyond} too many to be located"] if found.beyond else []
     if parts:

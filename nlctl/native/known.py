@@ -42,6 +42,7 @@ def known_conditions(
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
     return Known(
         stops=jumps, longest=_longest(found, times), labels=tuple(labels),
+        partners=tuple(lowered.conditions.partners[:located]),
         crossings=_crossings(compiled, p, slice(first, first + located)),
     )  # fmt: skip
 

@@ -63,8 +63,14 @@ def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> Even
         watched=located - len(program.guards) - len(watched),
         ways=np.array([each.direction for each in watched], dtype=np.int64),
         ending=np.array([each.ends for each in watched], dtype=np.int64),
+        partners=np.array(_partners(program, code), dtype=np.int64),
         memory=np.array(program.memory, dtype=np.int64),
     )
+
+
+def _partners(program: Program, code: Machine) -> list[int]:
+    found = code.lowered.conditions.partners
+    return [*[0] * program.switching, *found, *[0] * len(program.guards)]
 
 
 def _resets(program: Program, code: Machine) -> Resets:

@@ -326,7 +326,7 @@ class Driver:
     def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
         """Note a change of sign, whether it ends the run, and whether there is an end of them."""
         if self.jumps.counts(i, rises):
-            way = "rising" if rises else "falling"
+            way = "rising" if self.jumps.rises(i, rises, self._looked(t, x)) else "falling"
             self.happened.append((float(t), *self.jumps.label(i), way))
             self._ended |= self.jumps.ends(i, rises)
         self._switches.switched(i, t, lambda t, x: self._looked(t, x)[i], x, self._rates(t, x))

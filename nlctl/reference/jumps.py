@@ -143,6 +143,13 @@ class Jumps:
         one = self._watched(number)
         return one is not None and one.ends and one.counts(rises)
 
+    def rises(self, number: int, positive: bool, seen: np.ndarray) -> bool:
+        """Whether what switches rises where its function becomes positive, or negative."""
+        k = number - self.switching.stop
+        partners = self.conditions.partners
+        partner = partners[k] if 0 <= k < len(partners) else 0
+        return positive != (partner != 0 and partner * seen[number + partner] > 0.0)
+
     def counts(self, number: int, rises: bool) -> bool:
         """Whether a change of sign of a row is an event."""
         one = self._watched(number)

@@ -28,3 +28,6 @@ class Known:
     # the inputs of the diagram, and behind them what leaves its delays
     crossings: Callable[[float, Any, Any], Any] | None = None
     labels: tuple[tuple[str, str], ...] = ()  # block and name of each of these
+    # and how far behind it, or with a sign before, that is which says what its sign means; 0 for
+    # none
+    partners: tuple[int, ...] = ()

@@ -11,7 +11,7 @@ import numpy as np
 from ...blocks import Block, memory_states
 from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
-from ...expressions.conditions import conditions, switching_functions
+from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
 from ..diagram.nodes import Node
@@ -34,6 +34,8 @@ class Located:
     block: str  # the block in whose equations it stands
     what: str  # the operation
     bends: bool  # whether nothing jumps there: the equations have a kink, of `abs`, `min` and `max`
+    # 1 and -1 for the functions of even and of odd integers, one behind the other
+    integers: int = 0
 
     @property
     def rows(self) -> int:
@@ -57,6 +59,20 @@ class Conditions:
     def rows(self) -> int:
         """Numbers that the switching functions are."""
         return sum(condition.rows for condition in self.located)
+
+    @property
+    def count(self) -> int:
+        """How many conditions that is: of integers there are two functions."""
+        return sum(condition.rows for condition in self.located if condition.integers >= 0)
+
+    @property
+    def partners(self) -> list[int]:
+        """How many rows behind it, or with a sign before, the partner of each row is; 0 for none.
+
+        Where the function of even integers is 0, it rises with what is counted if the other one is
+        below 0; where that one is 0, if the first is above.
+        """
+        return [each.integers * each.rows for each in self.located for _ in range(each.rows)]
 
     @property
     def bending(self) -> int:
@@ -98,7 +114,9 @@ def found_conditions(
             continue
         path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
-        for function in switching_functions(reader.graph, condition):
+        functions = switching_functions(reader.graph, condition)
+        sides = (1, -1) if at_integers(condition) else (0,) * len(functions)
+        for function, side in zip(functions, sides, strict=True):
             key, size = _key(function), function.size or 1
             if key in located:
                 both = bends and located[key].bends
@@ -106,11 +124,15 @@ def found_conditions(
                 continue
             if key in known or not function.varies or _remembers(function, node):
                 continue
-            if rows + size > _MOST:
+            if side < 0 and _key(functions[0]) not in located:
+                continue
+            if rows + size > _MOST and side >= 0:
                 beyond += size
                 continue
-            located[key] = Located(function=function, block=path, what=condition.op, bends=bends)
-            rows += size
+            located[key] = Located(
+                function=function, block=path, what=condition.op, bends=bends, integers=side
+            )
+            rows += size if side >= 0 else 0
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     return Conditions(
         located=tuple(sorted(located.values(), key=lambda one: not one.bends)),

@@ -353,13 +353,23 @@ def _note_events(task, lanes, w, found, done):
                 if at_zero(task, i, before) or at_zero(task, i, now):
                     continue  # noted where it has left that
                 if _counts(task, lanes[j], i, now):
-                    note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
+                    note(task, lanes[j], w, lanes[j].t, i, _rises(task, w, i, now, j), j)
             elif left_to_other_side(task, w, i, j):
                 turns = 0
         for i in range(rows.guarded, rows.switching):
             if w.guards.above[i - rows.guarded, j] != 0 and events.g[i, j] < 0.0:
                 turns = 0
         lanes[j].turns += turns
+
+
+@numba.njit(**INNER)
+def _rises(task, w, i, now, j):
+    """Whether what switches rises where its function changes its sign to that of `now`.
+
+    Functions of integers rise and fall in turns: the partner's sign says what that means.
+    """
+    partner = task.rows.partners[i]
+    return (now > 0.0) != (partner != 0 and partner * w.events.g[i + partner, j] > 0.0)
 
 
 @numba.njit(**INNER)
@@ -381,7 +391,7 @@ def _note_left(task, lane, w, located, j):
         if came == 0.0 or opposite(came, now):
             t = lane.t if located and came != 0.0 and before == 0.0 else lane.begun
             if _counts(task, lane, i, now):
-                note(task, lane, w, t, i, now > 0.0, j)
+                note(task, lane, w, t, i, _rises(task, w, i, now, j), j)
 
 
 @numba.njit(**INNER)

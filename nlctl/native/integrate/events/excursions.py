@@ -28,6 +28,7 @@ _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in
 _SHORTER = 0.3  # part of a step to be tried where its event functions cannot be followed
 _FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
 _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
+_STAGES = 0.1  # of the range: what values at stages of the stiff method may be wrong by
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
 _DENSE = 2  # the row of task.pair.inside that is no method's stages
 _NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
@@ -111,6 +112,8 @@ def _known(task, lane, w, i, j, row):
     if task.rows.memory.size and row != _DENSE:
         longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
     inside.resolved[j] = min(inside.resolved[j], longer * lane.step)
+    if row != _DENSE and is_stiff(lane):
+        inside.wrong[j] = max(inside.wrong[j], _STAGES * extent)
     return _judged(task, w, at, extent, 0.0, False, j)
 
 
@@ -153,7 +156,9 @@ def _judged(task, w, at, extent, offset, carried, j):
     if _least(inside.values) > extent:
         return _CLEAR, 0.0
     lower, x = least_value(inside.newton, at, carried)
-    if lower + offset > 2.0 * wrong or _leads_away(w, at, x, carried, j):
+    if lower + offset <= 2.0 * wrong and _leads_away(w, at, x, carried, j):
+        lower, x = least_value(inside.newton, at, carried, True)  # it may come back
+    if lower + offset > 2.0 * wrong:
         return _CLEAR, 0.0
     return _SUSPECT, min(max(x, 0.02), 0.98)
 

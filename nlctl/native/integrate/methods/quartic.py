@@ -61,17 +61,19 @@ def following_nodes(parts):
 
 
 @numba.njit(**INNER)
-def least_value(n, at, slope):
+def least_value(n, at, slope, inner=False):
     """Return the least value of the polynomial, or with `slope` of its derivative, and its place.
 
     On a grid of [0, 1] that is closer at both ends, where steps begin and end near minima; of the
-    parabola through the three values around the least one.
+    parabola through the three values around the least one.  `inner` ones are minima in between.
     """
     least, where = np.inf, 0
     for k in range(_POINTS + 1):
         y = _either(n, at, _node(k), slope)
-        if y < least:
+        if y < least and not (inner and _is_undercut(n, at, slope, k, y)):
             least, where = y, k
+    if least == np.inf:
+        return least, 0.0
     k = min(max(where, 1), _POINTS - 1)
     low, middle, high = _node(k - 1), _node(k), _node(k + 1)
     y = _either(n, at, middle, slope)
@@ -80,6 +82,15 @@ def least_value(n, at, slope):
     if bend > 0.0 and low < middle - 0.5 * tilt / bend < high:
         return y - 0.25 * tilt * tilt / bend, middle - 0.5 * tilt / bend
     return least, _node(where)
+
+
+@numba.njit(**INNER)
+def _is_undercut(n, at, slope, k, y):
+    """Whether one of two neighbours has a lower value, or there is only one."""
+    if k == 0 or k == _POINTS:
+        return True
+    below, above = _either(n, at, _node(k - 1), slope), _either(n, at, _node(k + 1), slope)
+    return y > min(below, above)
 
 
 @numba.njit(**INNER)

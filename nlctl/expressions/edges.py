@@ -1,0 +1,82 @@
+"""Where what is compared is no number any more, or infinite: edges of domains, and poles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from .graph import Expr, Graph, needed
+
+_ROOTS = ("sqrt", "log", "log2", "log10")
+_ARCS = ("arcsin", "arccos", "arctanh")
+_BEHIND_ONE = {"arccosh": "sub", "log1p": "add"}
+_SQUARES = ("absolute", "sqrt", "hypot")  # at least 0
+_ABOVE = ("exp", "exp2", "cosh")  # above 0
+
+
+def domain_edges(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
+    """Return what is below 0 where something that expressions are made of is no number."""
+    found = dict.fromkeys(_domain(graph, node) for node in needed(exprs) if _ends(node))
+    return [edge for edge in found if edge.varies]
+
+
+def have_edges(exprs: Iterable[Expr]) -> bool:
+    """Return whether there are any."""
+    return any(map(_ends, needed(exprs)))
+
+
+def poles(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
+    """Return what is 0 where something that expressions are made of is infinite."""
+    found: dict[Expr, None] = {}
+    for node in needed(exprs):
+        if node.op == "div" and node.args[1].varies and not is_positive(node.args[1]):
+            found[graph.number(node.args[1])] = None
+        if node.op == "tan" and node.varies:
+            found[graph.op("cos", node.args[0])] = None
+    return list(found)
+
+
+def _ends(node: Expr) -> bool:
+    """Return whether an operation has no value somewhere."""
+    if not node.varies:
+        return False
+    if node.op in _ROOTS or (node.op == "power" and not _is_whole(node.args[1])):
+        return not _is_square(node.args[0])
+    return node.op in (*_ARCS, *_BEHIND_ONE)
+
+
+def _domain(graph: Graph, node: Expr) -> Expr:
+    """Return what is at least 0 where an operation has a value."""
+    arg, one = graph.number(node.args[0]), graph.const(1.0)
+    if node.op in _ARCS:
+        return graph.op("sub", one, graph.op("mul", arg, arg))
+    return graph.op(_BEHIND_ONE[node.op], arg, one) if node.op in _BEHIND_ONE else arg
+
+
+def _is_whole(exponent: Expr) -> bool:
+    return exponent.kind == "i" or (exponent.op == "const" and float(exponent.data).is_integer())
+
+
+def is_positive(expr: Expr) -> bool:
+    """Return whether an expression is seen to be above 0 wherever it is a number."""
+    if expr.op == "const":
+        return bool(expr.data > 0)
+    if expr.op == "add":
+        return all(map(_is_square, expr.args)) and any(map(is_positive, expr.args))
+    if expr.op in ("mul", "div", "sqrt"):
+        return all(map(is_positive, expr.args))
+    if expr.op == "maximum":
+        return any(map(is_positive, expr.args))
+    return expr.op in _ABOVE
+
+
+def _is_square(expr: Expr) -> bool:
+    """Return whether an expression is seen to be at least 0."""
+    if expr.op == "const":
+        return bool(expr.data >= 0)
+    if expr.op == "mul" and expr.args[0] is expr.args[1]:
+        return True
+    if expr.op in ("add", "mul", "div"):
+        return all(map(_is_square, expr.args))
+    if expr.op == "maximum":
+        return any(map(_is_square, expr.args))
+    return expr.op in _SQUARES or is_positive(expr)
