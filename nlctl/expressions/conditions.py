@@ -19,6 +19,7 @@ _OF_SECONDS = ("copysign",)
 _OF_FIRSTS = ("arctan2",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
 _ROOTS = ("sqrt", "hypot")
+_INVERSE = {"exp": math.log, "log": math.exp, "tanh": math.atanh}
 _OF_QUOTIENTS = ("remainder", "fmod")
 # functions that jump
 JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
@@ -69,10 +70,13 @@ def _is_quotient(node: Expr) -> bool:
         return all(map(_is_quotient, node.args[1:]))
     if node.op == "sub" and node.args[1].op == "const":
         return _is_quotient(node.args[0])
-    if node.op != "div" or node.args[0].op != "sub":
+    difference = node.args[0] if node.op == "div" else node
+    if difference.op != "sub" or difference.args[1].op != "fmod":
         return False
-    a, rest = node.args[0].args
-    return rest.op == "fmod" and rest.args == (a, node.args[1])
+    (a, rest), divisor = difference.args, node.args[1] if node.op == "div" else None
+    if divisor is None:  # by 1
+        return rest.args[0] is a and rest.args[1].op == "const" and rest.args[1].data == 1
+    return rest.args == (a, divisor)
 
 
 def _is_of_infinity(node: Expr) -> bool:
@@ -149,11 +153,27 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
             less = graph.op("sub", graph.number(p), graph.op("mul", other, graph.number(q)))
             signed = graph.op("mul", less, graph.number(q))
             return signed if quotient is a else graph.op("neg", signed)
+    for rising, level, step in ((a, b, 1), (b, a, -1)):
+        # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
+        own = _inverse(rising.op, level)
+        if own is not None:
+            pair = [graph.number(rising.args[0]), graph.const(own)]
+            return graph.op("sub", *pair[::step])
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
             return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
+
+
+def _inverse(op: str, level: Expr) -> float | None:
+    """Return what a function that rises is a constant at, None where that is not known."""
+    if op not in _INVERSE or level.op != "const":
+        return None
+    try:
+        return _INVERSE[op](float(level.data))
+    except (ValueError, OverflowError):  # it never is
+        return None
 
 
 def _square_of_root(graph: Graph, root: Expr) -> Expr:

@@ -28,7 +28,6 @@ _CLEAR, _SUSPECT, _UNRESOLVED = 0, 1, 2  # what is known of an event function in
 _SHORTER = 0.3  # part of a step to be tried where its event functions cannot be followed
 _FAR = 20.0  # in ranges: what is so far from 0 may grow before it is followed
 _FOLLOWED = 0.2  # of the range: what the polynomial may be wrong by at most
-_STAGES = 0.1  # of the range: what values at stages of the stiff method may be wrong by
 _FLAT = 8.0  # in doubts: a slope at an end that may as well have the other sign
 _DENSE = 2  # the row of task.pair.inside that is no method's stages
 _NARROW = 1e-6  # part of a step: a minimum is not below what is so near by more than its square
@@ -84,7 +83,8 @@ def _suspected(task, lane, w, j):
     suspected = False
     for i in range(w.events.g.shape[0]):
         if not _is_far(w, i, j):
-            suspected |= _known(task, lane, w, i, j, row)[0] != _CLEAR
+            # Nothing follows from stages of the stiff method, which are of a low order.
+            suspected |= row == 1 or _known(task, lane, w, i, j, row)[0] != _CLEAR
     for i in range(w.memories.m.shape[0]):
         suspected |= _known_memory(task, lane, w, i, j, row)[0] != _CLEAR
     return suspected
@@ -112,8 +112,6 @@ def _known(task, lane, w, i, j, row):
     if task.rows.memory.size and row != _DENSE:
         longer = max(longer, _DOUBLE)  # stages may be less accurate than what follows from them
     inside.resolved[j] = min(inside.resolved[j], longer * lane.step)
-    if row != _DENSE and is_stiff(lane):
-        inside.wrong[j] = max(inside.wrong[j], _STAGES * extent)
     return _judged(task, w, at, extent, 0.0, False, j)
 
 
@@ -152,7 +150,7 @@ def _judged(task, w, at, extent, offset, carried, j):
     inside.floor[j] = max(inside.narrow[j] ** 2 * extent, task.atol if touches else 0.0)
     wrong = inside.wrong[j]
     if wrong > _FOLLOWED * extent:
-        return _UNRESOLVED, 0.0
+        return _UNRESOLVED, min(max(least_value(inside.newton, at, carried)[1], 0.02), 0.98)
     if _least(inside.values) > extent:
         return _CLEAR, 0.0
     lower, x = least_value(inside.newton, at, carried)
@@ -295,9 +293,12 @@ def _go_on(task, lane, w, found, carried, first, j):
 @numba.njit(**INNER)
 def _has_to_look(task, lane, w, found, known, x, growing, j):
     """Whether the minimum of a function is to be sought; `found` becomes AGAIN if unresolved."""
-    if known == _UNRESOLVED and task.fixed == 0.0 and lane.tries == 0 and growing:
-        shorten(lane, _SHORTER)
-        found[j] = AGAIN
+    if known == _UNRESOLVED and growing:
+        if task.fixed == 0.0 and lane.tries == 0:
+            shorten(lane, _SHORTER)
+            found[j] = AGAIN
+        else:
+            known = _SUSPECT
     if known == _SUSPECT:
         _bracket(w, x, j)
         w.inside.attempts[j] = 0

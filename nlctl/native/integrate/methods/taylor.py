@@ -31,6 +31,7 @@ SLOPES = 2  # slopes at both ends of a step
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
+_TURNS = 5  # attempts at where a polynomial is least
 _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
 _BEFORE = 3.0  # times as far before an event as a step may end behind it
@@ -389,6 +390,22 @@ def _is_followed(highest, h, terms, row, j):
 
 
 @numba.njit(**INNER)
+def _turning(p, h, terms, row, ends, slopes, j):
+    """Return about where a polynomial's slope is 0, between two places where its signs differ."""
+    low, high = ends
+    first, last = slopes
+    least = low
+    for _ in range(_TURNS):
+        least = low + first / (first - last) * (high - low)
+        slope = _value_and_slope(p, least * h, terms, row, j)[1]
+        if opposite(slope, first):
+            high, last = least, slope
+        else:
+            low, first = least, slope
+    return least
+
+
+@numba.njit(**INNER)
 def _crossing(p, h, terms, row, side, until, j):
     """Return where a polynomial is on another side first, 1 for nowhere, and where farthest."""
     first, farthest, most, steep = 1.0, 1.0, 0.0, 0.0
@@ -405,7 +422,7 @@ def _crossing(p, h, terms, row, side, until, j):
             break
         value, slope = _value_and_slope(p, part * h, terms, row, j)
         if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
-            least = before + steep / (steep - slope) / _LOOKS
+            least = _turning(p, h, terms, row, (before, part), (steep, slope), j)
             under = _value_and_slope(p, least * h, terms, row, j)[0] * side
             if under < 0.0 and least < until:
                 first, farthest, most = min(first, least), least, max(most, -under)
