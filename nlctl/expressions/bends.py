@@ -9,6 +9,7 @@ import numpy as np
 from .evaluate import evaluate_expressions
 from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
 
+_OF_SIGNS = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}
 _POINTS = 256
 _TRUTHS = "truths"  # the array of values that say whether other conditions hold
 _NEAR = 0.1  # of a parameter
@@ -17,15 +18,17 @@ _SAME = 1e-12
 
 def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
     """Return whether nothing that expressions are made of jumps at a condition, with such p."""
-    if condition.op not in (*ORDERS, "sign") or condition.size is not None:
+    if condition.op not in (*ORDERS, *_OF_SIGNS, "copysign") or condition.size is not None:
         return False
-    one, *rest = map(graph.number, condition.args)
-    other = rest[0] if rest else graph.const(0.0)
+    numbers = [graph.number(arg) for arg in condition.args]
+    one, other = numbers if condition.op in ORDERS else (numbers[0], graph.const(0.0))
+    if condition.op == "copysign":
+        one = numbers[1]
     on_it = {one: other} if one.varies else {other: one}
-    free = _free(graph, roots, condition, on_it)
+    there = {**on_it, **_free(graph, roots, condition, on_it)}
     sides = [
-        replaced_parts(graph, roots, {**on_it, **free, condition: graph.const(side)})
-        for side in ((True, False) if rest else (1.0, -1.0))
+        replaced_parts(graph, roots, {**there, condition: value})
+        for value in _values(graph, condition, there)
     ]
     pairs = [pair for pair in zip(*sides, strict=True) if pair[0] is not pair[1]]
     exprs = [expr for pair in pairs for expr in pair]
@@ -36,6 +39,16 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
     apart = zip(values[::2], values[1::2], strict=True)
     with np.errstate(invalid="ignore"):  # what is infinite on both sides is not known to agree
         return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
+
+
+def _values(graph: Graph, condition: Expr, there: Mapping[Expr, Expr]) -> list[Expr]:
+    """Return what a condition is on either side of where it switches."""
+    if condition.op == "copysign":
+        (given,) = replaced_parts(graph, condition.args[:1], there)
+        size = graph.op("absolute", graph.number(given))
+        return [size, graph.op("neg", size)]
+    sides = _OF_SIGNS.get(condition.op, (True, False))
+    return [graph.const(side) for side in sides]
 
 
 def _free(

@@ -43,6 +43,7 @@ def _switches(node: Expr) -> bool:
     return (
         node.op in _OF_SIGNS
         or node.op in _OF_FIRSTS
+        or _rooted(node) is not None
         or (at_integers(node) and not _is_quotient(node.args[0]))
         or (node.op in _OF_SECONDS and node.args[1].varies)
     )
@@ -62,6 +63,16 @@ def _is_always(node: Expr) -> bool:
 def at_integers(node: Expr) -> bool:
     """Return whether an operation jumps where something is an integer, as `floor` and `%` do."""
     return node.op in _OF_INTEGERS or node.op in _OF_QUOTIENTS
+
+
+def _rooted(node: Expr) -> Expr | None:
+    """Return what a root is the size of, as sqrt(z z) is that of z; None of any other number."""
+    square = node.args[0] if node.op in ("sqrt", "power") else node
+    return square.args[0] if square is not node and _is_square(square) else None
+
+
+def _is_square(node: Expr) -> bool:
+    return node.op == "mul" and node.args[0] is node.args[1]
 
 
 def _is_quotient(node: Expr) -> bool:
@@ -102,6 +113,8 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
         return args[0]
     if op in _OF_SECONDS:
         return args[1]
+    if (rooted := _rooted(condition)) is not None:
+        return rooted
     return _at_integers(graph, _counted(graph, condition))
 
 

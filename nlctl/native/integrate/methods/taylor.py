@@ -31,6 +31,7 @@ SLOPES = 2  # slopes at both ends of a step
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
+_ROUNDED = 1e-12  # of how far a polynomial may get from its start: it is not known any better
 _TURNS = 5  # attempts at where a polynomial is least
 _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
@@ -390,6 +391,12 @@ def _is_followed(highest, h, terms, row, j):
 
 
 @numba.njit(**INNER)
+def _last_terms(p, h, terms, row, j):
+    """Return what a polynomial may be wrong by at h: its last two terms."""
+    return h ** (p - 1.0) * (abs(terms[p - 1, row, j]) + abs(h * terms[p, row, j]))
+
+
+@numba.njit(**INNER)
 def _turning(p, h, terms, row, ends, slopes, j):
     """Return about where a polynomial's slope is 0, between two places where its signs differ."""
     low, high = ends
@@ -424,7 +431,8 @@ def _crossing(p, h, terms, row, side, until, j):
         if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
             least = _turning(p, h, terms, row, (before, part), (steep, slope), j)
             under = _value_and_slope(p, least * h, terms, row, j)[0] * side
-            if under < 0.0 and least < until:
+            lacks = _last_terms(p, least * h, terms, row, j)
+            if under < (lacks if lacks > _ROUNDED * extent * h else 0.0) and least < until:
                 first, farthest, most = min(first, least), least, max(most, -under)
         fell, steep = slope * side < 0.0, slope
         if value * side < 0.0 and part < until:
