@@ -53,7 +53,9 @@ def described(reading: Reading) -> str:
         ]
         own = [each for each in reading.equations.conditions.located if each.block == nodes[i].path]
         if own:
-            lines.append(f"    {'conditions':<12} {sum(each.rows for each in own if each.integers >= 0)}")
+            lines.append(
+                f"    {'conditions':<12} {sum(each.rows for each in own if each.integers >= 0)}"
+            )
     return "\n".join(lines)
 
 

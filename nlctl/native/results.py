@@ -82,7 +82,9 @@ def made(run: Any, outputs: np.ndarray, j: int) -> Trajectory:
         events=int(lane["noted"]),
         stiff=bool(lane["stiff"]),
         jump=run.jumps.get(j),
-        conditions=int(run.task.rows.switching - run.task.rows.bending - np.sum(run.task.rows.partners < 0)),
+        conditions=int(
+            run.task.rows.switching - run.task.rows.bending - np.sum(run.task.rows.partners < 0)
+        ),
         opaque=bool(run.task.timed.opaque),
         turns=int(lane["turns"]),
     )

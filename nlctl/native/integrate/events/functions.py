@@ -22,8 +22,8 @@ class EventRows(NamedTuple):
     watched: int  # the first of those that the run watches, behind the other conditions
     ways: Places1  # which of their changes count: 1 rising, -1 falling, 0 both
     ending: Places1  # and whether the run ends there
-    # of each row how far behind it, or with a sign before, its partner is: of what jumps at integers
-    # one has its roots at even ones, one at odd ones; 0 for none
+    # of each row how far behind it, or with a sign before, its partner is: of what jumps at
+    # integers one has its roots at even ones, one at odd ones; 0 for none
     partners: Places1
     memory: Places1  # indices of memory states
     table: Places2
