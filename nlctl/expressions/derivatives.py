@@ -19,6 +19,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+from .linear_systems import changed_solution, determinant, solution
 from .stage import Stage
 
 
@@ -148,6 +149,31 @@ class _Reader:
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:
         yes, no = self._zero_if_none(a), self._zero_if_none(b)
         return self.graph.op("select", node.args[0], yes, no)
+
+    def _lu(self, node: Expr, *entries: Expr | None) -> Expr:
+        """Return the derivative of the matrix: no other one of its factors is used."""
+        return self._pieces_of(entries, node.data[1])
+
+    def _lu_solve(self, node: Expr, matrix: Expr | None, *right: Expr | None) -> Expr | None:
+        """X' = A^-1 (B' - A' X)."""
+        sizes = node.data[1][1:]
+        pieces = [(self._zero_if_none(part), n) for part, n in zip(right, sizes, strict=True)]
+        return changed_solution(self.graph, node, matrix, pieces)
+
+    def _lu_det(self, node: Expr, matrix: Expr) -> Expr:
+        """det' = det tr(A^-1 A'), Jacobi's formula; NaN where A is singular."""
+        graph, lu = self.graph, node.args[0]
+        n = lu.data[0]
+        whole = solution(graph, lu, [(matrix, n * n)])
+        trace = graph.sum(graph.part(whole, 0, n + 1, n), n)
+        return graph.op("mul", node, trace)
+
+    def _lu_regular(self, node: Expr, matrix: Expr) -> None:
+        """It is the same almost everywhere."""
+
+    def _pieces_of(self, parts: Sequence[Expr | None], sizes: Sequence[int]) -> Expr:
+        pairs = zip(parts, sizes, strict=True)
+        return self.graph.joined([(self._zero_if_none(part), n) for part, n in pairs])
 
     def _function(self, node: Expr, parts: list[Expr | None]) -> Expr | None:
         change: Expr | None = None

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from ....expressions.graph import COMPARISONS, LOGIC, Expr
+from ....expressions.graph import COMPARISONS, LINEAR, LOGIC, Expr
 from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
+from .linear_systems import ROUTINES
 from .text import Body, Value
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
@@ -54,12 +55,23 @@ class Writer:
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""
+        if node.op in LINEAR:
+            self._linear(node)
+            return
         name, _ = node.data
         if node.op == "call":
             self.b.module.declared[f"declare void @{name}(ptr, i64, i64)"] = None
         _, row = self.plan.stored[node]
         for lane in range(self.lanes):
             self.b.write(f"call void @{name}(ptr %c, i64 {row}, i64 {lane})")
+
+    def _linear(self, node: Expr) -> None:
+        """Compute factors or a solution in memory, member by member."""
+        (_, row), sizes = self.plan.stored[node], node.data[0]
+        given = (sizes,) if isinstance(sizes, int) else sizes
+        for lane in range(self.lanes):
+            where = self.b.address("c", row * self.lanes + lane)
+            self.b.routine(node.op, ROUTINES[node.op], where, given, self.lanes)
 
     def operation(self, node: Expr) -> Value:
         """Return an operation on what has names already."""
