@@ -43,8 +43,9 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
     """Return what a linear operation makes of parts, None for one that is 0."""
     a, b, zero = parts[0], parts[-1], graph.const(0.0)
-    if node.op == "concat":
-        return graph.joined([(p or zero, n) for p, n in zip(parts, node.data, strict=True)])
+    if node.op in ("concat", "lu"):  # as derivative of factors stands that of the matrix
+        sizes = node.data if node.op == "concat" else node.data[1]
+        return graph.joined([(p or zero, n) for p, n in zip(parts, sizes, strict=True)])
     if node.op == "add":
         return _sum(graph, a, b)
     if node.op == "sub":
@@ -67,7 +68,7 @@ def _difference(graph: Graph, a: Expr | None, b: Expr | None) -> Expr:
     return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or graph.const(0.0))
 
 
-_LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum")
+_LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum", "lu")
 
 
 class _Reader:
@@ -150,11 +151,7 @@ class _Reader:
         yes, no = self._zero_if_none(a), self._zero_if_none(b)
         return self.graph.op("select", node.args[0], yes, no)
 
-    def _lu(self, node: Expr, *entries: Expr | None) -> Expr:
-        """Return the derivative of the matrix: no other one of its factors is used."""
-        return self._pieces_of(entries, node.data[1])
-
-    def _lu_solve(self, node: Expr, matrix: Expr | None, *right: Expr | None) -> Expr | None:
+    def _lu_solve(self, node: Expr, matrix: Expr | None, *right: Expr | None) -> Expr:
         """X' = A^-1 (B' - A' X)."""
         sizes = node.data[1][1:]
         pieces = [(self._zero_if_none(part), n) for part, n in zip(right, sizes, strict=True)]
@@ -164,16 +161,12 @@ class _Reader:
         """det' = det tr(A^-1 A'), Jacobi's formula; NaN where A is singular."""
         graph, lu = self.graph, node.args[0]
         n = lu.data[0]
-        whole = solution(graph, lu, [(matrix, n * n)])
+        whole = solution(graph, lu, n, [(matrix, n * n)])
         trace = graph.sum(graph.part(whole, 0, n + 1, n), n)
         return graph.op("mul", node, trace)
 
     def _lu_regular(self, node: Expr, matrix: Expr) -> None:
         """It is the same almost everywhere."""
-
-    def _pieces_of(self, parts: Sequence[Expr | None], sizes: Sequence[int]) -> Expr:
-        pairs = zip(parts, sizes, strict=True)
-        return self.graph.joined([(self._zero_if_none(part), n) for part, n in pairs])
 
     def _function(self, node: Expr, parts: list[Expr | None]) -> Expr | None:
         change: Expr | None = None

@@ -28,9 +28,9 @@ def factors(graph: Graph, matrix: Pieces, n: int) -> Expr:
     return graph.node("lu", *args, data=(n, sizes), size=n * n + n + 2)
 
 
-def solution(graph: Graph, lu: Expr, right: Pieces) -> Expr:
+def solution(graph: Graph, lu: Expr, n: int, right: Pieces) -> Expr:
     """Return the solution for right-hand sides that are given row by row: a vector of n m."""
-    n, count = lu.data[0], sum(size for _, size in right)
+    count = sum(size for _, size in right)
     args, sizes = zip((lu, lu.size), *_joined_constants(graph, right), strict=True)
     return graph.node("lu_solve", *args, data=((n, count // n), sizes), size=count)
 
@@ -63,19 +63,19 @@ def _joined_constants(graph: Graph, pieces: Pieces) -> list[tuple[Expr, int]]:
     return joined
 
 
-def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: Pieces) -> Expr | None:
-    """Return A^-1 (B' - A' X) of a solution X, for changes A' and B'; None if nothing changes."""
+def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: Pieces) -> Expr:
+    """Return A^-1 (B' - A' X) of a solution X, for changes A' and B'."""
     lu, (n, m) = node.args[0], node.data[0]
     change = graph.joined(list(right))
     if matrix is None:
-        return solution(graph, lu, right) if right else None
+        return solution(graph, lu, n, right)
     rows = []
     for i in range(n):
         for j in range(m):
             moved = entry_of_product(graph, matrix, node, (i, j))
             given = graph.item(change, i * m + j)
             rows.append((given if moved is None else graph.op("sub", given, moved), 1))
-    return solution(graph, lu, rows)
+    return solution(graph, lu, n, rows)
 
 
 def entry_of_product(

@@ -83,7 +83,7 @@ def _solved_as_one(graph: Graph, rows: _Rows, right: Tracer) -> Tracer:
     graph.guards.append(regular(graph, lu))
     columns = 1 if right.ndim == 1 else right.shape[1]
     pieces = [p for row in (right if right.ndim == 2 else [right]) for p in row.pieces()]
-    whole = solution(graph, lu, pieces)
+    whole = solution(graph, lu, len(rows), pieces)
     starts = range(0, len(rows) * columns, columns)
     if right.ndim == 1:
         items = Tracer(graph, as_array(whole), 0, len(rows))
