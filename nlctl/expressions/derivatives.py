@@ -19,7 +19,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
-from .linear_systems import changed_solution, determinant, solution
+from .linear_systems import changed_solution, solution
 from .stage import Stage
 
 

@@ -13,7 +13,7 @@ the matrix: X' = A^-1 (B' - A' X) needs no other one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -78,9 +78,7 @@ def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: Piece
     return solution(graph, lu, n, rows)
 
 
-def entry_of_product(
-    graph: Graph, matrix: Expr, node: Expr, place: tuple[int, int]
-) -> Expr | None:
+def entry_of_product(graph: Graph, matrix: Expr, node: Expr, place: tuple[int, int]) -> Expr | None:
     """Return an entry of the product of a matrix and a solution; None for 0."""
     (n, m), (i, j) = node.data[0], place
     row = [graph.item(matrix, i * n + k) for k in range(n)]

@@ -21,7 +21,7 @@ from ..blocks import Block, supplied_of
 from ..diagrams import known_system, overridden
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
-from ..expressions.graph import Expr, Graph, needed
+from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
 from ..sliding.relay import SLIDING
@@ -136,14 +136,17 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
     derivative = _next if next_value else _dotted
-    lines = [
-        *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
-        *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
-    ]
+    states = [derivative(s) for s in _names(system.state_labels)]
+    outputs = _names(system.output_labels[: found["y"].size])
+    try:
+        lines = [*_lines(writer, found["x"], states), *_lines(writer, found["y"], outputs)]
+        where = tuple(_definitions(writer))
+    except Untraceable as error:
+        raise CompileError(f"block '{node.path}' has no formula: {error}") from None
     return BlockEquations(
         block=node.path,
         equations=tuple(line for line in lines if not _says_nothing(line)),
-        where=tuple(_definitions(writer)),
+        where=where,
         inputs=tuple(_connections(read, node)),
     )
 
@@ -293,7 +296,7 @@ def _known(
 ) -> dict[Expr, str]:
     """Return names for parts of the equations: the author's, and letters for what is used twice."""
     exprs = needed(expr for array in found.values() for expr, _ in array.pieces())
-    plain = ("leaf", "const", "table", "concat", "item", "slice")
+    plain = ("leaf", "const", "table", "concat", "item", "slice", "lu", "lu_regular")
     taken = {leaf(e.data[0], (e.data[1], 0, "")) for e in exprs if e.op == "leaf" and not e.size}
     known: dict[Expr, str] = {}
     for expr in exprs:

@@ -3,9 +3,13 @@
 import control as ct
 import numpy as np
 import pytest
-import scipy.linalg
+from exported import evaluated
+from plain_plan import interpreted
 
 import nlctl
+from nlctl.errors import CompileError, ParameterError
+from nlctl.export import c_files, export_equations
+from nlctl.native.enclosures.boxes import enclosed, expressions_of
 
 ROWS = (7, 8, 9, 13, 20)
 
@@ -25,20 +29,15 @@ def dense(n, seed=0):
 
 def chain(n):
     """Masses that hang one below the other, as links of an arm: the mass matrix moves."""
+    below = n - np.maximum.outer(np.arange(n), np.arange(n)).astype(float)
+    driven = np.eye(n)[0]
 
     def update(t, x, u, params):
         q, v = x[:n], x[n:]
-        mass, rest = np.zeros((n, n)), np.zeros(n)
-        for i in range(n):
-            for j in range(n):
-                below = n - max(i, j)
-                mass[i, j] = below * np.cos(q[i] - q[j])
-                rest[i] += below * np.sin(q[i] - q[j]) * v[j] ** 2
-            mass[i, i] += params["inertia"]
-            rest[i] += 9.81 * (n - i) * np.sin(q[i]) + 0.2 * v[i]
-        torque = np.zeros(n)
-        torque[0] = u[0]
-        return np.concatenate([v, np.linalg.solve(mass, torque - rest)])
+        apart = q[:, None] - q[None, :]
+        mass = below * np.cos(apart) + params["inertia"] * np.eye(n)
+        rest = (below * np.sin(apart)) @ v**2 + 9.81 * np.diag(below) * np.sin(q) + 0.2 * v
+        return np.concatenate([v, np.linalg.solve(mass, u[0] * driven - rest)])
 
     return ct.nlsys(update, None, inputs="u", outputs=2 * n, states=2 * n, name="chain",
                     params={"inertia": 0.5})  # fmt: skip
@@ -112,16 +111,191 @@ def test_a_linearization_is_that_of_differences(system):
         np.testing.assert_allclose(matrix, wanted, rtol=1e-6, atol=1e-6 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("method", ["dop853", "rodas5p", "taylor"])
-def test_every_method_runs_it(method):
-    """The energy of the chain without friction and torque is no different at the end."""
-    system, times = chain(8), np.linspace(0.0, 0.5, 6)
+@pytest.fixture(scope="module")
+def run_of_chain():
+    """A run of the chain that SciPy has integrated with python-control's own functions."""
+    system, times = chain(8), np.linspace(0.0, 0.3, 4)
     start = np.concatenate([0.4 * np.cos(np.arange(8.0)), np.zeros(8)])
-    found = nlctl.input_output_response(
-        nlctl.compile(system), times, np.sin(times), start, method=method, rtol=1e-10, atol=1e-12
-    )
     wanted = ct.input_output_response(
         system, times, np.sin(times), start,
-        solve_ivp_method="DOP853", solve_ivp_kwargs={"rtol": 1e-11, "atol": 1e-13},
+        solve_ivp_method="DOP853", solve_ivp_kwargs={"rtol": 1e-10, "atol": 1e-12},
     )  # fmt: skip
-    np.testing.assert_allclose(found.states, wanted.states, rtol=1e-7, atol=1e-8)
+    return system, times, start, wanted.states
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+def test_every_method_runs_it(method, run_of_chain):
+    system, times, start, wanted = run_of_chain
+    found = nlctl.input_output_response(
+        nlctl.compile(system), times, np.sin(times), start, method=method, rtol=1e-9, atol=1e-11
+    )
+    np.testing.assert_allclose(found.states, wanted, rtol=1e-6, atol=1e-7)
+
+
+def test_members_of_an_ensemble_have_pivots_of_their_own():
+    """Rows are exchanged member by member."""
+    system, times = dense(7), np.linspace(0.0, 0.2, 3)
+    compiled, k = nlctl.compile(system), np.linspace(-1.0, 1.0, 11)
+    start = {f"x[{i}]": 0.1 * i for i in range(7)}
+    every = nlctl.ensemble_response(
+        compiled, times, 0.3, initial_state=start, params={"k": k}, keep=["y[0]"]
+    )
+    for i, one in enumerate(k):
+        alone = nlctl.input_output_response(compiled, times, 0.3, start, params={"k": one})
+        np.testing.assert_allclose(every.signals["y[0]"][i], alone.outputs[0], rtol=1e-9)
+
+
+def test_sensitivities_of_a_run_are_those_of_differences():
+    system, times = chain(8), np.linspace(0.0, 0.3, 3)
+    compiled, start = nlctl.compile(system), {"x[0]": 0.4, "x[3]": -0.2}
+    made = nlctl.sensitivity_response(
+        system, times, 1.0, start, of=["y[0]"], with_respect_to=["chain.inertia", "chain.x[3](0)"]
+    )
+    assert made.success
+
+    def end(inertia, angle):
+        found = nlctl.input_output_response(
+            compiled, times, 1.0, {**start, "x[3]": angle}, params={"inertia": inertia},
+            rtol=1e-12, atol=1e-14,
+        )  # fmt: skip
+        return found.outputs[0]
+
+    jacobian = [
+        richardson(lambda v: end(v[0], -0.2), np.array([0.5]))[:, 0],
+        richardson(lambda v: end(0.5, v[0]), np.array([-0.2]))[:, 0],
+    ]
+    for name, wanted in zip(("chain.inertia", "chain.x[3](0)"), jacobian, strict=True):
+        np.testing.assert_allclose(made["y[0]", name], wanted, rtol=1e-6, atol=1e-9)
+
+
+def test_plain_python_carries_out_the_same_plan():
+    """Without machine code the plan's own levels and places serve."""
+    for system in (dense(7), of_inverse(9)):
+        compiled = nlctl.compile(system)
+        rhs, _ = interpreted(compiled)
+        n, dx = system.nstates, np.zeros(system.nstates)
+        for t, x, u in points(system):
+            rhs(t, x, u, compiled.parameter_vector(), dx, np.zeros(1), np.zeros(n))
+            np.testing.assert_allclose(dx, compiled.dynamics(t, x, u), rtol=1e-10, atol=1e-10)
+
+
+def of_parameters(t, x, u, params):
+    """A matrix of parameters alone: its factors are computed once for a run."""
+    matrix = params["k"] * np.eye(8) + np.ones((8, 8))
+    return np.linalg.solve(matrix, u[0] - x)
+
+
+def test_factors_of_parameters_are_computed_in_advance():
+    system = ct.nlsys(of_parameters, None, inputs="u", outputs=8, states=8, name="p",
+                      params={"k": 2.0})  # fmt: skip
+    compiled, point = nlctl.compile(system), (0.0, np.arange(8.0), np.array([3.0]))
+    text = compiled.lowered.text
+    assert "lu." in text.partition("@rhs(")[0].partition("@prepare(")[2]
+    for k in (0.5, 7.0):  # Sherman and Morrison: ((v - sum(v) / (k + 8)) / k
+        v = 3.0 - point[1]
+        wanted = (v - v.sum() / (k + 8.0)) / k
+        np.testing.assert_allclose(compiled.dynamics(*point, {"k": k}), wanted, rtol=1e-13)
+
+
+def singular(t, x, u, params):
+    matrix = np.eye(7) + x[0] * np.ones((7, 7))
+    matrix[6, 6] += u[0]
+    return np.linalg.solve(matrix, np.ones(7)) - x
+
+
+def test_what_is_singular_is_an_error_in_python_and_not_a_number_in_machine_code():
+    """I + x 1 1' with x = -1 / 7 would not be singular in floats; two equal rows are."""
+
+    def update(t, x, u, params):
+        matrix = first + np.outer(u[0] * unit, x)
+        return np.linalg.solve(matrix, x) + 0.0 * np.linalg.det(matrix)
+
+    first, unit = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) + np.tri(7, k=-1), np.eye(7)[6]
+    system = ct.nlsys(update, None, inputs="u", outputs=7, states=7, name="s")
+    compiled, x = nlctl.compile(system), np.arange(1.0, 8.0)
+    np.testing.assert_allclose(
+        compiled.dynamics(0.0, x, [1.0]), system.dynamics(0.0, x, [1.0]), rtol=1e-13
+    )
+    with pytest.raises(np.linalg.LinAlgError):
+        system.dynamics(0.0, x, [0.0])
+    assert np.isnan(compiled.dynamics(0.0, x, [0.0])).all()
+
+
+@pytest.mark.parametrize("row", [0, 3, 8])
+def test_nan_travels(row):
+    system = dense(9)
+    x = np.ones(9)
+    x[row] = np.nan
+    assert np.isnan(nlctl.compile(system).dynamics(0.0, x, [1.0])).all()
+    assert np.isnan(system.dynamics(0.0, x, [1.0])).all()
+
+
+def test_a_determinant_of_zero_is_zero():
+    """NumPy raises no error for it."""
+
+    def update(t, x, u, params):
+        return np.linalg.det(np.outer(x, x + 1.0) + u[0] * np.diag(np.arange(7.0))) - x
+
+    system = ct.nlsys(update, None, inputs="u", outputs=7, states=7, name="s")
+    x = np.array([2.0, 1.0, 4.0, 8.0, 2.0, 1.0, 0.5])
+    found = nlctl.compile(system).dynamics(0.0, x, [0.0])
+    np.testing.assert_allclose(found, -x, atol=1e-12)
+    np.testing.assert_allclose(nlctl.compile(system).dynamics(0.0, x, [1.0]),
+                               system.dynamics(0.0, x, [1.0]), rtol=1e-11)  # fmt: skip
+
+
+def of_six_angles(x):
+    """A function of a box with a solution of seven equations, and another with a determinant."""
+    angles = np.array([0.3, x[0], x[1], 0.1, x[0] * x[1], -0.2, 0.5])
+    matrix = np.cos(angles[:, None] - angles[None, :]) + 6.0 * np.eye(7)
+    solution = np.linalg.solve(matrix, np.sin(angles))
+    return solution[0], solution[6], np.linalg.det(matrix)
+
+
+def test_enclosures_hold_every_sample():
+    """Elimination is written out for them; where a box is small its pivots are certain."""
+    _, exprs = expressions_of(of_six_angles, 2)
+    code, rng = enclosed(exprs, 2), np.random.default_rng(0)
+    middle = rng.uniform(-1.0, 1.0, (20, 2))
+    low, high = middle - 1e-3, middle + 1e-3
+    below, above = code.values(low, high)
+    assert np.all(above - below < 0.1 * (1.0 + np.abs(above)))
+    for share in rng.uniform(size=(10, 20, 2)):
+        value = np.array([of_six_angles(x) for x in low + share * (high - low)])
+        assert np.all((below <= value + 1e-9) & (value <= above + 1e-9 * np.abs(value)))
+
+
+def test_a_formula_has_the_matrix():
+    """x' = (k I + 1 1')^-1 (u - x), component by component."""
+
+    system = ct.nlsys(of_parameters, None, inputs="u", outputs=8, states=8, name="p",
+                      params={"k": 2.0})  # fmt: skip
+    (block,) = nlctl.typeset(system)
+    assert block.equations[7].startswith(r"\dot{x}_{8} = s_{1,8}")
+    (where,) = block.where
+    assert where.startswith(r"s_{1,i} = \left(\begin{pmatrix} k + 1 & 0 k + 1")
+    assert where.endswith(r"\end{pmatrix}\right)_{i}, \quad i = 1, \dots, 8")
+    assert where.count("&") == 8 * 7
+    assert where.count("k + 1") == 64
+    assert r"\end{pmatrix}^{-1} \begin{pmatrix} u - x_{1} \\ u - x_{2}" in where
+    with pytest.raises(CompileError, match="'inverse' has no formula: a solution of 9 columns"):
+        nlctl.typeset(of_inverse(9))
+
+
+def test_a_determinant_has_no_taylor_coefficients():
+    with pytest.raises(ParameterError, match="coefficients of the determinant of 7 rows"):
+        nlctl.input_output_response(of_inverse(7), [0.0, 0.1], 0.0, np.ones(7), method="taylor")
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("system", [chain(8), dense(7), of_inverse(9)], ids=lambda s: s.name)
+def test_c_computes_the_same(tmp_path, system):
+    """The routine that is written as machine code is written as C."""
+    equations = export_equations(system, name="exported")
+    given = points(system)
+    for (t, x, u), (dx, _) in zip(given, evaluated(tmp_path, equations, given), strict=True):
+        wanted = system.dynamics(t, x, u)
+        np.testing.assert_allclose(dx, wanted, rtol=1e-10, atol=1e-10 * np.abs(wanted).max())
+    n = 8 if system.name == "chain" else system.nstates
+    source = c_files(equations)["exported.c"]
+    assert f"1 LU factorisation of {n} x {n}" in source.replace("\n", " ")

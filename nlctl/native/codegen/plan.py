@@ -94,7 +94,8 @@ class FunctionPlan:
         """Return where the elements of a vector in memory are: array, first row, distance."""
         if vector in self.stored:
             array, row = self.stored[vector]
-            return array, row + (sum(vector.data[1]) if vector.op in CALLS else 0), 1
+            called = vector.op in CALLS and vector not in self.known
+            return array, row + (sum(vector.data[1]) if called else 0), 1
         if vector.op == "slice":
             array, row, step = self.elements(vector.args[0])
             return array, row + step * vector.data[0], step * vector.data[1]
@@ -228,7 +229,7 @@ def _written(
         if node not in known and node.op not in CALLS:
             inner += split(Store(array=array, row=row, expr=node, size=node.size or 1), known)
     for node in nodes:
-        if node.op in CALLS and node in stored:
+        if node.op in CALLS and node in stored and node not in known:
             row = stored[node][1]
             for arg, size in zip(node.args, node.data[1], strict=True):
                 inner += split(Store(array="c", row=row, expr=arg, size=size), known)
