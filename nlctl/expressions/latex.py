@@ -225,14 +225,13 @@ class LatexWriter:
     def _lu_solve(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         assert index is not None
         columns, (first, step, _) = expr.data[0][1], index
-        place = index_text(index)
-        if columns > 1:
-            if step:
-                raise Untraceable(f"a solution of {columns} columns has no formula row by row")
-            place = f"{first // columns + 1},{first % columns + 1}"
         matrix = self._lu(expr.args[0], None, depth)[0]
         right = self._matrix(expr.args[1:], expr.data[1][1:], columns, depth)
-        return rf"\left({matrix}^{{-1}} {right}\right)_{{{place}}}", ATOM
+        text = rf"\left({matrix}^{{-1}} {right}\right)"
+        if columns == 1 or step:
+            rows = text if columns == 1 else rf"\operatorname{{vec}}\left({text}^{{T}}\right)"
+            return rf"{rows}_{{{index_text(index)}}}", ATOM
+        return rf"{text}_{{{first // columns + 1},{first % columns + 1}}}", ATOM
 
     def _matrix(
         self, args: Sequence[Expr], lengths: Sequence[int], columns: int, depth: int

@@ -21,7 +21,7 @@ from ..blocks import Block, supplied_of
 from ..diagrams import known_system, overridden
 from ..errors import CompileError
 from ..expressions.arrays import Tracer, leaf_vector
-from ..expressions.graph import Expr, Graph, Untraceable, needed
+from ..expressions.graph import Expr, Graph, needed
 from ..expressions.latex import Index, LatexWriter, index_text, number_text, symbol, with_index
 from ..params import declared_params
 from ..sliding.relay import SLIDING
@@ -136,17 +136,14 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
     derivative = _next if next_value else _dotted
-    states = [derivative(s) for s in _names(system.state_labels)]
-    outputs = _names(system.output_labels[: found["y"].size])
-    try:
-        lines = [*_lines(writer, found["x"], states), *_lines(writer, found["y"], outputs)]
-        where = tuple(_definitions(writer))
-    except Untraceable as error:
-        raise CompileError(f"block '{node.path}' has no formula: {error}") from None
+    lines = [
+        *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
+        *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
+    ]
     return BlockEquations(
         block=node.path,
         equations=tuple(line for line in lines if not _says_nothing(line)),
-        where=where,
+        where=tuple(_definitions(writer)),
         inputs=tuple(_connections(read, node)),
     )
 
