@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -161,9 +162,9 @@ class _Reader:
         """det' = det tr(A^-1 A'), Jacobi's formula; NaN where A is singular."""
         graph, lu = self.graph, node.args[0]
         n = lu.data[0]
-        whole = solution(graph, lu, n, [(matrix, n * n)])
-        trace = graph.sum(graph.part(whole, 0, n + 1, n), n)
-        return graph.op("mul", node, trace)
+        whole = solution(graph, lu, n, [(graph.item(matrix, k), 1) for k in range(n * n)])
+        diagonal = (graph.item(whole, k) for k in range(0, n * n, n + 1))
+        return graph.op("mul", node, reduce(lambda a, b: graph.op("add", a, b), diagonal))
 
     def _lu_regular(self, node: Expr, matrix: Expr) -> None:
         """It is the same almost everywhere."""

@@ -102,7 +102,7 @@ def values(node: Expr, given: np.ndarray) -> np.ndarray:
         return _factors(given, node.data[0])
     n, m = node.data[0]
     count = n * n + n + 2
-    lu, order = given[: n * n].reshape(n, n, -1), given[n * n : count - 2].astype(int)
+    lu, order = given[: n * n].reshape(n, n, -1), np.rint(given[n * n : count - 2]).astype(int)
     x = given[count:].reshape(n, m, -1)
     x = np.take_along_axis(x, order[:, None, :], axis=0)
     for i in range(n):

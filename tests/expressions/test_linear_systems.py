@@ -1,5 +1,7 @@
 """Linear equations of more than six rows: one operation, with derivative, in every reader."""
 
+import math
+
 import control as ct
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from plain_plan import interpreted
 import nlctl
 from nlctl.errors import ParameterError
 from nlctl.export import c_files, export_equations
+from nlctl.expressions.jacobian_source import jacobian_function
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
 
 ROWS = (7, 8, 9, 13, 20)
@@ -302,3 +305,57 @@ def test_c_computes_the_same(tmp_path, system):
     n = 8 if system.name == "chain" else system.nstates
     source = c_files(equations)["exported.c"]
     assert f"1 LU factorisation of {n} x {n}" in source.replace("\n", " ")
+
+
+def in_a_loop(t, x, u, params):
+    """An output that depends on the input of the same block."""
+    matrix = np.eye(7) * 3.0 + np.outer(np.cos(x), np.ones(7)) * np.cos(u[0])
+    return np.linalg.solve(matrix, np.ones(7))[:1]
+
+
+def test_algebraic_loops_are_solved_through_it():
+    """y = e1' A(y)^-1 1: python-control finds no value of it, the equation says which it is."""
+    block = ct.nlsys(lambda t, x, u, params: -x, in_a_loop, inputs="v", outputs="y", states=7,
+                     name="b")  # fmt: skip
+    loop = nlctl.interconnect([block], connections=[["b.v", "b.y"]], inputs=[], outputs=["b.y"])
+    x = 0.2 * np.arange(7.0)
+    (y,) = nlctl.compile(loop, algebraic_loops="solve").output(0.0, x)
+    np.testing.assert_allclose(in_a_loop(0.0, x, [y], {}), [y], rtol=1e-10)
+
+
+def of_seven(x, k):
+    matrix = np.diag(3.0 + np.cos(x)) + k * np.outer(x, x)
+    return np.linalg.solve(matrix, np.sin(x)) * np.linalg.det(matrix)
+
+
+def test_a_jacobian_as_a_function_of_numpy():
+    """As the extended Kalman filter has it."""
+    x, k = 0.3 * np.arange(7.0), np.array([0.2])
+    found = jacobian_function(of_seven, 7, 1)(x, k)
+    wanted = richardson(lambda v: of_seven(v, k), x)
+    np.testing.assert_allclose(found, wanted, rtol=1e-7, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_many_systems_at_once_are_refused_by_name():
+    """They are called as they stand, and the block says why."""
+
+    def update(t, x, u, params):
+        matrices = np.stack([np.eye(7) + x[0], np.eye(7) - x[1] ** 2])
+        return np.linalg.solve(matrices, np.ones((2, 7, 1)))[0, :, 0]
+
+    system = ct.nlsys(update, None, inputs="u", outputs=7, states=7, name="many")
+    assert "many matrices at once" in str(nlctl.compile(system))
+
+
+@pytest.mark.parametrize("x", [2.75, -2.75, 0.0, np.inf, -np.inf, np.nan])
+def test_modf_is_that_of_python(x):
+    """math.modf, with both signs and at infinity; both parts of NaN are NaN."""
+
+    def update(t, x, u, params):
+        rest, whole = math.modf(x[0])
+        return np.array([rest, whole])
+
+    system = ct.nlsys(update, None, inputs="u", outputs=2, states=2, name="parts")
+    compiled = nlctl.compile(system)
+    assert "Jacobian     exact" in str(compiled)
+    np.testing.assert_array_equal(compiled.dynamics(0.0, [x, 0.0], [0.0]), math.modf(x))

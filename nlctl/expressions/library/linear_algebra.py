@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, as_array, scalar, traced
-from ..elimination import eliminated, is_zero, substituted
+from ..elimination import eliminated, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
@@ -18,8 +18,6 @@ __all__: list[str] = []
 
 _Rows = list[list[Any]]
 _SMALL = 6  # rows of a matrix up to which elimination is written out
-_SPARSE = 12  # ... of one that has more than one zero in so many
-_MOSTLY = 1.5
 
 
 def _rows(graph: Graph, matrix: Any) -> _Rows:
@@ -61,12 +59,9 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
 
 def _is_written_out(rows: _Rows) -> bool:
     """Whether elimination is written out; otherwise it is an operation of its own."""
-    n, whole = len(rows), [v for row in rows for v in row]
-    if n <= _SMALL:
+    if len(rows) <= _SMALL:
         return True
-    if all(e.op == "const" for v in whole for e in v.values.flat):
-        return True
-    return n <= _SPARSE and _MOSTLY * sum(map(is_zero, whole)) > n * n
+    return all(e.op == "const" for row in rows for v in row for e in v.values.flat)
 
 
 def _factors(graph: Graph, rows: _Rows) -> Expr:
