@@ -59,7 +59,22 @@ def of_inverse(n):
     return ct.nlsys(update, None, inputs="u", outputs=n, states=n, name="inverse")
 
 
-SYSTEMS = {"dense": dense, "inverse": of_inverse}
+def assembled(n):
+    """A band that is written element by element."""
+
+    def update(t, x, u, params):
+        matrix = 3.0 * np.eye(n)
+        for i in range(n - 1):
+            matrix[i, i + 1] = np.sin(x[i])
+            matrix[i + 1, i] -= x[i + 1] * u[0]
+        matrix[0] += 0.1
+        matrix[:, -1] = x
+        return np.linalg.solve(matrix, x)
+
+    return ct.nlsys(update, None, inputs="u", outputs=n, states=n, name="band")
+
+
+SYSTEMS = {"dense": dense, "inverse": of_inverse, "band": assembled}
 
 
 def points(system, count=3):
@@ -317,7 +332,9 @@ def test_algebraic_loops_are_solved_through_it():
     """y = e1' A(y)^-1 1: python-control finds no value of it, the equation says which it is."""
     block = ct.nlsys(lambda t, x, u, params: -x, in_a_loop, inputs="v", outputs="y", states=7,
                      name="b")  # fmt: skip
-    loop = nlctl.interconnect([block], connections=[["b.v", "b.y"]], inputs=[], outputs=["b.y"])
+    loop = nlctl.interconnect(
+        [block], connections=[["b.v", "b.y"]], inputs=[], inplist=[], outlist=["b.y"], outputs=["y"]
+    )
     x = 0.2 * np.arange(7.0)
     (y,) = nlctl.compile(loop, algebraic_loops="solve").output(0.0, x)
     np.testing.assert_allclose(in_a_loop(0.0, x, [y], {}), [y], rtol=1e-10)
