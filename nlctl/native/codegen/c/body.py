@@ -258,7 +258,7 @@ class CBody:
             self.lines[-1] += f" /* {self.labels[where]} */"
         return value
 
-    def store(self, value: Value, where: str) -> None:
+    def store(self, value: Value, where: str, *, alone: bool = False) -> None:
         self.write(f"{where} = {value.text};")
 
 

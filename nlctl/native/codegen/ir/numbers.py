@@ -13,6 +13,7 @@ from .text import Body, Value
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+_MERGED = 32  # numbers that are written to memory
 PACKED = 4  # numbers of one member whose sines, powers, ... are computed together
 
 
@@ -24,6 +25,8 @@ class Writer:
         self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
+        # to merge neighbours takes the compiler a time that grows with the square of their number
+        self.alone = sum(s.array == "c" and s.size == 1 for s in plan.stores) > _MERGED
         # sines and cosines of those that have been computed, by the angle's name
         self.pairs: dict[str, dict[str, Value]] = {}
         kinds = Counter(
@@ -51,7 +54,8 @@ class Writer:
         """Write a number where it is to lie."""
         for array, row in self.plan.places.get(node, ()):
             value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
-            self.b.store(value, self.b.address(array, row * self.lanes))
+            alone = array == "c" and self.alone
+            self.b.store(value, self.b.address(array, row * self.lanes), alone=alone)
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""

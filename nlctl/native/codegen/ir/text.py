@@ -352,9 +352,9 @@ class Body:
         """Return the number, or as many as a vector has, at an address."""
         return self.new(f"load {llvm_type(width)}, ptr {where}, align 8", width)
 
-    def store(self, value: Value, where: str) -> None:
-        """Write a number or vector to an address."""
-        self.write(f"store {value}, ptr {where}, align 8")
+    def store(self, value: Value, where: str, *, alone: bool = False) -> None:
+        """Write a number or vector to an address; alone it is not merged with its neighbours."""
+        self.write(f"store {'volatile ' if alone else ''}{value}, ptr {where}, align 8")
 
     # -- control
 
