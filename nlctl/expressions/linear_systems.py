@@ -19,16 +19,16 @@ import numpy as np
 
 from .graph import Expr, Graph
 
-Pieces = Sequence[tuple[Expr, int]]
+_Pieces = Sequence[tuple[Expr, int]]
 
 
-def factors(graph: Graph, matrix: Pieces, n: int) -> Expr:
+def factors(graph: Graph, matrix: _Pieces, n: int) -> Expr:
     """Return the factors of a matrix whose entries are given row by row."""
     args, sizes = zip(*_joined_constants(graph, matrix), strict=True)
     return graph.node("lu", *args, data=(n, sizes), size=n * n + n + 2)
 
 
-def solution(graph: Graph, lu: Expr, n: int, right: Pieces) -> Expr:
+def solution(graph: Graph, lu: Expr, n: int, right: _Pieces) -> Expr:
     """Return the solution for right-hand sides that are given row by row: a vector of n m."""
     count = sum(size for _, size in right)
     args, sizes = zip((lu, lu.size), *_joined_constants(graph, right), strict=True)
@@ -46,7 +46,7 @@ def regular(graph: Graph, lu: Expr) -> Expr:
     return graph.op("ne", flag, graph.const(0.0))
 
 
-def _joined_constants(graph: Graph, pieces: Pieces) -> list[tuple[Expr, int]]:
+def _joined_constants(graph: Graph, pieces: _Pieces) -> list[tuple[Expr, int]]:
     """Return pieces with neighbours that are constant as one table."""
     joined: list[tuple[Expr, int]] = []
     run: list[float] = []
@@ -63,7 +63,7 @@ def _joined_constants(graph: Graph, pieces: Pieces) -> list[tuple[Expr, int]]:
     return joined
 
 
-def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: Pieces) -> Expr:
+def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: _Pieces) -> Expr:
     """Return A^-1 (B' - A' X) of a solution X, for changes A' and B'."""
     lu, (n, m) = node.args[0], node.data[0]
     change = graph.joined(list(right))

@@ -90,7 +90,7 @@ def factorised(b: Any, step: int, n: Value) -> None:
     b.counted(m.zero, n, column)
 
 
-def solved(b: Any, step: int, n: Value, columns: Value) -> None:
+def back_substituted(b: Any, step: int, n: Value, columns: Value) -> None:
     """Write the solution for some right-hand sides, from the factors in front of them."""
     m = _Memory(b, step)
     order = b.index("mul", n, n)
@@ -124,4 +124,4 @@ def solved(b: Any, step: int, n: Value, columns: Value) -> None:
 
 
 # by operation: what writes its function, given the numbers of members and the sizes
-ROUTINES: dict[str, Callable[..., None]] = {"lu": factorised, "lu_solve": solved}
+ROUTINES: dict[str, Callable[..., None]] = {"lu": factorised, "lu_solve": back_substituted}
