@@ -11,8 +11,14 @@ from plain_plan import interpreted
 import nlctl
 from nlctl.errors import ParameterError
 from nlctl.export import c_files, export_equations
+from nlctl.expressions.arrays import leaf_vector
+from nlctl.expressions.derivatives import tangents
+from nlctl.expressions.evaluate import evaluate_expressions
+from nlctl.expressions.graph import Graph, needed
 from nlctl.expressions.jacobian_source import jacobian_function
+from nlctl.expressions.trace import trace
 from nlctl.native.enclosures.boxes import enclosed, expressions_of
+from nlctl.native.sliding.pieces import affine
 
 ROWS = (7, 8, 9, 13, 20)
 
@@ -215,20 +221,15 @@ def test_factors_of_parameters_are_computed_in_advance():
         np.testing.assert_allclose(compiled.dynamics(*point, {"k": k}), wanted, rtol=1e-13)
 
 
-def singular(t, x, u, params):
-    matrix = np.eye(7) + x[0] * np.ones((7, 7))
-    matrix[6, 6] += u[0]
-    return np.linalg.solve(matrix, np.ones(7)) - x
-
-
 def test_what_is_singular_is_an_error_in_python_and_not_a_number_in_machine_code():
-    """I + x 1 1' with x = -1 / 7 would not be singular in floats; two equal rows are."""
+    """The last row is 0 unless the input is not."""
 
     def update(t, x, u, params):
         matrix = first + np.outer(u[0] * unit, x)
         return np.linalg.solve(matrix, x) + 0.0 * np.linalg.det(matrix)
 
-    first, unit = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) + np.tri(7, k=-1), np.eye(7)[6]
+    first, unit = np.triu(np.ones((7, 7))), np.eye(7)[6]
+    first[6] = 0.0
     system = ct.nlsys(update, None, inputs="u", outputs=7, states=7, name="s")
     compiled, x = nlctl.compile(system), np.arange(1.0, 8.0)
     np.testing.assert_allclose(
@@ -376,3 +377,35 @@ def test_modf_is_that_of_python(x):
     compiled = nlctl.compile(system)
     assert "Jacobian     exact" in str(compiled)
     np.testing.assert_array_equal(compiled.dynamics(0.0, [x, 0.0], [0.0]), math.modf(x))
+
+
+@pytest.mark.parametrize("n", [7, 20, 40])
+def test_a_constant_matrix_is_factorised_in_advance(n):
+    """What a step computes is the substitution, which is affine in the right-hand side."""
+    matrix = np.random.default_rng(n).normal(size=(n, n))
+    system = ct.nlsys(lambda t, x, u, params: np.linalg.solve(matrix, x - u[0]), None, inputs="u",
+                      outputs=n, states=n, name="constant")  # fmt: skip
+    compiled = nlctl.compile(system)
+    found = compiled.linearize(np.ones(n), [0.5])
+    wanted = np.linalg.inv(matrix)
+    bound = 1e-14 * np.linalg.cond(matrix)
+    np.testing.assert_allclose(found.A, wanted, atol=bound * np.abs(wanted).max())
+    parts = [e for e, _ in compiled.equations.pieces("dx")]
+    u = next(e for e in needed(parts) if e.op == "leaf" and e.data[0] == "u")
+    assert all(affine(e, u) for e in parts)
+
+
+def test_second_derivatives_follow():
+    """Of a solution and a determinant: derivatives of derivatives, as differences of these."""
+    graph = Graph({"x": 2})
+    x, wanted = leaf_vector(graph, "x", 0, (2,)), of_six_angles
+    results = [e for e, _ in trace(graph, lambda v: np.array(wanted(v)), lambda: (x,)).pieces()]
+    along = lambda exprs, k: tangents(graph, exprs, lambda e: graph.const(float(e.data[1] == k)))  # noqa: E731
+    second = along(along(results, 0), 1)
+
+    def first(v):
+        return np.array(evaluate_expressions(along(results, 0), {"x": v[:, None]}))[:, 0]
+
+    at = np.array([0.3, -0.4])
+    found = np.array(evaluate_expressions(second, {"x": at[:, None]}))[:, 0]
+    np.testing.assert_allclose(found, richardson(first, at)[:, 1], rtol=1e-7)

@@ -17,7 +17,7 @@ from .table import Facade, constant_value, of
 __all__: list[str] = []
 
 _Rows = list[list[Any]]
-_SMALL = 6  # rows of a matrix up to which elimination is written out
+_SMALL = 6  # rows of a matrix up to which elimination is written out, not one operation
 
 
 def _rows(graph: Graph, matrix: Any) -> _Rows:
@@ -47,7 +47,7 @@ def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
 def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
     right, rows = traced(graph, b), _square(graph, matrix)
-    if not _is_written_out(rows):
+    if len(rows) > _SMALL:
         return _solved_as_one(graph, rows, right)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
     rows = [[*row, *more] for row, more in zip(rows, columns, strict=True)]
@@ -55,13 +55,6 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     _guard(graph, pivots)
     x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
-
-
-def _is_written_out(rows: _Rows) -> bool:
-    """Whether elimination is written out; otherwise it is an operation of its own."""
-    if len(rows) <= _SMALL:
-        return True
-    return all(e.op == "const" for row in rows for v in row for e in v.values.flat)
 
 
 def _factors(graph: Graph, rows: _Rows) -> Expr:
@@ -172,7 +165,7 @@ def inv(graph: Graph, a: Any) -> Tracer:
 def det(graph: Graph, a: Any) -> Any:
     """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
     rows = _square(graph, a)
-    if not _is_written_out(rows):
+    if len(rows) > _SMALL:
         return scalar(graph, determinant(graph, _factors(graph, rows)))
     return _determinant(graph, rows)
 
