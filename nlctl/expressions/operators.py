@@ -87,7 +87,7 @@ def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
         return special.operation(graph, name, operands)
     arrays = [traced(graph, v) for v in operands]
     if all(not a.values.shape and a.axis is None for a in arrays):  # most are numbers
-        return scalar(graph, graph.op(name, *(a.cells[()] for a in arrays)))
+        return scalar(graph, graph.op(name, *(a.only for a in arrays)))
     longs = {(a.ndim - a.axis, a.length) for a in arrays if a.axis is not None}
     if len(longs) > 1 or (longs and _is_mixed(arrays, *longs)):
         arrays, longs = [a.short() for a in arrays], set()
