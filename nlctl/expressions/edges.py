@@ -40,7 +40,7 @@ def _ends(node: Expr) -> bool:
     if not node.varies:
         return False
     if node.op in _ROOTS or (node.op == "power" and not _is_whole(node.args[1])):
-        return not _is_square(node.args[0])
+        return not _is_never_negative(node.args[0])
     return node.op in (*_ARCS, *_BEHIND_ONE)
 
 
@@ -61,7 +61,7 @@ def is_positive(expr: Expr) -> bool:
     if expr.op == "const":
         return bool(expr.data > 0)
     if expr.op == "add":
-        return all(map(_is_square, expr.args)) and any(map(is_positive, expr.args))
+        return all(map(_is_never_negative, expr.args)) and any(map(is_positive, expr.args))
     if expr.op in ("mul", "div", "sqrt"):
         return all(map(is_positive, expr.args))
     if expr.op == "maximum":
@@ -69,14 +69,14 @@ def is_positive(expr: Expr) -> bool:
     return expr.op in _ABOVE
 
 
-def _is_square(expr: Expr) -> bool:
+def _is_never_negative(expr: Expr) -> bool:
     """Return whether an expression is seen to be at least 0."""
     if expr.op == "const":
         return bool(expr.data >= 0)
     if expr.op == "mul" and expr.args[0] is expr.args[1]:
         return True
     if expr.op in ("add", "mul", "div"):
-        return all(map(_is_square, expr.args))
+        return all(map(_is_never_negative, expr.args))
     if expr.op == "maximum":
-        return any(map(_is_square, expr.args))
+        return any(map(_is_never_negative, expr.args))
     return expr.op in _SQUARES or is_positive(expr)

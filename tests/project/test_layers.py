@@ -80,7 +80,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     "nlctl.expressions": [
         ["graph", "source"],
         ["functions", "elimination", "linear_systems"],
-        ["arrays", "operators", "masked", "indexing"],
+        ["arrays", "operators", "masked", "indexing", "edges"],
         [
             "conditions",
             "continuity",
