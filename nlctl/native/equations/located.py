@@ -89,9 +89,8 @@ def found_conditions(
     watched: Iterable[Expr] = (),
 ) -> Conditions:
     """Return what switches in a diagram whose blocks have been read."""
-    # Where it moves rates, declared switching functions, guards, by the places of their blocks,
-    # what arrives at delays and memories become (`others`), or an event function of the run
-    # (`watched`).
+    # Where it moves rates, declared switching functions, guards, by their blocks' places, what
+    # arrives at delays and memories become (`others`), or an event function (`watched`).
     declared, watched = tuple(declared), tuple(watched)
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
@@ -102,42 +101,44 @@ def found_conditions(
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
     rows = beyond = 0
-    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps where x is 0 within
-    # tolerances, and there is nothing to locate.
+    # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
     p = _values(reader)
     for condition, node in _undeclared(reader, rates, guards, watched):
-        if condition not in inside:
-            continue
-        if condition in timed:
+        if condition in timed and condition in inside:
             of_time[condition] = None
+        if condition in timed or condition not in inside:
             continue
         path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
-        functions = switching_functions(reader.graph, condition)
-        sides = (1, -1) if at_integers(condition) else (0,) * len(functions)
-        for function, side in zip(functions, sides, strict=True):
+        functions = _with_sides(reader.graph, condition)
+        for function, side in functions:
             key, size = _key(function), function.size or 1
             if key in located:
-                both = bends and located[key].bends
-                located[key] = replace(located[key], bends=both)
+                located[key] = replace(located[key], bends=bends and located[key].bends)
                 continue
             if key in known or not function.varies or _remembers(function, node):
                 continue
-            if side < 0 and _key(functions[0]) not in located:
-                continue
-            if rows + size > _MOST and side >= 0:
+            size *= side >= 0  # of two functions of integers one counts
+            if rows + size > _MOST:
                 beyond += size
-                continue
-            located[key] = Located(
-                function=function, block=path, what=condition.op, bends=bends, integers=side
-            )
-            rows += size if side >= 0 else 0
+            elif size or _key(functions[0][0]) in located:
+                located[key] = Located(
+                    function=function, block=path, what=condition.op, bends=bends, integers=side
+                )
+                rows += size
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
+    ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=tuple(sorted(located.values(), key=lambda one: not one.bends)),
-        of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
-    )  # fmt: skip
+        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond
+    )
+
+
+def _with_sides(graph: Graph, condition: Expr) -> list[tuple[Expr, int]]:
+    """Return switching functions, each with what `Located.integers` says of it."""
+    functions = switching_functions(graph, condition)
+    sides = (1, -1) if at_integers(condition) else (0,) * len(functions)
+    return list(zip(functions, sides, strict=True))
 
 
 def _values(reader: Reader) -> np.ndarray:

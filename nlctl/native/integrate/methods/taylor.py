@@ -326,9 +326,9 @@ def _compare(task, lane, w, j):
 
     What changes so fast that its polynomial says little asks for a shorter step as well.
 
-    The polynomials of what is compared are looked at in `_LOOKS` places, unless their terms
-    together are less than the first.  A shorter step is not asked for without end: what begins so
-    near to a kink that rounding cannot tell may go through it.
+    Polynomials are looked at in `_LOOKS` places, unless their terms together are less than the
+    first.  A shorter step is not asked for without end: what begins so near to a kink that rounding
+    cannot tell may go through it.
     """
     events, inside, taylor = w.events, w.inside, w.taylor
     inside.looked[j], inside.foreseen[j] = 0.0, 1.0
@@ -399,9 +399,7 @@ def _last_terms(p, h, terms, row, j):
 @numba.njit(**INNER)
 def _turning(p, h, terms, row, ends, slopes, j):
     """Return about where a polynomial's slope is 0, between two places where its signs differ."""
-    low, high = ends
-    first, last = slopes
-    least = low
+    (low, high), (first, last), least = ends, slopes, 0.0
     for _ in range(_TURNS):
         least = low + first / (first - last) * (high - low)
         slope = _value_and_slope(p, least * h, terms, row, j)[1]
