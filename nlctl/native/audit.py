@@ -8,7 +8,7 @@ some points of a run's own trajectory its right-hand side and outputs are compar
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal
@@ -83,15 +83,24 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         raise ParameterError(f"audit must be True, False or 'every run', got {wanted!r}")
     if not wanted:
         return
-    with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        width = trial.width if ct.isctime(compiled.system) else 1
-        (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
-        each = np.repeat(trial.p[:, None], width, axis=1)
-        code, done = machine(compiled, each, width, due.patterns), compiled.cache.of(_Audited)
-        if wanted != _EVERY and any(known.code is code for known in done):
-            return
-        _, c = prepared_parameters(compiled, trial.p, width, due.patterns)
-        done.append(_Audited(code=code))
+    with _ONE_AT_A_TIME:
+        width, patterns = trial.width if ct.isctime(compiled.system) else 1, ()
+        if compiled.program.clocks:
+            p = trial.p[:, None]
+            patterns = instants_of(compiled.schedule, compiled.program, trial.time, p)[0].patterns
+        each = trial.p[:, None] if width == 1 else np.repeat(trial.p[:, None], width, axis=1)
+        code, done = machine(compiled, each, width, patterns), compiled.cache.of(_Audited)
+        if wanted == _EVERY or all(known.code is not code for known in done):
+            done.append(_Audited(code=code))
+            _compare_points(compiled, trial, code, patterns)
+
+
+def _compare_points(
+    compiled: Compiled, trial: Trial, code: Machine, patterns: Iterable[Happening]
+) -> None:
+    """Compare the points of a run."""
+    with np.errstate(all="ignore"):
+        _, c = prepared_parameters(compiled, trial.p, code.width, patterns)
         evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None

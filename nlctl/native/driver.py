@@ -127,7 +127,8 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     """
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
-    if np.all(run.lanes["status"] >= 0):  # all are over
+    if not np.any(run.lanes["status"] == RUNNING):  # all are over, or it goes on otherwise
+        paces["t"] = run.lanes["t"]
         return run
     lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
     if not len(lanes):

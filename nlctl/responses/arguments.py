@@ -117,7 +117,7 @@ def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) ->
         raise ParameterError(f"inputs need real numbers, got {_short(inputs)}")
     if array.shape != shape:
         raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
-    for i, k in np.argwhere(~np.isfinite(array))[:1]:
+    for i, k in () if np.isfinite(array).all() else np.argwhere(~np.isfinite(array))[:1]:
         raise ParameterError(
             f"inputs has {array[i, k]} at '{system.input_labels[i]}', t = {times[k]:g} s: "
             "every input needs a finite number at every time"

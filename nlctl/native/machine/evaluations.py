@@ -13,7 +13,7 @@ from ...sampling.system import Happening
 from ..equations.blocks import equations
 from ..lower import Lowered, lower
 from ..reading import Reading
-from .routine import called_back, entry, lowered_code, raise_failures
+from .routine import called_back, entries_of, entry, lowered_code, raise_failures
 
 _LOG = logging.getLogger("nlctl")
 ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
@@ -59,27 +59,21 @@ class Machine:
     @property
     def sample_entries(self) -> np.ndarray:
         """What integrators take of `samples`."""
-        return _entries(self.samples)
+        return entries_of(self.samples)
 
     @property
     def reset_entries(self) -> np.ndarray:
         """What integrators take of `resets`: one function, or none."""
-        return _entries(() if self.resets is None else (self.resets,))
+        return entries_of(() if self.resets is None else (self.resets,))
 
     @property
     def signal_entry(self) -> np.ndarray:
         """What integrators take of `out` to look at delayed signals."""
-        return _entries((self.out,))
+        return entries_of((self.out,))
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
         raise_failures(self._functions, c)
-
-
-def _entries(functions: tuple[Any, ...]) -> np.ndarray:
-    entries = [entry(function) for function in functions]
-    plain = any(callable(address) for address in entries)
-    return np.array(entries, dtype=object if plain else np.int64)
 
 
 def machine(

@@ -111,6 +111,13 @@ def entry(function: Any) -> Any:
     return function.address if isinstance(function, Routine) else function
 
 
+def entries_of(functions: Sequence[Any]) -> np.ndarray:
+    """Return what integrators take of several functions."""
+    entries = [entry(function) for function in functions]
+    plain = any(callable(address) for address in entries)
+    return np.array(entries, dtype=object if plain else np.int64)
+
+
 def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
     """Raise what an opaque function has raised within these, whose parameters were `c`."""
     for function in functions:

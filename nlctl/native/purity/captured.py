@@ -11,8 +11,8 @@ from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import compress
-from operator import is_, not_
+from itertools import chain, compress
+from operator import getitem, is_, not_
 from types import CellType, CodeType, FunctionType, MethodType
 from typing import Any
 
@@ -77,19 +77,22 @@ class CapturedValues:
 
     def __init__(self, notes: Iterable[Captured]) -> None:
         every = tuple({(id(n.holder), n.name, id(n.then)): n for n in notes}.values())
-        is_alike = [type(n.holder) is not dict and n.now is n.then for n in every]
-        alike = list(compress(every, is_alike))
+        is_alike = [n.now is n.then for n in every]
         self.notes, self.others = every, list(compress(every, map(not_, is_alike)))
+        in_dict = [n for n in compress(every, is_alike) if type(n.holder) is dict]
+        alike = [n for n in compress(every, is_alike) if type(n.holder) is not dict]
         in_cell = "cell_contents"
-        self.names = [in_cell if isinstance(n.holder, CellType) else n.name for n in alike]
-        self.holders = [n.holder for n in alike]
-        self.objects = [n.then for n in alike]
+        names = [in_cell if isinstance(n.holder, CellType) else n.name for n in alike]
+        self.attributes = [n.holder for n in alike], names
+        self.items = [n.holder for n in in_dict], [n.name for n in in_dict]
+        self.objects = [n.then for n in (*alike, *in_dict)]
 
     def changed(self) -> Captured | None:
         """Return the first value that is not what it was."""
         try:
-            alike = all(map(is_, map(getattr, self.holders, self.names), self.objects))
-        except (AttributeError, ValueError):  # gone, or a cell that was emptied
+            values = chain(map(getattr, *self.attributes), map(getitem, *self.items))
+            alike = all(map(is_, values, self.objects))
+        except (AttributeError, KeyError, ValueError):  # gone, or a cell that was emptied
             alike = False
         notes = self.others if alike else self.notes
         for note in notes:
@@ -136,8 +139,8 @@ def same(now: Any, then: Any) -> bool:
         return False
     if isinstance(now, np.ndarray):
         alike = now.dtype == then.dtype and now.shape == then.shape
-        masks = [np.ma.getmaskarray(v) for v in (now, then) if isinstance(v, np.ma.MaskedArray)]
-        alike = alike and (not masks or np.array_equal(masks[0], masks[1]))
+        if alike and isinstance(now, np.ma.MaskedArray):
+            alike = np.array_equal(np.ma.getmaskarray(now), np.ma.getmaskarray(then))
         # bit by bit: NaN is itself, 0 is not -0, an object is not its equal
         return alike and np.asarray(now).tobytes() == np.asarray(then).tobytes()
     if isinstance(now, MethodType):  # a new one each time it is read
