@@ -127,12 +127,11 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     """
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
-    if not np.any(run.lanes["status"] == RUNNING):  # all are over, or it goes on otherwise
-        paces["t"] = run.lanes["t"]
+    if np.all(run.lanes["status"] >= 0):  # all are over
         return run
     lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
     if not len(lanes):
-        return go_on(run, probe)
+        return go_on(run, probe) if RUNNING in run.lanes["status"] else run
     attempts = []
     for _ in range(probe):
         run, attempt = snapshot(run.work, partial(go_on, run, 1))
