@@ -127,9 +127,9 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     """
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
-    if np.all(run.lanes["status"] >= 0):  # all are over
+    if (run.lanes["status"] >= 0).all():  # all are over
         return run
-    lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
+    lanes = asked(run.lanes, paces).nonzero()[0] if run.task.fixed == 0.0 else ()
     if not len(lanes):
         return go_on(run, probe) if RUNNING in run.lanes["status"] else run
     attempts = []

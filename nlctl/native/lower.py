@@ -91,7 +91,8 @@ class Lowered:
 
     def holds_for(self, p: Any) -> bool:
         """Whether the program holds for parameters `p`, an array with a row per number."""
-        return all(bool(np.all(np.asarray(p)[i] == v)) for i, v in self.assumed.items())
+        values = np.asarray(p)
+        return all(bool((values[i] == v).all()) for i, v in self.assumed.items())
 
 
 def lower(

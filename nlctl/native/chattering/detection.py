@@ -63,15 +63,17 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
     `_LONG` windows on: what usual runs take must not cost them anything.
     """
-    gone = lanes["t"] - paces["t"]
-    paces["t"] = lanes["t"]
-    paces["longest"] = np.maximum(paces["longest"], gone)
-    paces["windows"] += 1
-    paces["slow"] = np.where(gone < _SLOW * paces["longest"], paces["slow"] + 1, 0)
-    due = [(n & (n - 1)) == 0 for n in (paces["windows"], paces["slow"])]
-    return (lanes["status"] == RUNNING) & (
-        (due[0] & (paces["windows"] >= _LONG)) | ((paces["slow"] > 0) & due[1])
-    )
+    before, longest, windows, slow = (paces[name] for name in _PACES.names or ())
+    gone = lanes["t"] - before
+    before[:] = lanes["t"]
+    np.maximum(longest, gone, out=longest)
+    windows += 1
+    slow[:] = (slow + 1) * (gone < _SLOW * longest)
+    running = lanes["status"] == RUNNING
+    if not running.any():
+        return running
+    due = [(n & (n - 1)) == 0 for n in (windows, slow)]
+    return running & ((due[0] & (windows >= _LONG)) | ((slow > 0) & due[1]))
 
 
 def probe_of(task: Any) -> int:

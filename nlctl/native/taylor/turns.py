@@ -32,7 +32,7 @@ from .routine import series
 
 _ORDER = 8  # from which on steps are worth more than what they cost, in most loops
 _STEPS = 250  # of the explicit pair, before Taylor's method is tried
-_SPAN, _MOST = 400, 2000  # steps of Taylor's method before that, twice as many each time
+_SPAN, _MOST = 800, 2000  # steps of Taylor's method before that, twice as many each time
 _COMPARED = with_fields(OTHER_METHOD, compared=1)
 
 
@@ -63,9 +63,11 @@ def series_ahead(reading: Reading, p: np.ndarray) -> None:
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
     """Return a run that continues by the other method, if it asks for that."""
-    lane, fails = run.lanes[0], _fails(run)
-    if lane["status"] != METHOD and not fails:
+    status = run.lanes["status"][0]
+    fails = status in (STEP_TOO_SMALL, DIVERGED) and _fails(run)
+    if status != METHOD and not fails:
         return run
+    lane = run.lanes[0]
     if fails:  # the explicit pair has the last word
         lane["span"] = FIRST_TURN
     lane["status"] = RUNNING
@@ -89,12 +91,12 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
 
 
 def _fails(run: Run) -> bool:
-    """Whether Taylor's method does not get on, from a place where all is finite."""
+    """Whether it is Taylor's method that does not get on: from a place where all is finite."""
     # Where a guard is NaN it is, at that place: no other method may continue.
     if not (run.task.taylor.highest and run.task.taylor.compared):
         return False
     here = np.append(run.work.x, run.work.events.g_start)
-    return run.lanes["status"][0] in (STEP_TOO_SMALL, DIVERGED) and bool(np.isfinite(here).all())
+    return bool(np.isfinite(here).all())
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:
