@@ -8,7 +8,7 @@ some points of a run's own trajectory its right-hand side and outputs are compar
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal
@@ -83,24 +83,16 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         raise ParameterError(f"audit must be True, False or 'every run', got {wanted!r}")
     if not wanted:
         return
-    with _ONE_AT_A_TIME:
-        width, patterns = trial.width if ct.isctime(compiled.system) else 1, ()
-        if compiled.program.clocks:
-            p = trial.p[:, None]
-            patterns = instants_of(compiled.schedule, compiled.program, trial.time, p)[0].patterns
-        each = trial.p[:, None] if width == 1 else np.repeat(trial.p[:, None], width, axis=1)
-        code, done = machine(compiled, each, width, patterns), compiled.cache.of(_Audited)
-        if wanted == _EVERY or all(known.code is not code for known in done):
-            done.append(_Audited(code=code))
-            _compare_points(compiled, trial, code, patterns)
-
-
-def _compare_points(
-    compiled: Compiled, trial: Trial, code: Machine, patterns: Iterable[Happening]
-) -> None:
-    """Compare the points of a run."""
-    with np.errstate(all="ignore"):
-        _, c = prepared_parameters(compiled, trial.p, code.width, patterns)
+    with _ONE_AT_A_TIME, np.errstate(all="ignore"):
+        width, p = trial.width if ct.isctime(compiled.system) else 1, trial.p[:, None]
+        read, clocks = compiled.schedule, compiled.program.clocks
+        due = instants_of(read, compiled.program, trial.time, p)[0].patterns if clocks else ()
+        each = np.repeat(p, width, axis=1)
+        code, done = machine(compiled, each, width, due), compiled.cache.of(_Audited)
+        if wanted != _EVERY and any(known.code is code for known in done):
+            return
+        _, c = prepared_parameters(compiled, trial.p, width, due)
+        done.append(_Audited(code=code))
         evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None

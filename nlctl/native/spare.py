@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,14 +44,12 @@ def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> S
 
 def _fitting(kept: list[Spare], sizes: tuple[Any, ...]) -> Spare | None:
     """Take the workspace of these sizes, if one is kept."""
-    for _ in range(len(kept)):
-        try:
+    with suppress(IndexError):  # another thread has just taken the last
+        for _ in range(len(kept)):
             spare = kept.pop(0)
-        except IndexError:  # another thread has just taken it
-            return None
-        if spare.sizes == sizes:
-            return spare
-        kept.append(spare)
+            if spare.sizes == sizes:
+                return spare
+            kept.append(spare)
     return None
 
 

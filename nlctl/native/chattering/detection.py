@@ -69,11 +69,9 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     np.maximum(longest, gone, out=longest)
     windows += 1
     slow[:] = (slow + 1) * (gone < _SLOW * longest)
-    running = lanes["status"] == RUNNING
-    if not running.any():
-        return running
     due = [(n & (n - 1)) == 0 for n in (windows, slow)]
-    return running & ((due[0] & (windows >= _LONG)) | ((slow > 0) & due[1]))
+    asked_now = (due[0] & (windows >= _LONG)) | ((slow > 0) & due[1])
+    return (lanes["status"] == RUNNING) & asked_now
 
 
 def probe_of(task: Any) -> int:

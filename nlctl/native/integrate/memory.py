@@ -56,11 +56,6 @@ class Pointed(types.Type):
         super().__init__(name=f"Pointed({text})")
 
     @functools.cached_property
-    def places(self) -> dict[str, int]:
-        """Which row of the table each field has."""
-        return {name: place for place, name in enumerate(self.fields)}
-
-    @functools.cached_property
     def formats(self) -> dict[str, tuple[Any, int]]:
         """Data type, or the type of a record inside, and number of dimensions of each field."""
         return {
@@ -149,14 +144,11 @@ def _check_format(record: Any, name: str, value: Any) -> None:
 
 def with_fields(record: Any, **changes: Any) -> Any:
     """Return a record with other values of some fields."""
-    kind, values, table = type(record), list(record), record.table.copy()
-    places, formats = type_of(kind).places, type_of(kind).formats
+    kind, table = type(record), record.table.copy()
+    formats = type_of(kind).formats
     for name, value in changes.items():
-        place = places[name]
-        table[place] = _entry(kind, name, value, *formats[name])
-        values[place] = value
-    values[-1] = table
-    return kind(*values)
+        table[list(formats).index(name)] = _entry(kind, name, value, *formats[name])
+    return record._replace(**changes, table=table)
 
 
 def grown(record: Any, names: tuple[str, ...], room: int) -> Any:

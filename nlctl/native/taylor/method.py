@@ -9,6 +9,7 @@ import numpy as np
 
 from ..integrate.memory import with_fields, with_table
 from ..integrate.methods.taylor import TaylorMethod
+from ..machine.routine import entries_of
 from ..reading import Reading
 from ..settings import Settings
 from .routine import series
@@ -39,7 +40,7 @@ def with_taylor(
     taylor = with_table(
         TaylorMethod,
         highest=order,
-        functions=coefficients.entries,
+        functions=entries_of(coefficients.functions),
         sides=coefficients.sides,
         c=coefficients.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
         compared=int(settings.method != "taylor"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..equations.relays import relay_places
 from ..integrate.memory import zeros
 from ..lower import Lowered, planned, stores_of
 from ..machine.finish import finished
-from ..machine.routine import Routine, entries_of
+from ..machine.routine import Routine
 from ..reading import Reading
 from .folds import WIDE, SeriesLayout, taylor_text
 from .plain import plain_series
@@ -44,11 +43,6 @@ class Series:
     functions: tuple[Any, ...]
     layout: SeriesLayout
     sides: np.ndarray  # (comparisons, 2): see `Recurrences.sides`
-
-    @cached_property
-    def entries(self) -> np.ndarray:
-        """What integrators take of the functions."""
-        return entries_of(self.functions)
 
     def parameters(self, p: np.ndarray, **settings: float) -> np.ndarray:
         """Return the `c` of parameter vectors, shape (parameters, members), and of `_SETTINGS`."""

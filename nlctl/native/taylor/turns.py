@@ -46,9 +46,8 @@ def may_turn(reading: Reading) -> bool:
 
 def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
     """Return a run that tries Taylor's method after so many steps."""
-    if settings.method != "auto" or settings.step or order_for(settings.rtol) < _ORDER:
-        return run
-    if not may_turn(reading):
+    tight = order_for(settings.rtol) >= _ORDER
+    if settings.method != "auto" or settings.step or not (tight and may_turn(reading)):
         return run
     run.lanes["span"], run.lanes["wait"], run.lanes["stay"] = _STEPS, _STEPS, _SPAN
     return replace(run, task=with_fields(run.task, taylor=_COMPARED))
