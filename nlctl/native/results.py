@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..responses.event_log import NO_EVENTS, EventLog
-from .chattering.detection import Jump
+from .chattering.steps import Jump
 from .integrate.state import Status
 
 

@@ -21,8 +21,6 @@ from ..equations.relays import relay_places
 from ..happened import row_labels
 from .steps import Jump
 
-__all__ = ["chattering_words"]
-
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 _WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
 _JUMPS = 1e3  # change of an output over that of inputs and states, which no usual function has

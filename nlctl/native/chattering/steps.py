@@ -10,8 +10,6 @@ import numpy as np
 
 from ...accumulation import Crowd
 
-__all__ = ["Attempt", "Jump", "LaneEquations", "parameters_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Jump:

@@ -19,8 +19,6 @@ from ...expressions.derivatives import tangents
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["affine", "bend_places", "replaced_parts", "unreadable", "zero_between"]
-
 _LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _BENDS = ("maximum", "minimum", "absolute", "select")
 _ORDERS = ("lt", "le", "gt", "ge")

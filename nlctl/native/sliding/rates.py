@@ -11,17 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import CompileError
+from ...expressions.bends import replaced_parts
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .pieces import (
-    LeafDerivative,
-    affine,
-    bend_places,
-    replaced_parts,
-    slope_of,
-    unreadable,
-    zero_between,
-)
+from .pieces import LeafDerivative, affine, bend_places, slope_of, unreadable, zero_between
 from .second import Limits, SecondOrder, second_order
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs

@@ -21,8 +21,6 @@ from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from .pieces import LeafDerivative, affine, bend_places, unreadable, zero_between
 
-__all__ = ["Limits", "SecondOrder", "second_order"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
