@@ -17,7 +17,6 @@ import numpy as np
 from ..annotations import as_annotated
 from ..arguments import ATOL, RTOL, one_of
 from ..arguments import number as checked_number
-from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..names import unknown
 from ..params import checked_times, integer
@@ -28,9 +27,8 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import begin, finish, prepared, trajectory, watched
+from .driver import Course, begin, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike
-from .histories import variations
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -159,7 +157,8 @@ def ensemble_response(
     grid, u = times, input_array(compiled.system, given["inputs"], times)
     if hold == "zoh" and ct.isctime(compiled.system) and u.size:
         grid, u = held(times, u)
-    asked = _Asked(times=times, grid=grid, inputs=u, settings=settings, metrics=metrics)
+    course = Course(compiled=compiled, times=grid, inputs=u, settings=settings)
+    asked = _Asked(times=times, course=course, metrics=metrics)
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     rows = _run(_runner(every, asked, kept, audit), every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
@@ -188,12 +187,10 @@ def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[Me
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """What each member is asked: times of its samples among those of the run, inputs, metrics."""
+    """What each member is asked: times of its samples among those of the run, and metrics."""
 
     times: np.ndarray
-    grid: np.ndarray
-    inputs: np.ndarray
-    settings: Settings
+    course: Course
     metrics: Sequence[MetricLike]
 
 
@@ -203,18 +200,18 @@ def _runner(
     """Return what runs a group of members, keeps their signals and returns their rows."""
     compiled = every.compiled
     labels = compiled.system.output_labels
-    varied = variations(compiled, asked.grid)  # once for all members
+    _ = asked.course.varied  # once for all members
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
     compile_for(compiled, p, ENSEMBLE_WIDTH)  # once, before the threads start
     audited = {0, every.size // 2, every.size - 1} if audit else ()
 
     def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
         rows = {}
-        runs = _group(every, numbers, asked.grid, asked.inputs, asked.settings, varied, stop)
+        runs = _group(every, numbers, asked.course, stop)
         for number, run in zip(numbers, runs, strict=False):
             if number in audited:
                 _audit(every, number, run, audit)
-            run = run if asked.grid is asked.times else _sampled_at(run, asked.times)
+            run = run if asked.course.times is asked.times else _sampled_at(run, asked.times)
             for signal, samples in kept.items():
                 samples[number, : run.time.size] = run.outputs[labels.index(signal)]
             rows[number] = _row(run, labels, asked.metrics)
@@ -256,23 +253,15 @@ class _Stop:
     wanted = True
 
 
-def _group(
-    every: Members,
-    numbers: range,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    settings: Settings,
-    varied: list[Variation | None],
-    stop: _Stop,
-) -> Iterator[Trajectory]:
+def _group(every: Members, numbers: range, course: Course, stop: _Stop) -> Iterator[Trajectory]:
     """Run up to WIDTH members in a batch; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, ENSEMBLE_WIDTH)
-    alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
+    alone = course.settings.method == "rodas5p" or not ct.isctime(compiled.system)
     if alone:
         for j in range(len(numbers)):
             if not stop.wanted:
                 return
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
+            yield trajectory(course, x0[:, j], p[:, j])
         return
     found: dict[int, tuple[Run, np.ndarray]] = {}
     while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
@@ -280,28 +269,20 @@ def _group(
         fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), ENSEMBLE_WIDTH), first)
         # others' places are taken by copies: what runs beside a member changes nothing
         columns = np.where(fits, np.arange(ENSEMBLE_WIDTH), first)
-        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, varied, stop)
+        ran = _ran(course, x0[:, columns], p[:, columns], stop)
         found |= {int(j): ran for j in np.flatnonzero(fits)}
     for j in range(len(numbers) if stop.wanted else 0):
         run, outputs = found[j]
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
+            yield trajectory(course, x0[:, j], p[:, j])
         else:
             yield made(run, outputs, j)
 
 
-def _ran(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    members: tuple[np.ndarray, np.ndarray],
-    settings: Settings,
-    varied: list[Variation | None],
-    stop: _Stop,
-) -> tuple[Run, np.ndarray]:
+def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: _Stop) -> tuple[Run, np.ndarray]:
     """Run as many members as there are lanes; return the run and its outputs."""
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        run = prepared(compiled, times, inputs, *members, settings, varied)
+        run = prepared(course, x0, p)
         begin(run)
         paces = new_paces(run.lanes)
         while stop.wanted and np.any(run.lanes["status"] == RUNNING):

@@ -19,7 +19,7 @@ from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled, with_watched
-from .driver import trajectory
+from .driver import Course, trajectory
 from .integrate.state import Status
 from .own_errors import own_error
 from .reading import Resolved
@@ -59,7 +59,8 @@ def respond(
         u = interpolated(u, times, grid)
     p = resolved.p
     check_numbers(watched, (float(grid[0]), x0, u[:, 0]), params)
-    reached = trajectory(compiled, grid, u, x0, p, settings, progress)
+    course = Course(compiled=compiled, times=grid, inputs=u, settings=settings)
+    reached = trajectory(course, x0, p, progress)
     trial = Trial(
         time=reached.time, states=reached.states, inputs=reached.inputs, p=p, params=params, width=1
     )
