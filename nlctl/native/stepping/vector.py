@@ -20,7 +20,7 @@ from ..integrate.methods.tableau import Tableau
 from ..members import members
 from .held import HeldRun
 from .pool import Pool
-from .stepper import stepper
+from .stepper import begun, failed, stepper
 from .window import HELD_STEPS
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class VectorStepper:
         chosen, u = self._chosen(members), self._inputs("reset", inputs)
         x0, p, given = self._begins(initial_state, params)
         for i in chosen:
-            self._y[i] = self._members[i].begin(x0[:, i], p[:, i], given(i), time, u[i])
+            self._y[i] = begun(self._members[i], (x0[:, i], p[:, i]), given(i), time, u[i])
         return self._y.copy()
 
     @as_annotated
@@ -160,7 +160,7 @@ class VectorStepper:
         if together.size and self._pool is not None:
             self._y[together] = self._pool.advance(together, u[together])
             for i in together[~np.isfinite(self._y[together]).all(axis=1)]:
-                self._y[i] = self._members[i].fail()
+                self._y[i] = failed(self._members[i])
         alone = np.ones(self.size, dtype=bool)
         alone[together] = False
         for i in np.flatnonzero(alone):
