@@ -15,22 +15,32 @@ from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
 from ..diagrams import apart, not_a_system, override
-from ..errors import CompileError, ParameterError, UsageError
+from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
 from ..responses.watched import Watched
-from ..upstream.control_internals import StandIn, is_system
+from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
 from .describe import called, described
 from .diagram.checks import check_sizes
+from .diagram.parameters import length
 from .diagram.program import program
 from .diagram.schedule import schedule
-from .jacobians import Tangent, linear_system, parameter_jacobian, tangent
+from .jacobians import (
+    Tangent,
+    check_enters_alone,
+    float_parameters,
+    jacobian,
+    over_a_period,
+    tangent,
+    tell_of_differences,
+)
 from .machine.evaluations import evaluations
 from .reading import Reading
 
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
+_NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 Rhs = Callable[..., None]
 
 
@@ -231,7 +241,28 @@ class Compiled(Reading, StandIn):
         -----
         Forward mode on the expressions, so nothing is lost to a step width.
         """
-        return linear_system(self, x0, u0, t, params, copy_names=copy_names, names=names)
+        for name in names:
+            if name not in _NAMED:
+                known = ("copy_names", *_NAMED)
+                raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
+        if isinstance(x0, ct.OperatingPoint):
+            x0, u0 = x0.states, x0.inputs if u0 is None else u0
+        system = self.system
+        n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
+        tell_of_differences(self)
+        directions = np.eye(n + given + length(self.program.layout), n + m)
+        found = jacobian(self, x0, u0, t, params, directions)
+        rates, outputs, dt = found["dx"], found["y"], system.dt
+        if self.program.sampled:
+            rates, outputs, dt = over_a_period(self, found)
+        own = {
+            "name": f"{system.name}$linearized",
+            "inputs": system.input_labels,
+            "outputs": system.output_labels,
+            "states": system.state_labels,
+        }
+        matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
+        return state_space(matrices, dt, (own if copy_names else {}) | names)
 
     @as_annotated
     def parameter_jacobian(
@@ -268,7 +299,19 @@ class Compiled(Reading, StandIn):
             As `linearize`, if there is no such parameter, and if numbers follow from it outside of
             the equations, by a record's `derived`.
         """
-        return parameter_jacobian(self, parameters, x0, u0, t, params)
+        places = float_parameters(self)
+        tell_of_differences(self)
+        self.parameter_vector(params)  # blocks have the run's parameters then
+        start = (self.system.nstates or 0) + self.schedule.ninputs
+        directions = np.zeros((start + length(self.program.layout), len(parameters)))
+        for k, name in enumerate(parameters):
+            if name not in places:
+                raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
+            place, owner = places[name]
+            check_enters_alone(owner, name)
+            directions[start + place, k] = 1.0
+        found = jacobian(self, x0, u0, t, params, directions)
+        return found["dx"], found["y"]
 
     def _call(
         self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any

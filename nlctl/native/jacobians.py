@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import control as ct
 import numpy as np
 from scipy.linalg import expm
 
@@ -16,27 +15,23 @@ from ..arguments import number
 from ..blocks import Block
 from ..delays.transport import PAST
 from ..diagrams import supplied_blocks
-from ..errors import CompileError, InexactWarning, ParameterError, UnknownKeywordError, UsageError
+from ..errors import CompileError, InexactWarning, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
-from ..names import unknown
 from ..params import as_numbers, declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
-from ..upstream.control_internals import state_space
 from ..upstream.systems import System
 from ..wording import counted
 from .codegen.solver import searched
 from .diagram.nodes import Node
-from .diagram.parameters import length
 from .equations.blocks import Equations
 from .lower import DIRECTION
 from .opaque.calls import Call
 from .reading import Reading
 
-_NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
@@ -196,41 +191,6 @@ def point_inputs(system: System, given: Any) -> np.ndarray | None:
     return u if u is not None and u.size == count and np.all(np.isfinite(u)) else None
 
 
-def linear_system(
-    reading: Reading,
-    x0: Any,
-    u0: Any,
-    t: float,
-    params: Any,
-    *,
-    copy_names: bool,
-    names: Mapping[str, Any],
-) -> ct.StateSpace:
-    """Linearize a compiled diagram with exact derivatives; see `Compiled.linearize`."""
-    for name in names:
-        if name not in _NAMED:
-            known = ("copy_names", *_NAMED)
-            raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
-    if isinstance(x0, ct.OperatingPoint):
-        x0, u0 = x0.states, x0.inputs if u0 is None else u0
-    system = reading.system
-    n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
-    tell_of_differences(reading)
-    directions = np.eye(n + given + length(reading.program.layout), n + m)
-    found = jacobian(reading, x0, u0, t, params, directions)
-    rates, outputs, dt = found["dx"], found["y"], system.dt
-    if reading.program.sampled:
-        rates, outputs, dt = over_a_period(reading, found)
-    own = {
-        "name": f"{system.name}$linearized",
-        "inputs": system.input_labels,
-        "outputs": system.output_labels,
-        "states": system.state_labels,
-    }
-    matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
-    return state_space(matrices, dt, (own if copy_names else {}) | dict(names))
-
-
 def tell_of_differences(reading: Reading) -> None:
     """Warn of derivatives that are not exact."""
     names = ("dx", "y", *(r for r in reading.equations.results if r.startswith("sample")))
@@ -282,31 +242,6 @@ def _sampled_map(
         step[places] = found[f"sample{which}"][at : at + array.size]
         at += array.size
     return step
-
-
-def parameter_jacobian(
-    reading: Reading,
-    parameters: Sequence[str],
-    x0: Any,
-    u0: Any = None,
-    t: float = 0.0,
-    params: Any = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
-    system = reading.system
-    places = float_parameters(reading)
-    tell_of_differences(reading)
-    reading.parameter_vector(params)  # blocks have the run's parameters then
-    start = (system.nstates or 0) + reading.schedule.ninputs
-    directions = np.zeros((start + length(reading.program.layout), len(parameters)))
-    for k, name in enumerate(parameters):
-        if name not in places:
-            raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
-        place, owner = places[name]
-        check_enters_alone(owner, name)
-        directions[start + place, k] = 1.0
-    found = jacobian(reading, x0, u0, t, params, directions)
-    return found["dx"], found["y"]
 
 
 def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:
