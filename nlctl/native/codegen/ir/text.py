@@ -138,7 +138,7 @@ class Body:
 
     def same(self, *values: Operand) -> list[Value]:
         """Return values as vectors of one width."""
-        width = max(v.width for v in values if isinstance(v, Value))
+        width = max((v.width for v in values if isinstance(v, Value)), default=0)
         return [self.wide(v, width) for v in values]
 
     def element(self, v: Value, i: int) -> Value:
