@@ -23,7 +23,6 @@ from ..params import as_numbers, declared_params, equation_arguments, with_overr
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
-from ..upstream.systems import System
 from ..wording import counted
 from .codegen.solver import searched
 from .diagram.nodes import Node
@@ -61,10 +60,7 @@ def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
 
 def tangent(reading: Reading) -> Tangent:
     """Return a diagram's equations differentiated by states, inputs and parameters."""
-    known = reading.cache.of(Tangent)
-    if not known:
-        known.append(_tangent(reading))
-    return known[0]
+    return reading.cache.found(Tangent, lambda _: True, lambda: _tangent(reading))
 
 
 def _tangent(reading: Reading) -> Tangent:
@@ -133,10 +129,7 @@ def jacobian(
     system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
     p = reading.parameter_vector(params)
     check_assumed(reading, made, p)
-    u = point_inputs(system, u0)
-    if u is None:
-        count = counted(system.ninputs or 0, "finite number")
-        raise ParameterError(f"u0 needs {count} for '{system.name}', got {u0!r}")
+    u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
     return differentiated_at(reading, made, columns, directions)
@@ -183,12 +176,14 @@ def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
     return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
 
 
-def point_inputs(system: System, given: Any) -> np.ndarray | None:
-    """Return the inputs at a point, shape (ninputs,), 0 by default; None if they are not that."""
-    count, u = system.ninputs or 0, as_numbers(0.0 if given is None else given)
-    if u is not None:
-        u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
-    return u if u is not None and u.size == count and np.all(np.isfinite(u)) else None
+def point_numbers(needs: str, count: int, what: str, given: Any) -> np.ndarray:
+    """Return so many finite numbers, 0 by default, or one for all of them; shape (count,)."""
+    numbers = as_numbers(0.0 if given is None else given)
+    if numbers is not None:
+        numbers = np.full(count, float(numbers)) if numbers.ndim == 0 else numbers.reshape(-1)
+    if numbers is None or numbers.size != count or not np.all(np.isfinite(numbers)):
+        raise ParameterError(f"{needs} {counted(count, 'finite number')} for {what}, got {given!r}")
+    return numbers
 
 
 def tell_of_differences(reading: Reading) -> None:

@@ -15,13 +15,13 @@ from ..arguments import number
 from ..diagrams import state_names
 from ..errors import OperatingPointError, ParameterError, UnknownKeywordError
 from ..names import find_name, unknown
-from ..params import as_numbers
 from ..responses.arguments import checked_params, state_array
 from ..upstream.systems import System
 from ..wording import counted
 from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram
 from .happened import row_labels
+from .jacobians import point_numbers
 
 _WHO = "find_operating_point"
 _FOUND = 1e-8  # residual, relative to what it is made of
@@ -292,7 +292,8 @@ def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
     return _Asked(
         x=state_array(system, named["initial_state"]),
         u=cut.inputs(_WHO, "inputs", named["inputs"]),
-        y=_vector("outputs", y, cut.noutputs), dx=_vector("derivs", named["derivs"], cut.n),
+        y=point_numbers(f"{_WHO} needs", cut.noutputs, "outputs", y),
+        dx=point_numbers(f"{_WHO} needs", cut.n, "derivs", named["derivs"]),
         states=np.setdiff1d(np.arange(cut.n), ix), inputs=np.setdiff1d(np.arange(cut.m), iu),
         rates=idx, outputs=iy,
     )  # fmt: skip
@@ -317,16 +318,6 @@ def _place(kind: str, each: Any, names: Sequence[str]) -> int:
             f"{_WHO} got {each} for the place of an {kind}: there are {len(names)}, from 0 on"
         )
     return int(each)
-
-
-def _vector(name: str, given: Any, size: int) -> np.ndarray:
-    if given is None:
-        return np.zeros(size)
-    array = as_numbers(given)
-    array = np.full(size, float(array)) if array is not None and array.ndim == 0 else array
-    if array is None or array.shape != (size,) or not np.isfinite(array).all():
-        raise ParameterError(f"{_WHO} needs {counted(size, 'finite number')} for {name}")
-    return array.astype(float)
 
 
 def _equations(cut: CutDiagram, asked: _Asked) -> tuple[Callable[..., Any], Callable[..., Any]]:

@@ -530,7 +530,7 @@ class TestSources:
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"purity/vectors.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"purity/dicts.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
         assert taught != module_key(*TAUGHT)

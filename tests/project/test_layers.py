@@ -67,8 +67,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["describe"],
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "linearized", "members"],
-        ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"]
-        + ["spare"],
+        ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"],
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
 from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
 from ...upstream.systems import System
-from ..audit import block_outputs
+from ..audit import every_output
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
 from ..diagram.program import count_switching_functions, memory
@@ -129,9 +128,7 @@ def _blocks(
     """Yield for each block what it is given, and its outputs and rates with their names."""
     t, x, u = point
     nodes = compiled.schedule.nodes
-    y = block_outputs(compiled, p, point)
-    counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
+    outputs = every_output(compiled, p)(point)
     given = block_inputs(system, u[: system.ninputs or 0], outputs)
     for i, (node, (block, inputs)) in enumerate(zip(nodes, given, strict=True)):
         own = x[node.state_offset :][: block.nstates or 0]

@@ -24,8 +24,9 @@ from ...upstream.numba_internals import CPUDispatcher
 from ...upstream.systems import System
 from ...wording import counted
 from ..diagram.parameters import Slot, current_values
-from ..purity import dicts, vectors
+from ..purity import dicts
 from ..purity.dicts import (
+    as_vector,
     callable_constant,
     make_callable,
     params_record,
@@ -33,10 +34,9 @@ from ..purity.dicts import (
     unpacked_arguments,
 )
 from ..purity.objects import frozen
-from ..purity.vectors import as_vector
 from .calls import Call, Source
 
-TAUGHT = (dicts, vectors)  # modules that teach numba what functions of others use
+TAUGHT = (dicts,)  # modules that teach numba what functions of others use
 
 
 def call_of(

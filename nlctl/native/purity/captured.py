@@ -37,10 +37,7 @@ class Captured:
     def now(self) -> Any:
         """What it is."""
         if isinstance(self.holder, CellType):
-            try:
-                return self.holder.cell_contents
-            except ValueError:  # emptied
-                return GONE
+            return in_cell(self.holder, GONE)
         if type(self.holder) is dict:
             return self.holder.get(self.name, GONE)
         return getattr(self.holder, self.name, GONE)
@@ -53,6 +50,14 @@ class Captured:
             owner = owner.func
         name = getattr(owner, "__qualname__", "")
         return f"{name}.{self.name}" if name else self.name
+
+
+def in_cell(cell: CellType, empty: Any = None) -> Any:
+    """Return what is in the cell of a closure, something else if it is not filled."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return empty
 
 
 def noted(holder: object, name: str, value: object) -> Captured:

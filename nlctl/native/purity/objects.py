@@ -19,6 +19,7 @@ import numpy as np
 
 from ...expressions.source import Definition, Unreadable, cells_of, definition
 from ...upstream.numba_internals import CPUDispatcher
+from .captured import in_cell
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (
@@ -72,11 +73,7 @@ def _with(function: FunctionType, names: dict[str, Any], cells: list[CellType]) 
 
 def _cell(name: str, cell: CellType, node: Definition) -> CellType:
     """Return a cell with a record instead of an object; what needs none stays as it is."""
-    try:
-        value = cell.cell_contents
-    except ValueError:  # nothing in it yet
-        return cell
-    record = _record(value, name, node)
+    record = _record(in_cell(cell), name, node)
     return cell if record is None else CellType(record)
 
 

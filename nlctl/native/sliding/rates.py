@@ -15,7 +15,7 @@ from ...expressions.bends import replaced_parts
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from .pieces import LeafDerivative, affine, bend_places, slope_of, unreadable, zero_between
-from .second import Limits, SecondOrder, second_order
+from .second import Limits, second_order
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
@@ -44,11 +44,9 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingRate:
-    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v.
+    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v."""
 
-    Of a rate in several pieces: a and b of the straight line through both ends, v = +-height.
-    """
-
+    # of a rate in several pieces those of the straight line through both ends, v = +-height
     drift: Expr
     gain: Expr
     output: Expr
@@ -136,11 +134,9 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
     gain = slope(rate) or graph.const(0.0)  # what is called as it stands has none: refused
     beyond = None if _acts(gain) else _second(graph, relay, rate, motion, slope)
     if beyond is not None:
-        return _Rate(
-            whole=graph.joined([(e, 1) for e in (*beyond.line, *beyond.piece)]),
-            line=beyond.line,
-            piece=beyond.piece,
-        )
+        line, piece = beyond
+        whole = graph.joined([(e, 1) for e in (*line, *piece)])
+        return _Rate(whole=whole, line=line, piece=piece)
     if affine(rate, relay.leaf):
         (drift,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
         return _Rate(whole=rate, line=(drift, gain), piece=(drift, gain))
@@ -163,7 +159,7 @@ def _acts(gain: Expr) -> bool:
 
 def _second(
     graph: Graph, relay: SlidingInput, rate: Expr, motion: Motion, slope: LeafDerivative
-) -> SecondOrder | None:
+) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]] | None:
     """Return the second-order sliding of one relay alone, without what nobody knows the rate of."""
     (rate,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
     found = second_order(
@@ -171,7 +167,7 @@ def _second(
     )
     if found is None:
         return None
-    parts = needed([*found.line, *found.piece])
+    parts = needed([part for pair in found for part in pair])
     known = not any(
         (e.op == "leaf" and e.data[0] == OUTPUTS)
         or e.op in ("call", "solve")
