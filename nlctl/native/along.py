@@ -54,11 +54,9 @@ class AlongCode:
 
 
 def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
-    """Return the derivatives for a parameter vector, made when they are first needed.
-
-    None if there are none: an equation was differentiated for an integer parameter that has
-    another value now.  Opaque functions have differences in them.
-    """
+    """Return the derivatives for a parameter vector, made when they are first needed."""
+    # None if there are none: an equation was differentiated for an integer parameter that has
+    # another value now.  Opaque functions have differences in them.
     with _ONCE:
         made = reading.cache.found(AlongCode, lambda each: True, lambda: _made(reading))
     if not made.lowered.holds_for(p):

@@ -26,10 +26,8 @@ LOOP = numba.int64(
 def simulate_discrete(
     compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k]).
-
-    Shapes: `times` (m,), `inputs` (ninputs, m), `x0` (nstates,); returns (noutputs, n).
-    """
+    """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k])."""
+    # Shapes: `times` (m,), `inputs` (ninputs, m), `x0` (nstates,); returns (noutputs, n).
     system, count = compiled.system, times.size
     _check_times(system, times)
     code, c = prepared_parameters(compiled, p)

@@ -125,11 +125,9 @@ def go_on(run: Run, rounds: int = ROUNDS) -> Run:
 
 
 def watched(run: Run, paces: np.ndarray) -> Run:
-    """Try a window of steps in every lane; one that chatters at its end gets that status.
-
-    The window is the same number of steps whatever lanes are looked at, so that what becomes of
-    one does not depend on the others.
-    """
+    """Try a window of steps in every lane; one that chatters at its end gets that status."""
+    # It is the same number of steps whatever lanes are looked at, so that what becomes of one does
+    # not depend on the others.
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
     if np.all(run.lanes["status"] >= 0):  # all are over

@@ -61,7 +61,7 @@ def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> S
         spare = None
     if spare is None or spare.sizes != sizes:
         work = new_work(x0, times, *sizes[2:])
-        arrays = tuple(array for array in _arrays(work) if array.size)
+        arrays = tuple(a for path, a in arrays_of(work) if a.size and _is_0_at_first(path[-1]))
         return Spare(sizes, work, arrays, sum(array.nbytes for array in arrays) <= _MOST)
     for array in spare.arrays:
         array.fill(0)
@@ -79,11 +79,18 @@ def give_back(cache: Cache, spare: Spare) -> None:
         kept.append(spare)
 
 
-def _arrays(record: Any) -> Iterator[np.ndarray]:
-    """Yield the arrays of a workspace that are 0 when a run begins."""
+def _is_0_at_first(name: str) -> bool:
+    """Whether an array is 0 when a run begins: flat ones are the same memory, `v` has unit ones."""
+    return name not in ("lanes", "samples", "y", "v") and not name.endswith("_flat")
+
+
+def arrays_of(
+    record: Any, path: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Yield the arrays of a record, and of those inside, by their names."""
     for name in record._fields[:-1]:
         value = getattr(record, name)
         if hasattr(value, "_fields"):
-            yield from _arrays(value)
-        elif name not in ("lanes", "samples", "y", "v") and not name.endswith("_flat"):
-            yield value  # flat ones are the same memory, and `v` has unit vectors
+            yield from arrays_of(value, (*path, name))
+        elif isinstance(value, np.ndarray):
+            yield (*path, name), value

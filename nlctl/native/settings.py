@@ -106,5 +106,10 @@ def solver_settings(
             )
         if name not in ("rtol", "atol"):
             raise unknown("keyword", name, ["rtol", "atol", *_REFUSED], "in solve_ivp_kwargs")
-    given = {name: value for name, value in settings.items() if value is not None}
-    return Settings(**given | keywords, method="auto" if method is None else method)
+    return settings_of(method, **settings | keywords)
+
+
+def settings_of(method: str | Tableau | None, **given: Any) -> Settings:
+    """Return settings, the usual ones where None is given."""
+    chosen = {name: value for name, value in given.items() if value is not None}
+    return Settings(**chosen, method="auto" if method is None else method)

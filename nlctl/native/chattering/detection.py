@@ -56,11 +56,9 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 
 
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
-    """Return which lanes are to be looked at, at the end of a window.
-
-    Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    `_LONG` windows on: what usual runs take must not cost them anything.
-    """
+    """Return which lanes are to be looked at, at the end of a window."""
+    # Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
+    # `_LONG` windows on: what usual runs take must not cost them anything.
     gone = lanes["t"] - paces["t"]
     paces["t"] = lanes["t"]
     paces["longest"] = np.maximum(paces["longest"], gone)
@@ -176,11 +174,8 @@ class _Places(LaneEquations):
         return jump if found else None
 
     def _stands_out(self, jump: Jump, i: int) -> bool:
-        """Whether component `i` jumps by more than it changes next to the jump.
-
-        What changes by rounding does so everywhere, and what is smooth changes by more over a
-        longer way.
-        """
+        """Whether component `i` jumps by more than it changes next to the jump."""
+        # What changes by rounding does so everywhere, and what is smooth by more over a longer way.
         with np.errstate(all="ignore"):
             points = [jump.sides(wider) for wider in _BESIDE]
             below, above = (

@@ -16,12 +16,9 @@ Combination = Mapping["Signal", float]
 
 @dataclass(frozen=True)
 class Signal:
-    """An elementary signal: output `index` of block `block`, or external input `index`.
+    """An elementary signal: output `index` of block `block`, or external input `index`."""
 
-    ``block`` is None for an external input.
-    """
-
-    block: int | None
+    block: int | None  # None for an external input
     index: int
 
 

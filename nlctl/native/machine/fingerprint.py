@@ -55,14 +55,11 @@ STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 
 
 class _Seen(dict[int, Any]):
-    """Things that have been gone through, kept so that no other one takes their places.
-
-    `deep` says whether objects of libraries are read.
-    """
+    """Things that have been gone through, kept so that no other one takes their places."""
 
     def __init__(self, *, deep: bool) -> None:
         super().__init__()
-        self.deep = deep
+        self.deep = deep  # whether objects of libraries are read
         self.kept: list[Any] = []
 
     def add(self, thing: object) -> bool:

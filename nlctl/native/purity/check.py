@@ -18,7 +18,7 @@ from typing import Any
 
 from ...expressions.source import Definition, Unreadable, definition, source_file
 from . import known_calls, made
-from .captured import Captured, noted_function, noted_partial
+from .captured import Captured, Walk, noted_function, noted_partial
 from .expressions import Frame
 from .statements import CallWalker
 from .values import (
@@ -39,7 +39,6 @@ from .values import (
     least_upper_bound,
     python_function,
 )
-from .walk import Walk
 
 _BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import made
+from .captured import Walk
 from .values import (
     FRESH,
     OUTSIDE,
@@ -40,7 +41,6 @@ from .values import (
     library,
     python_function,
 )
-from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...expressions.source import Definition
 from . import made
+from .captured import Walk
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
 from .values import (
@@ -27,7 +28,6 @@ from .values import (
     holder,
     least_upper_bound,
 )
-from .walk import Walk
 
 _SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.MatMult: "@"}
 

@@ -76,11 +76,9 @@ def bend_places(graph: Graph, rate: Expr, leaf: Expr, tangent: LeafDerivative) -
 def zero_between(
     graph: Graph, rate: Expr, leaf: Expr, height: Expr, breaks: Sequence[Expr]
 ) -> tuple[list[Expr], list[Expr]]:
-    """Return a and b of the straight line through both ends, and of the piece with the zero.
-
-    The first has the values of the rate R at v = height and -height.  The second is 0 where R is,
-    or at the end that is nearer to it where no v of [-height, height] makes R vanish.
-    """
+    """Return a and b of the straight line through both ends, and of the piece with the zero."""
+    # The first has the values of the rate R at v = height and -height.  The second is 0 where R is,
+    # or at the end that is nearer to it where no v of [-height, height] makes R vanish.
     op, const = graph.op, graph.const
     least = op("neg", height)
     inner = [op("maximum", op("minimum", z, height), least) for z in breaks]
@@ -183,10 +181,7 @@ def _jumps(graph: Graph, choice: Expr, leaf: Expr, tangent: LeafDerivative) -> b
 
 
 def _at_random(exprs: Sequence[Expr]) -> list[np.ndarray] | None:
-    """Return values of expressions for random values of all that they read, if they have any.
-
-    Parameters are positive: the bounds of a symmetric dead zone stand in order then.
-    """
+    """Return values of expressions for random values of all that they read, if they have any."""
     rng, rows = np.random.default_rng(1), dict.fromkeys("txup", 0)
     for node in needed(exprs):
         if node.op == "leaf":
@@ -194,7 +189,7 @@ def _at_random(exprs: Sequence[Expr]) -> list[np.ndarray] | None:
             end = start + step * ((node.size or 1) - 1) + 1
             rows[array] = max(rows.get(array, 0), end)
     arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
-    arrays["p"] = 0.5 + np.abs(arrays["p"])
+    arrays["p"] = 0.5 + np.abs(arrays["p"])  # bounds of a symmetric dead zone stand in order
     try:
         found = evaluate_expressions(exprs, arrays)
     except (Untraceable, KeyError):

@@ -21,7 +21,7 @@ from ..compiled import Compiled, as_compiled
 from ..integrate.methods.tableau import Tableau
 from ..own_errors import own_error
 from ..response import failure
-from ..settings import Settings
+from ..settings import Settings, settings_of
 from .held import HeldRun
 from .sampled_run import SampledRun
 
@@ -391,11 +391,9 @@ def stepper(
     [0.393469, 0.238651]
     """
     dt = number("stepper", "dt", dt, above=0)
-    given = {"max_steps": max_steps, "max_step": max_step, "step": step}
-    settings = Settings(
-        rtol=rtol, atol=atol, method="auto" if method is None else method,
-        **{name: value for name, value in given.items() if value is not None},
-    )  # fmt: skip
+    settings = settings_of(
+        method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step, step=step
+    )
     compiled = as_compiled(system)
     period = compiled.system.dt
     if not ct.isctime(compiled.system) and period is not True and not np.isclose(period, dt):

@@ -21,10 +21,7 @@ Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 def break_points(
     conditions: Sequence[Expr], p: np.ndarray, span: tuple[float, float], fastest: float
 ) -> np.ndarray:
-    """Return when conditions of t alone switch within a run.
-
-    Shapes: `p` (parameters,).
-    """
+    """Return when conditions of t alone switch within a run with one parameter vector."""
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
         found = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})

@@ -81,20 +81,13 @@ Operand = Value | float
 
 
 class Body:
-    """The instructions of one function, and what writes the next one.
+    """The instructions of one function, and what writes the next one."""
 
-    Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
-    Where ``exact`` is given it is not.  A float next to a vector is meant in every element.
-
-    Parameters
-    ----------
-    module : Module
-    portable : bool
-        Whether every operation rounds in the same way on every processor, and whatever else a
-        function computes: nothing is contracted, what may be rounded once is, and each sine has a
-        polynomial of its own.
-    """
-
+    # Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
+    # Where ``exact`` is given it is not.  A float next to a vector is meant in every element.
+    # What is `portable` rounds in the same way on every processor, and whatever else a function
+    # computes: nothing is contracted, what may be rounded once is, and each sine has a polynomial
+    # of its own.
     def __init__(self, module: Module, portable: bool = False) -> None:
         self.module, self.portable = module, portable
         self.lines: list[str] = []
