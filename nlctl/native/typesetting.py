@@ -34,6 +34,7 @@ from .diagram.trace import feedthrough
 from .equations.reader import Reader
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+DERIVATIVE, NEXT = r"\dot{{{}}}", "{}^{{+}}"  # of the letter of a state
 _RATE = ("a", "b")  # of the rate a + b v of an ideal relay's input
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
@@ -121,9 +122,9 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     leaf = _symbols(system, slots)
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
-    form = "{}^{{+}}" if next_value else r"\dot{{{}}}"
+    form = NEXT if next_value else DERIVATIVE
     lines = [
-        *_lines(writer, found["x"], [_changing(s, form) for s in _names(system.state_labels)]),
+        *_lines(writer, found["x"], [changing(s, form) for s in _names(system.state_labels)]),
         *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
     ]
     return BlockEquations(
@@ -152,7 +153,7 @@ def _euler(reader: Reader, sampled: Any, slots: dict[str, Slot], values: bool) -
     return leaf_vector(reader.graph, "x", 0, (rates.size,)) + step * rates
 
 
-def _changing(name: str, form: str) -> str:
+def changing(name: str, form: str) -> str:
     """Return the symbol of a derivative or next value: the mark is its letter's."""
     head, mark, index = name.partition("_")
     return form.format(head) + mark + index
