@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
+from ..attributes import with_parameters_of
 from ..diagrams import apart, not_a_system, override
 from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..names import unknown
@@ -265,6 +266,7 @@ class Compiled(Reading, StandIn):
         return state_space(matrices, dt, (own if copy_names else {}) | names)
 
     @as_annotated
+    @with_parameters_of(linearize)
     def parameter_jacobian(
         self,
         parameters: Sequence[str],
@@ -279,14 +281,6 @@ class Compiled(Reading, StandIn):
         ----------
         parameters : sequence of str
             Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
-        x0 : mapping, array_like or control.OperatingPoint
-            State, as in `linearize`.
-        u0 : array_like, optional
-            Inputs, of shape (ninputs,), as in `linearize`.
-        t : float, optional
-            Time in s.
-        params : mapping, optional
-            Parameters that are overridden.
 
         Returns
         -------

@@ -14,6 +14,7 @@ from ..errors import ParameterError
 from ..host.notebook import table_html
 from ..names import unknown
 from ..params import integer
+from ..plotting.axes import control_plot
 from ..plotting.bands import Limit, bands
 from ..wording import counted
 
@@ -138,10 +139,7 @@ class Ensemble:
         limits = {} if spec is None else spec.limits
         figure = plt.figure(layout="constrained")
         _, axes = bands(self.time, shown, lines, limits=limits, figure=figure)
-        drawn = np.empty((len(axes), 1), dtype=object)
-        for k, ax in enumerate(axes):
-            drawn[k, 0] = list(ax.lines)
-        return ct.ControlPlot(drawn, np.array(axes)[:, None], figure)
+        return control_plot(figure, axes)
 
     def _shown(self, signals: Sequence[str] | None) -> dict[str, np.ndarray]:
         """Return the signals that a plot shows."""

@@ -8,11 +8,13 @@ from typing import Any
 import control as ct
 
 from ..annotations import as_annotated
+from ..attributes import with_parameters_of
 from ..upstream.systems import System
-from .compiled import as_compiled
+from .compiled import Compiled, as_compiled
 
 
 @as_annotated
+@with_parameters_of(Compiled.linearize)
 def linearize(
     system: System,
     x0: Any,
@@ -29,19 +31,6 @@ def linearize(
     ----------
     system : control.InputOutputSystem or Compiled
         A diagram, or what `compile` made of it.
-    x0 : mapping, array_like or control.OperatingPoint
-        State, as `initial_state` of `input_output_response`.
-    u0 : array_like, optional
-        Inputs, of shape (ninputs,); a number for all of them; 0 if left out.
-    t : float, optional
-        Time in s.
-    params : mapping, optional
-        Parameters that are overridden.
-    copy_names : bool, optional
-        Whether it gets the diagram's names of states, inputs and outputs, or python-control's
-        generic ones.
-    **names : object
-        Other names: `name`, `inputs`, `outputs` and `states` of ``ct.ss``.
 
     Returns
     -------

@@ -12,6 +12,7 @@ from scipy.optimize import OptimizeResult, least_squares, root
 
 from ..annotations import as_annotated
 from ..arguments import number
+from ..attributes import with_parameters_of
 from ..diagrams import state_names
 from ..errors import OperatingPointError, ParameterError, UnknownKeywordError
 from ..names import find_name, unknown
@@ -207,6 +208,7 @@ def find_operating_point(
 
 
 @as_annotated
+@with_parameters_of(find_operating_point)
 def find_operating_points(
     system: System | Compiled,
     starts: Iterable[Any],
@@ -218,12 +220,8 @@ def find_operating_points(
 
     Parameters
     ----------
-    system : control.InputOutputSystem or Compiled
-        A diagram, or what `compile` made of it.
     starts : iterable
         Where searches begin, each as `initial_state` of `find_operating_point`.
-    inputs, outputs : array_like, optional
-        As there.
     **given : object
         Its other arguments.
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...annotations import as_annotated
 from ...arguments import ATOL, RTOL
+from ...attributes import with_parameters_of
 from ...errors import ParameterError
 from ...params import as_numbers, integer
 from ...responses.arguments import checked_params
@@ -232,6 +233,7 @@ class VectorStepper:
 
 
 @as_annotated
+@with_parameters_of(stepper)
 def vector_stepper(
     system: System | Compiled,
     dt: float,
@@ -249,22 +251,10 @@ def vector_stepper(
 
     Parameters
     ----------
-    system : control.InputOutputSystem or Compiled
-        A diagram, or what `compile` made of it.
     dt : float
         Length of a step (s), as in `stepper`.
     size : int
         Number of members.
-    method : str or Tableau, optional
-        As in `input_output_response`.
-    rtol, atol : float, optional
-        Tolerances of the integrator.
-    max_steps : int, optional
-        Attempted steps of the integrator after which a run is given up.
-    max_step : float, optional
-        Longest step of the integrator (s).
-    step : float, optional
-        A fixed step of the integrator (s); 0 for error control.
     audit : bool or "every run", optional
         As in `stepper`, for each member.
 
