@@ -95,7 +95,8 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
-            known = _relay_outputs(compiled, outputs(point)) if outputs else {}
+            every = outputs(point) if outputs else {}
+            known = {i: float(every[i][0]) for i in relays}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
 
 
@@ -204,11 +205,6 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointVal
     with supplying(lines), happening():
         declared = declared_now(compiled.schedule, system, point)
     return rates, np.concatenate([outputs, *arriving]), *after, *without_nan(*declared)
-
-
-def _relay_outputs(compiled: Compiled, found: Mapping[int, np.ndarray]) -> dict[int, float]:
-    """Return what ideal relays output, by the number of their blocks, of all blocks' outputs."""
-    return {i: float(found[i][0]) for i in relay_places(compiled.schedule.nodes)}
 
 
 def _by_block(compiled: Compiled, values: np.ndarray) -> dict[int, np.ndarray]:

@@ -28,7 +28,6 @@ from .codegen.solver import searched
 from .diagram.nodes import Node
 from .equations.blocks import Equations
 from .lower import DIRECTION
-from .opaque.calls import Call
 from .reading import Reading
 
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
@@ -168,12 +167,10 @@ def differentiated_at(
 def searches_of(equations: Equations) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Return what finds signals of algebraic loops and calls opaque functions, by name."""
     found = {name: searched(one) for name, one in equations.solvers.items()}
-    return found | {name: _of_columns(call) for name, call in equations.calls.items()}
-
-
-def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
-    """Return an opaque function of arguments in columns."""
-    return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
+    return found | {
+        name: lambda given, f=call.function: np.stack([f(c.copy()) for c in given.T], axis=1)
+        for name, call in equations.calls.items()
+    }
 
 
 def point_numbers(needs: str, count: int, what: str, given: Any) -> np.ndarray:

@@ -192,10 +192,12 @@ def find_operating_point(
         "return_outputs": return_outputs,
     }  # fmt: skip
     named = _with_short_names(named, aliases)
-    cut = _cut(system, t, params)
+    checked_params(params)
+    cut = CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
     asked = _asked(cut, named)
     point = _search(cut, asked, root_method, bool(named["return_outputs"]))
-    if not point.residual <= _tolerance(cut, point):
+    size = np.abs(np.concatenate([point.states, point.inputs])).max(initial=0.0)
+    if not point.residual <= _FOUND * (1.0 + size):
         raise OperatingPointError(
             f"no operating point of '{cut.compiled.system.name}' was found from "
             f"{np.round(asked.x, 6)}: the search ended at {np.round(point.states, 6)}, where what "
@@ -254,12 +256,6 @@ def find_operating_points(
         if all(np.abs(here - o).max(initial=0.0) > _SAME * (1 + np.abs(o).max()) for o in others):
             found.append(point)
     return tuple(found)
-
-
-def _cut(system: Any, t: float, params: Any) -> CutDiagram:
-    """Return a diagram, compiled, with its delays cut."""
-    checked_params(params)
-    return CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
 
 
 def _with_short_names(named: dict[str, Any], aliases: Mapping[str, Any]) -> dict[str, Any]:
@@ -407,12 +403,6 @@ def _sharpened(residual: Any, slope: Any, z: np.ndarray) -> np.ndarray:
             break
         z, size = further, smaller
     return z
-
-
-def _tolerance(cut: CutDiagram, point: OperatingPoint) -> float:
-    """Return the residual up to which a point counts as found."""
-    x, u = point.states, point.inputs
-    return _FOUND * (1.0 + max(np.abs(x).max(initial=0.0), np.abs(u).max(initial=0.0)))
 
 
 def _kinks(cut: CutDiagram, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> tuple[str, ...]:

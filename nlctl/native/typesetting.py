@@ -171,7 +171,7 @@ def _names(labels: list[str]) -> list[str]:
 def _lines(writer: LatexWriter, array: Tracer, names: list[str]) -> Iterator[str]:
     """Yield an equation per number, and one per vector."""
     at = 0
-    for expr, size in _split(array):
+    for expr, size in (part for whole in array.pieces() for part in _pieces(*whole)):
         if size == 1 or not expr.size:
             for k in range(at, at + size):
                 yield f"{names[k]} = {writer.formula(expr, by_name=False)}"
@@ -180,11 +180,6 @@ def _lines(writer: LatexWriter, array: Tracer, names: list[str]) -> Iterator[str
             right = writer.formula(expr, (1 - first, 1, "i"), by_name=False)
             yield rf"{vector('i')} = {right}, \quad i = {first}, \dots, {first + size - 1}"
         at += size
-
-
-def _split(array: Tracer) -> Iterator[tuple[Expr, int]]:
-    for expr, size in array.pieces():
-        yield from _pieces(expr, size)
 
 
 def _pieces(expr: Expr, size: int) -> Iterator[tuple[Expr, int]]:

@@ -212,12 +212,6 @@ def _quotient_rounded(b: Body, name: str, x: Ends, y: Ends) -> tuple[Ends, Value
     return Ends(low=low, high=high), b.compare("une", low, high)
 
 
-def _within(b: Body, x: Ends, y: Ends) -> Ends:
-    """Return what two intervals that hold one number have in common."""
-    low, high = larger(b, y.low, x.low), smaller(b, y.high, x.high)
-    return Ends(low=low, high=high)
-
-
 def _rest(name: str) -> Callable[..., _Result]:
     """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
 
@@ -230,9 +224,8 @@ def _rest(name: str) -> Callable[..., _Result]:
             if name == "floor"
             else hull_of(b, absolute_of(b, y), neg(b, absolute_of(b, y)))
         )
-        single = _within(b, one, bound)
-        low = b.select(jumps, bound.low, single.low)
-        high = b.select(jumps, bound.high, single.high)
+        low = b.select(jumps, bound.low, larger(b, bound.low, one.low))
+        high = b.select(jumps, bound.high, smaller(b, bound.high, one.high))
         is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))
         return defined(b, is_number, Ends(low=low, high=high)), jumps
 

@@ -269,16 +269,17 @@ def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
         elif not name.startswith("__") and isinstance(part, _CONSTANTS):
             yield name
             yield from _fingerprint(part, seen)
-        elif seen.deep and not (_is_note(name) or isinstance(part, _MACHINERY)):
+        elif (
+            seen.deep
+            and not (name.startswith("__") or isinstance(part, _MACHINERY))
+            and (
+                name not in ("_abc_impl", "_is_protocol")  # Python's own
+            )
+        ):
             yield name
             yield from _fingerprint(getattr(part, "__func__", part), seen)
     for base in (*kind.__bases__, *((type(kind),) if seen.deep else ())):
         yield from _of_class(base, seen)
-
-
-def _is_note(name: str) -> bool:
-    """Whether an attribute of a class is Python's own."""
-    return name.startswith("__") or name in ("_abc_impl", "_is_protocol")
 
 
 def _is_controls(thing: object) -> bool:

@@ -132,7 +132,8 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
         )
     slope = slope_of(graph, relay.leaf, motion.solutions)
     gain = slope(rate) or graph.const(0.0)  # what is called as it stands has none: refused
-    beyond = None if _acts(gain) else _second(graph, relay, rate, motion, slope)
+    acts = gain.op != "const" or gain.data != 0.0
+    beyond = None if acts else _second(graph, relay, rate, motion, slope)
     if beyond is not None:
         line, piece = beyond
         whole = graph.joined([(e, 1) for e in (*line, *piece)])
@@ -150,11 +151,6 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
     breaks = bend_places(graph, rate, relay.leaf, slope)
     line, piece = zero_between(graph, rate, relay.leaf, relay.limits.height, breaks)
     return _Rate(whole=rate, line=line, piece=piece)
-
-
-def _acts(gain: Expr) -> bool:
-    """Whether a relay's output has a gain in the rate of its input that is not 0 as written."""
-    return not (gain.op == "const" and gain.data == 0.0)
 
 
 def _second(

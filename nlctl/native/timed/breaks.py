@@ -38,7 +38,8 @@ def break_points(
         places, indicators = _known(condition, lines), _indicators(condition)
         if places is None:
             places = levels_met(condition, lines, constant)
-            indicators = indicators if places is None else [_count_of(condition)]
+            if places is not None:  # how many elements hold
+                indicators = [lambda values, t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
             if places is None:
                 found.append(_sought(indicator, values, span, fastest))
@@ -56,11 +57,6 @@ def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
         return np.unique(switches(condition, lines))
     except NotLines:
         return None
-
-
-def _count_of(condition: Expr) -> Callable[[Values, np.ndarray], np.ndarray]:
-    """Return how many elements of a condition hold."""
-    return lambda values, t: np.sum(values([condition], t)[0], axis=0, dtype=float)
 
 
 def _indicators(condition: Expr) -> list[Callable[[Values, np.ndarray], np.ndarray]]:

@@ -46,12 +46,12 @@ class CModule(Module):
             numbers = ", ".join(map(c_number, values))
             tables.append(f"static const double {name}[{len(values)}] = {{{numbers}}};")
         body = "\n".join([*tables, *self.functions.values()])
-        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in body]
+        used = [
+            line
+            for line in SUPPORT.splitlines()
+            if f"{line.partition('(')[0].split()[-1]}(" in body
+        ]
         return "\n".join([*used, body])
-
-
-def _called(line: str) -> str:
-    return line.split("(")[0].split()[-1]
 
 
 def c_number(x: float) -> str:
