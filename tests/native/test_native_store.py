@@ -29,8 +29,7 @@ from nlctl.native.machine import finish, store
 from nlctl.native.machine.calls import loaded
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
-from nlctl.native.opaque.called import TAUGHT
-from nlctl.native.opaque.calls import Source
+from nlctl.native.opaque.called import TAUGHT, Source
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)

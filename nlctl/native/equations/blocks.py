@@ -23,7 +23,7 @@ from ..diagram.parameters import length
 from ..diagram.program import count_guards, count_switching_functions, memory
 from ..diagram.schedule import Schedule, during
 from ..diagram.trace import time
-from ..opaque.calls import Call
+from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
 from .reader import Reader
 from .relays import with_sliding

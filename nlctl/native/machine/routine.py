@@ -14,7 +14,7 @@ from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.interpret import interpreted_function
 from ..codegen.solver import plain_solver
 from ..lower import Lowered
-from ..opaque.calls import Call
+from ..opaque.called import Call
 from .calls import CALL_FAILED, Native, native_calls, plain_calls
 from .finish import Loaded, finished
 

@@ -1,8 +1,21 @@
-"""Taylor's method for a run: what it cannot do is refused by name, what it needs is laid out."""
+"""Taylor's method for a run: what it cannot do is refused by name, what it needs is laid out.
+
+The method "auto" of a single run: by the explicit pair and by Taylor's method in turn.  A run
+begins with the explicit pair: a short one is over before Taylor coefficients are reading.  After
+that Taylor's method is tried.  It stays while it gets further than the explicit pair with the same
+work, both as measured in this run, one right after the other; the explicit pair is measured again
+from time to time, and that is also when it sees that the equations have become stiff.  Nothing
+rests on clocks: a run has the same numbers on every machine.
+
+Where coefficients are not finite although the rates are, as those of the root of t at 0, the
+explicit pair has its turn whatever the method.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +23,22 @@ import numpy as np
 from ...errors import ParameterError
 from ..equations.relays import relay_places
 from ..integrate.memory import with_fields
+from ..integrate.methods.tableau import pair_of
+from ..integrate.methods.taylor import OTHER_METHOD, SLOPES, new_terms
+from ..integrate.methods.turn import FIRST_TURN, MEASURED
+from ..integrate.state import DIVERGED, METHOD, RUNNING, STEP_TOO_SMALL
+from ..integrate.workspace import with_stages
 from ..machine.routine import entry
 from ..reading import Reading
+from ..run import Run
 from ..settings import Settings
 from .routine import series
 
 LEAST, MOST = 4, 30  # orders
 _COST = 0.35  # of a step of order 1, in explicit ones: measured, 1.4 to 2.4 at 8, 4 to 5 at 15
+_ORDER = 10  # from which on steps are worth more than what they cost, in most loops
+_STEPS = 250  # of the explicit pair, before Taylor's method is tried
+_SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many each time
 
 
 def order_for(rtol: float) -> int:
@@ -70,3 +92,87 @@ def _check(reading: Reading) -> None:
                 f"'{name}' has {what} ('{places[0]}'), which method='taylor' does not integrate: "
                 "use method='tsit5'"
             )
+
+
+# -- in turn with the explicit pair ---------------------------------------------------------------
+
+
+def may_turn(reading: Reading) -> bool:
+    """Whether runs of a diagram may continue by Taylor's method."""
+    # Memories and delays have no coefficients, and where clocks end the steps a run can be
+    # resumed at a sample, and knows nothing of the steps before.
+    program, lines = reading.program, reading.schedule.lines
+    return bool(reading.system.nstates) and not (program.memory or program.sampled or lines)
+
+
+def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
+    """Return a run that tries Taylor's method after so many steps."""
+    if settings.method != "auto" or settings.step or order_for(settings.rtol) < _ORDER:
+        return run
+    if not may_turn(reading):
+        return run
+    run.lanes["span"] = run.lanes["wait"] = _STEPS
+    return replace(run, task=with_fields(run.task, taylor=with_fields(OTHER_METHOD, span=_SPAN)))
+
+
+def series_ahead(reading: Reading, p: np.ndarray) -> None:
+    """Make the code of Taylor's method now, where runs with parameters `p` may continue by it."""
+    if may_turn(reading):
+        with contextlib.suppress(ParameterError):
+            series(reading, p, 1)
+
+
+def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
+    """Return a run that continues by the other method, if it asks for that."""
+    lane, fails = run.lanes[0], _fails(run)
+    if lane["status"] != METHOD and not fails:
+        return run
+    if fails:  # the explicit pair has the last word
+        lane["span"] = FIRST_TURN
+    lane["status"] = RUNNING
+    lane["from_t"], lane["from_accepted"] = lane["t"], lane["accepted"]
+    lane["from_tried"] = lane["accepted"] + lane["rejected"]
+    if run.task.taylor.highest:
+        return _by_pair(run, settings)
+    alone = {"span": 0} if settings.method == "taylor" else {}  # nothing is compared
+    lane["other_pace"] = lane["pace"]
+    lane["span"] = FIRST_TURN
+    if run.series is not None:  # it has had its turn before
+        taylor = with_fields(run.series.taylor, **{"span": run.task.taylor.span} | alone)
+        run.work.taylor.expanded[:] = 0
+        task = with_fields(run.task, taylor=taylor, pair=run.series.pair)
+        return replace(run, task=task, work=with_stages(run.work, SLOPES))
+    try:
+        task, terms = with_taylor(run.task, reading, p[:, None], settings)
+    except ParameterError:  # there is what it cannot do
+        return replace(run, task=with_fields(run.task, taylor=OTHER_METHOD))
+    task = with_fields(task, taylor=with_fields(task.taylor, **alone))
+    arrays = new_terms(*terms, run.work.u.shape[0], 1)
+    work = with_fields(with_stages(run.work, SLOPES), taylor=arrays)
+    return replace(run, task=task, work=work, series=task)
+
+
+def _fails(run: Run) -> bool:
+    """Whether Taylor's method does not get on, from a place where all is finite."""
+    # Where a guard is NaN it is, at that place: no other method may continue.
+    if not (run.task.taylor.highest and run.task.taylor.span):
+        return False
+    here = np.append(run.work.x, run.work.events.g_start)
+    return run.lanes["status"][0] in (STEP_TOO_SMALL, DIVERGED) and bool(np.isfinite(here).all())
+
+
+def _by_pair(run: Run, settings: Settings) -> Run:
+    """Return a run that continues by the explicit pair: to be measured, or for longer each time."""
+    lane, span = run.lanes[0], run.task.taylor.span
+    if lane["span"] > FIRST_TURN:
+        lane["span"], span = MEASURED, min(2 * span, _MOST)
+    else:
+        lane["wait"] = max(2 * lane["wait"], MEASURED)
+        lane["span"], span = lane["wait"], _SPAN
+    lane["h"] = lane["other_pace"] or lane["h"]  # as it was when the pair was measured
+    for name in ("tries", "seeks", "traces", "returns", "across", "cross"):
+        lane[name] = 0  # what was being located is found again
+    task = with_fields(
+        run.task, taylor=with_fields(OTHER_METHOD, span=span), pair=pair_of(settings.pair)
+    )
+    return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))
