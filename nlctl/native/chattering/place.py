@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
+from ...accumulation import SECOND_ORDER, accumulation_words
 from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
 from ...upstream.systems import System
@@ -33,7 +33,11 @@ def chattering_words(
     """Return which signal jumps between which values, and what to do."""
     relays = relay_places(compiled.schedule.nodes)
     if jump.crowd is not None:
-        return _accumulation(compiled, jump.crowd)
+        labels = row_labels(compiled, compiled.lowered.conditions)
+        row = jump.crowd.row
+        which = labels[row] if row < len(labels) else ("", "a condition")
+        why = "and what is compared is within tolerances of 0"
+        return accumulation_words(which, jump.crowd, why)
     if relays and _keeps_on_switching(compiled, p, jump):
         return f"{_committed(compiled, p, jump)}: its switches accumulate; {SECOND_ORDER}"
     advice = (
@@ -43,13 +47,6 @@ def chattering_words(
     )
     found = _committed(compiled, p, jump) or _changed(compiled, p, params, jump)
     return f"{found}; {advice}"
-
-
-def _accumulation(compiled: Compiled, crowd: Crowd) -> str:
-    """Return whose switches come ever closer together, and how."""
-    labels = row_labels(compiled, compiled.lowered.conditions)
-    which = labels[crowd.row] if crowd.row < len(labels) else ("", "a condition")
-    return accumulation_words(which, crowd, "and what is compared is within tolerances of 0")
 
 
 def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:

@@ -206,17 +206,12 @@ def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
     return Ends(low=low, high=high), cut
 
 
-def _quotient_rounded(b: Body, name: str, x: Ends, y: Ends) -> tuple[Ends, Value]:
-    quotient = div(b, x, y)
-    low, high = (applied(b, name, v) for v in quotient.values)
-    return Ends(low=low, high=high), b.compare("une", low, high)
-
-
 def _rest(name: str) -> Callable[..., _Result]:
     """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
 
     def rule(b: Body, x: Ends, y: Ends) -> _Result:
-        q, jumps = _quotient_rounded(b, name, x, y)
+        least, most = (applied(b, name, v) for v in div(b, x, y).values)
+        q, jumps = Ends(low=least, high=most), b.compare("une", least, most)
         one = sub(b, x, mul(b, y, q))
         zero = point_of(0.0, x.low.width)
         bound = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ...sampling.system import Happening
 from ..equations.blocks import equations
 from ..lower import Lowered, lower
 from ..reading import Reading
-from .routine import called_back, entry, lowered_code, raise_failures
+from .routine import Routine, entry, lowered_code
 
 _LOG = logging.getLogger("nlctl")
 ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
@@ -44,11 +45,14 @@ class Machine:
     @property
     def called_back(self) -> tuple[str, ...]:
         """Names of functions that call back into Python."""
-        return called_back(self._functions)
+        calls = [call for function in self._routines for call in function.opaque]
+        names = [call.call.name for call in calls if call.call.name in call.native.called_back]
+        return tuple(dict.fromkeys(names))
 
-    @property
-    def _functions(self) -> tuple[Any, ...]:
-        return (self.rhs, self.out, *self.samples, *self.resets)
+    @cached_property
+    def _routines(self) -> list[Routine]:
+        every = (self.rhs, self.out, *self.samples, *self.resets)
+        return [function for function in every if isinstance(function, Routine)]
 
     @property
     def entries(self) -> tuple[Any, Any]:
@@ -65,7 +69,8 @@ class Machine:
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
-        raise_failures(self._functions, c)
+        for function in self._routines:
+            function.check(c)
 
 
 def entries_of(*functions: Any) -> np.ndarray:

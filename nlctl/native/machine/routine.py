@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -109,17 +109,3 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
 def entry(function: Any) -> Any:
     """Return what integrators take: the address of machine code, or a plain function."""
     return function.address if isinstance(function, Routine) else function
-
-
-def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
-    """Raise what an opaque function has raised within these, whose parameters were `c`."""
-    for function in functions:
-        if isinstance(function, Routine):
-            function.check(c)
-
-
-def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
-    """Return the names of opaque functions that these call back in Python."""
-    calls = [call for f in functions if isinstance(f, Routine) for call in f.opaque]
-    names = [call.call.name for call in calls if call.call.name in call.native.called_back]
-    return tuple(dict.fromkeys(names))
