@@ -10,7 +10,7 @@ from .along import derivatives
 from .compiled import Compiled
 from .discrete import discrete_loop
 from .machine.evaluations import ENSEMBLE_WIDTH, machine
-from .taylor.method import series_ahead
+from .taylor.turns import series_ahead
 
 
 @as_annotated

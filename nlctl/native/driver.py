@@ -34,7 +34,7 @@ from .machine.evaluations import entries_of, machine
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run, give_back, workspace
 from .settings import METHODS, Settings
-from .taylor.method import turned, with_taylor, with_turns
+from .taylor.turns import turned, with_taylor, with_turns
 from .timed.ahead import ahead
 
 _NOTED = 1000  # events of a run for which there is room from the beginning

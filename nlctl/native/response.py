@@ -49,11 +49,8 @@ def respond(
     compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
     evaluated = evaluation_array(evaluation_times, times)
     u, resolved = input_array(system, inputs, times), compiled.resolved(params)
-    x0 = (
-        resolved.initial_state.copy()
-        if initial_state is None
-        else state_array(system, initial_state)
-    )
+    own = initial_state is None
+    x0 = resolved.initial_state.copy() if own else state_array(system, initial_state)
     grid = times if evaluated is times else _grid(system, times, evaluated)
     if grid is not times:
         u = interpolated(u, times, grid)

@@ -42,7 +42,7 @@ class Run:
     along: Along | None = None
     # of members that chatter, by their lanes: where
     jumps: Mapping[int, Jump] = field(default_factory=dict)
-    # with Taylor's method, if it has had its turn: see `nlctl.native.taylor.method`
+    # with Taylor's method, if it has had its turn: see `nlctl.native.taylor.turns`
     series: Any = None
     spare: Spare | None = None  # memory that the next run may take when this one is over
 

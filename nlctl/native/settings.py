@@ -60,11 +60,8 @@ class Settings:
     @property
     def pair(self) -> Tableau:
         """The explicit pair that is used, alone or in turn with the stiff method."""
-        return (
-            self.method
-            if isinstance(self.method, Tableau)
-            else EXPLICIT_PAIRS.get(self.method, TSIT5)
-        )
+        own = self.method
+        return own if isinstance(own, Tableau) else EXPLICIT_PAIRS.get(own, TSIT5)
 
     def __post_init__(self) -> None:
         if not isinstance(self.method, Tableau) and self.method not in METHODS:

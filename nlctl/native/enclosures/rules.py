@@ -214,11 +214,8 @@ def _rest(name: str) -> Callable[..., _Result]:
         q, jumps = Ends(low=least, high=most), b.compare("une", least, most)
         one = sub(b, x, mul(b, y, q))
         zero = point_of(0.0, x.low.width)
-        bound = (
-            hull_of(b, zero, y)
-            if name == "floor"
-            else hull_of(b, absolute_of(b, y), neg(b, absolute_of(b, y)))
-        )
+        other = absolute_of(b, y)
+        bound = hull_of(b, zero, y) if name == "floor" else hull_of(b, other, neg(b, other))
         low = b.select(jumps, bound.low, larger(b, bound.low, one.low))
         high = b.select(jumps, bound.high, smaller(b, bound.high, one.high))
         is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))

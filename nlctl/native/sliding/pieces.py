@@ -32,21 +32,23 @@ LeafDerivative = Callable[[Expr], Expr | None]
 
 def affine(expr: Expr, leaf: Expr) -> bool:
     """Whether an expression is a + b v for all values, as it is written."""
-    depends: set[Expr] = {leaf}
+    return all(
+        node.op in _LINEAR
+        or (node.op == "mul" and sum(by) == 1)
+        or (node.op == "div" and not by[1])
+        or (node.op == "select" and not by[0])
+        for node, by in _dependent(expr, leaf)
+    )
+
+
+def _dependent(expr: Expr, leaf: Expr) -> Iterator[tuple[Expr, list[bool]]]:
+    """Yield what depends on a leaf, inner parts first, and by which arguments it does."""
+    depends = {leaf}
     for node in needed([expr]):
         by = [arg in depends for arg in node.args]
-        if not any(by):
-            continue
-        linear = (
-            node.op in _LINEAR
-            or (node.op == "mul" and sum(by) == 1)
-            or (node.op == "div" and not by[1])
-            or (node.op == "select" and not by[0])
-        )
-        if not linear:
-            return False
-        depends.add(node)
-    return True
+        if any(by):
+            depends.add(node)
+            yield node, by
 
 
 def unreadable(graph: Graph, rate: Expr, leaf: Expr, tangent: LeafDerivative) -> str:
@@ -109,15 +111,11 @@ def _chosen(graph: Graph, condition: Expr, one: Any, other: Any) -> tuple[Expr, 
 
 def _bends(expr: Expr, leaf: Expr) -> list[Expr]:
     """Return the parts at which an expression may bend as the leaf changes, inner ones first."""
-    depends, found = {leaf}, []
-    for node in needed([expr]):
-        by = [arg in depends for arg in node.args]
-        if not any(by):
-            continue
-        depends.add(node)
-        if node.op in _BENDS and (node.op != "select" or by[0]):
-            found.append(node)
-    return found
+    return [
+        node
+        for node, by in _dependent(expr, leaf)
+        if node.op in _BENDS and (node.op != "select" or by[0])
+    ]
 
 
 def _ways(graph: Graph, bend: Expr) -> tuple[Expr, Expr]:

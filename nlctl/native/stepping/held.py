@@ -20,7 +20,7 @@ from ..integrators import handle, integrators
 from ..results import Trajectory, made
 from ..run import Run
 from ..settings import Settings
-from ..taylor.method import turned, with_turns
+from ..taylor.turns import turned, with_turns
 from .window import HELD_STEPS, Window, first_window, following, in_full, packed_window, until
 
 

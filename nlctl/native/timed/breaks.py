@@ -70,11 +70,8 @@ def _level(condition: Expr, values: Values, t: np.ndarray, k: int) -> np.ndarray
     op, args = condition.op, condition.args
 
     def element(array: np.ndarray) -> np.ndarray:
-        return (
-            np.broadcast_to(array[k if array.shape[0] > 1 else 0], t.shape)
-            if array.ndim == 2
-            else array
-        )
+        rows = array if array.ndim == 2 else array[None]
+        return np.broadcast_to(rows[k if len(rows) > 1 else 0], t.shape)
 
     with np.errstate(all="ignore"):
         if condition.kind == "b" or op in ("floor", "ceil", "trunc", "rint", "sign", "heaviside"):
