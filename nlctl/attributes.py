@@ -65,12 +65,12 @@ def with_parameters_of(other: Any) -> Callable[[_F], _F]:
     """Return a decorator: parameters that a docstring does not describe are as another one has."""
 
     def completed(function: _F) -> _F:
-        own, theirs = (inspect.cleandoc(each.__doc__ or "") for each in (function, other))
-        if own:
-            known = _parameters(theirs) | _parameters(own)
+        text, others = (inspect.cleandoc(one.__doc__ or "") for one in (function, other))
+        if text:
+            known = _parameters(others) | _parameters(text)
             names = inspect.signature(function).parameters
             entries = dict.fromkeys(known[name] for name in names if name in known)
-            head, _, rest = own.partition(_PARAMETERS)
+            head, _, rest = text.partition(_PARAMETERS)
             behind = _SECTION.search(rest)
             rest = f"\n\n{rest[behind.start() :]}" if behind else ""
             function.__doc__ = head + _PARAMETERS + "\n".join(entries) + rest

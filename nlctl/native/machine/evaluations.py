@@ -59,13 +59,13 @@ class Machine:
         """What integrators take of `rhs` and `out`."""
         return entry(self.rhs), entry(self.out)
 
-    def values(self, function: Any, results: str, point: Any, c: np.ndarray) -> list[np.ndarray]:
+    def values(self, function: Any, names: str, point: Any, c: np.ndarray) -> list[np.ndarray]:
         """Return what a function makes of t, x and u, `c` in every lane: arrays of these names."""
         t, x, u = (np.reshape(np.asarray(v, dtype=float), (-1, 1)) for v in point)
         t, x, u = (np.repeat(v, self.width, axis=1) for v in (t, x, u))
-        made = [np.zeros((self.lowered.rows[name], self.width)) for name in results.split()]
-        function(t[0].copy(), x, u, c, *made)
-        return [array[:, -1] for array in made]
+        results = [np.zeros((self.lowered.rows[name], self.width)) for name in names.split()]
+        function(t[0].copy(), x, u, c, *results)
+        return [array[:, -1] for array in results]
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
