@@ -91,16 +91,20 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
             return
         _, c = prepared_parameters(compiled, trial.p, width, due.patterns)
         done.append(_Audited(code=code))
-        own = apart(compiled.schedule.system)  # which nobody else writes parameters into
-        params = override(own.system, trial.params)
-        trial = replace(trial, meetings=code.meetings, apart=own, params=params)
-        evaluated = _evaluated(compiled, code, c)
+        evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
             every = outputs(point) if outputs else {}
             known = {i: float(every[i][0]) for i in relays}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
+
+
+def _with_own_diagram(compiled: Compiled, trial: Trial, code: Machine) -> Trial:
+    """Return a trial with a diagram that nobody else writes parameters into."""
+    own = apart(compiled.schedule.system)
+    params = override(own.system, trial.params)
+    return replace(trial, meetings=code.meetings, apart=own, params=params)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:

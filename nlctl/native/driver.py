@@ -30,11 +30,14 @@ from .integrate.state import DERIVATIVES, EXPLICIT, RUNNING, Status
 from .integrate.workspace import Task
 from .integrators import integrators
 from .laid import laid_out, ticks_of
-from .machine.evaluations import entries_of, machine
+from .machine.evaluations import machine
+from .machine.routine import entries_of
 from .results import Statistics, Trajectory, at_its_end, made
-from .run import Run, give_back, workspace
+from .run import Run
 from .settings import METHODS, Settings
-from .taylor.turns import turned, with_taylor, with_turns
+from .spare import give_back, workspace
+from .taylor.method import with_taylor
+from .taylor.turns import turned, with_turns
 from .timed.ahead import ahead
 
 _NOTED = 1000  # events of a run for which there is room from the beginning
@@ -197,7 +200,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
         ),
         clocks=of_program.clocks or ticks_of(compiled.program, code, due),
         resets=of_program.resets,
-        lines=of_program.lines or lines_of(compiled, p, course.varied, entries_of(code.out)),
+        lines=of_program.lines or lines_of(compiled, p, course.varied, entries_of((code.out,))),
     )
     if method == "taylor":
         task, terms = with_taylor(task, compiled, p, settings)

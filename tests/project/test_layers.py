@@ -67,7 +67,8 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["describe"],
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "members"],
-        ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"],
+        ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"]
+        + ["spare"],
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],

@@ -56,9 +56,11 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 
 
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
-    """Return which lanes are to be looked at, at the end of a window."""
-    # Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    # `_LONG` windows on: what usual runs take must not cost them anything.
+    """Return which lanes are to be looked at, at the end of a window.
+
+    Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
+    `_LONG` windows on: what usual runs take must not cost them anything.
+    """
     gone = lanes["t"] - paces["t"]
     paces["t"] = lanes["t"]
     paces["longest"] = np.maximum(paces["longest"], gone)

@@ -13,25 +13,14 @@ from ...accumulation import Crowd
 
 @dataclass(frozen=True, kw_only=True)
 class Jump:
-    """A jump at which a run chatters.
+    """A jump at which a run chatters."""
 
-    Attributes
-    ----------
-    times : tuple of float
-        On both sides of the jump (s); the same, or neighbouring ones.
-    before, after : ndarray of shape (nstates,)
-        Neighbouring states on both sides.
-    inputs : ndarray
-        Inputs of the program there.
-    crowd : Crowd or None
-        How the switches accumulate, if they do.
-    """
-
-    times: tuple[float, float]
+    times: tuple[float, float]  # on both sides of the jump (s); the same, or neighbouring ones
+    # (nstates,): neighbouring states on both sides
     before: np.ndarray
     after: np.ndarray
-    inputs: np.ndarray
-    crowd: Crowd | None = None
+    inputs: np.ndarray  # inputs of the program there
+    crowd: Crowd | None = None  # how the switches accumulate, if they do
 
     @property
     def time(self) -> float:

@@ -73,13 +73,6 @@ class Machine:
             function.check(c)
 
 
-def entries_of(*functions: Any) -> np.ndarray:
-    """Return what integrators take of several functions."""
-    entries = [entry(function) for function in functions]
-    plain = any(callable(address) for address in entries)
-    return np.array(entries, dtype=object if plain else np.int64)
-
-
 def machine(
     reading: Reading, p: np.ndarray, width: int = 1, happening: Iterable[Happening] = ()
 ) -> Machine:

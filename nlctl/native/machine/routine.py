@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -109,3 +109,10 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
 def entry(function: Any) -> Any:
     """Return what integrators take: the address of machine code, or a plain function."""
     return function.address if isinstance(function, Routine) else function
+
+
+def entries_of(functions: Sequence[Any]) -> np.ndarray:
+    """Return what integrators take of several functions."""
+    entries = [entry(function) for function in functions]
+    plain = any(callable(address) for address in entries)
+    return np.array(entries, dtype=object if plain else np.int64)

@@ -16,7 +16,7 @@ from ..compiled import Compiled
 from ..driver import Course, prepared
 from ..integrate.memory import data_address, type_of, with_fields
 from ..integrate.workspace import Task
-from ..run import Run, arrays_of
+from ..run import Run
 from ..settings import Settings
 
 HELD_STEPS = 500  # of a window
@@ -199,7 +199,17 @@ def _places(work: Any) -> tuple[dict[int, int], int]:
 
 def _kept_arrays(work: Any) -> dict[tuple[str, ...], np.ndarray]:
     """Return the arrays of a workspace that a run reads again, by their names."""
-    return {path: a for path, a in arrays_of(work) if a.size and path not in _SHOWN}
+    return {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
+
+
+def _arrays(record: Any, path: tuple[str, ...] = ()) -> Any:
+    """Yield the arrays of a record, and of those inside, by their names."""
+    for name in record._fields[:-1]:
+        value = getattr(record, name)
+        if hasattr(value, "_fields"):
+            yield from _arrays(value, (*path, name))
+        elif isinstance(value, np.ndarray):
+            yield (*path, name), value
 
 
 def _with_arrays(record: Any, views: dict[tuple[str, ...], np.ndarray]) -> Any:

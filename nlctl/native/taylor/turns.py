@@ -1,11 +1,10 @@
-"""Taylor's method for a run: what it cannot do is refused by name, what it needs is laid out.
+"""The method "auto" of a single run: by the explicit pair and by Taylor's method in turn.
 
-The method "auto" of a single run: by the explicit pair and by Taylor's method in turn.  A run
-begins with the explicit pair: a short one is over before Taylor coefficients are reading.  After
-that Taylor's method is tried.  It stays while it gets further than the explicit pair with the same
-work, both as measured in this run, one right after the other; the explicit pair is measured again
-from time to time, and that is also when it sees that the equations have become stiff.  Nothing
-rests on clocks: a run has the same numbers on every machine.
+A run begins with the explicit pair: a short one is over before Taylor coefficients are reading.
+After that Taylor's method is tried.  It stays while it gets further than the explicit pair with
+the same work, both as measured in this run, one right after the other; the explicit pair is
+measured again from time to time, and that is also when it sees that the equations have become
+stiff.  Nothing rests on clocks: a run has the same numbers on every machine.
 
 Where coefficients are not finite although the rates are, as those of the root of t at 0, the
 explicit pair has its turn whatever the method.
@@ -14,87 +13,26 @@ explicit pair has its turn whatever the method.
 from __future__ import annotations
 
 import contextlib
-import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ...errors import ParameterError
-from ..equations.relays import relay_places
 from ..integrate.memory import with_fields
 from ..integrate.methods.tableau import pair_of
 from ..integrate.methods.taylor import OTHER_METHOD, SLOPES, new_terms
 from ..integrate.methods.turn import FIRST_TURN, MEASURED
 from ..integrate.state import DIVERGED, METHOD, RUNNING, STEP_TOO_SMALL
 from ..integrate.workspace import with_stages
-from ..machine.routine import entry
 from ..reading import Reading
 from ..run import Run
 from ..settings import Settings
+from .method import order_for, with_taylor
 from .routine import series
 
-LEAST, MOST = 4, 30  # orders
-_COST = 0.35  # of a step of order 1, in explicit ones: measured, 1.4 to 2.4 at 8, 4 to 5 at 15
 _ORDER = 10  # from which on steps are worth more than what they cost, in most loops
 _STEPS = 250  # of the explicit pair, before Taylor's method is tried
 _SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many each time
-
-
-def order_for(rtol: float) -> int:
-    """Return the order of Taylor's method for a tolerance: 1 - ln(rtol) / 2, rounded up.
-
-    With it the work per unit of time is least for long steps of a given part of the radius of
-    convergence: A. Jorba, M. Zou, Experimental Mathematics 14:99 (2005).
-
-    Examples
-    --------
-    >>> order_for(1e-6), order_for(1e-12)
-    (8, 15)
-    """
-    return min(max(math.ceil(1.0 - 0.5 * math.log(rtol)), LEAST), MOST)
-
-
-def with_taylor(
-    task: Any, reading: Reading, p: np.ndarray, settings: Settings
-) -> tuple[Any, tuple[int, int]]:
-    """Return the task with Taylor's method, and the shape of the coefficients."""
-    _check(reading)
-    order, coefficients = order_for(settings.rtol), series(reading, p, p.shape[1])
-    entries = [entry(function) for function in coefficients.functions]
-    plain = any(callable(one) for one in entries)
-    taylor = with_fields(
-        task.taylor,
-        highest=order,
-        functions=np.array(entries, dtype=object if plain else np.int64),
-        sides=coefficients.sides,
-        c=coefficients.parameters(p, order=order, rtol=settings.rtol, atol=settings.atol),
-        cost=_COST * order,
-    )
-    # the power of the step size in its error; there are no stages at parts of a step
-    inside = task.pair.inside * [[0.0], [1.0], [1.0]]
-    pair = with_fields(task.pair, order=order + 1.0, stable=np.inf, inside=inside)
-    return with_fields(task, taylor=taylor, pair=pair), (order + 1, coefficients.layout.rows)
-
-
-def _check(reading: Reading) -> None:
-    """Refuse what has no coefficients, whatever its equations are."""
-    name, schedule = reading.system.name, reading.schedule
-    if not reading.system.nstates:
-        raise ParameterError(
-            f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
-        )
-    memories = [reading.system.state_labels[i] for i in reading.program.memory]
-    relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
-    for what, places in (("memory", memories), ("an ideal relay", relays)):
-        if places:
-            raise ParameterError(
-                f"'{name}' has {what} ('{places[0]}'), which method='taylor' does not integrate: "
-                "use method='tsit5'"
-            )
-
-
-# -- in turn with the explicit pair ---------------------------------------------------------------
 
 
 def may_turn(reading: Reading) -> bool:

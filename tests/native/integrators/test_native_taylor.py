@@ -17,8 +17,8 @@ from nlctl.errors import DivergedError, ParameterError, UsageError
 from nlctl.expressions.functions import FUNCTIONS
 from nlctl.expressions.graph import numpy_function
 from nlctl.native.machine.routine import entry
+from nlctl.native.taylor.method import order_for
 from nlctl.native.taylor.routine import Series, series
-from nlctl.native.taylor.turns import order_for
 
 flint = pytest.importorskip("flint")
 ORDER = 12

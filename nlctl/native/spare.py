@@ -1,0 +1,61 @@
+"""Memory of runs that are over, for the next run: to lay it out takes longer than a short run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .cache import Cache
+from .integrate.state import new_lanes
+from .integrate.workspace import Work, new_work
+
+_MOST = 2**20  # bytes of a workspace that is kept until the next run
+_THREADS = 4  # runs at the same time whose workspaces are kept
+
+
+class Spare(NamedTuple):
+    """A workspace, which one run at a time has."""
+
+    sizes: tuple[Any, ...]  # what it was laid out for
+    work: Work
+    arrays: tuple[np.ndarray, ...]  # those in it that are 0 when a run begins
+    is_small: bool  # enough to be kept until the next run
+
+
+def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> Spare:
+    """Return the workspace of a run, see `new_work`: that of a run that is over, if it fits."""
+    sizes = (x0.shape, times.size, *sizes)
+    try:
+        spare = cache.of(Spare).pop()
+    except IndexError:  # there is none, or another thread has just taken it
+        spare = None
+    if spare is None or spare.sizes != sizes:
+        work = new_work(x0, times, *sizes[2:])
+        arrays = tuple(array for array in _arrays(work) if array.size)
+        return Spare(sizes, work, arrays, sum(array.nbytes for array in arrays) <= _MOST)
+    for array in spare.arrays:
+        array.fill(0)
+    work = spare.work
+    work.lanes[:], work.x[:] = new_lanes(times, x0.shape[1]), x0
+    work.samples.fill(np.nan)
+    work.y.fill(np.nan)
+    return spare
+
+
+def give_back(cache: Cache, spare: Spare) -> None:
+    """Keep the workspace of a run that is over, and of which nothing is read any more."""
+    kept = cache.of(Spare)
+    if spare.is_small and len(kept) < _THREADS:
+        kept.append(spare)
+
+
+def _arrays(record: Any) -> Iterator[np.ndarray]:
+    """Yield the arrays of a workspace that are 0 when a run begins."""
+    for name in record._fields[:-1]:
+        value = getattr(record, name)
+        if hasattr(value, "_fields"):
+            yield from _arrays(value)
+        elif name not in ("lanes", "samples", "y", "v") and not name.endswith("_flat"):
+            yield value  # flat ones are the same memory, and `v` has unit vectors
