@@ -32,13 +32,16 @@ LeafDerivative = Callable[[Expr], Expr | None]
 
 def affine(expr: Expr, leaf: Expr) -> bool:
     """Whether an expression is a + b v for all values, as it is written."""
-    return all(
-        node.op in _LINEAR
-        or (node.op == "mul" and sum(by) == 1)
-        or (node.op == "div" and not by[1])
-        or (node.op == "select" and not by[0])
-        for node, by in _dependent(expr, leaf)
-    )
+    for node, by in _dependent(expr, leaf):
+        linear = (
+            node.op in _LINEAR
+            or (node.op == "mul" and sum(by) == 1)
+            or (node.op == "div" and not by[1])
+            or (node.op == "select" and not by[0])
+        )
+        if not linear:
+            return False
+    return True
 
 
 def _dependent(expr: Expr, leaf: Expr) -> Iterator[tuple[Expr, list[bool]]]:
