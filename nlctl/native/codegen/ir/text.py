@@ -153,6 +153,17 @@ class Body:
         width = len(order)
         return self.new(f"shufflevector {a}, {b}, <{width} x i32> <{mask}>", width, a.kind)
 
+    def halved(self, v: Value, join: Callable[[Value, Value], Value]) -> Value:
+        """Return what is left of a vector whose halves are joined again and again."""
+        width = v.width
+        while width > 1:
+            width //= 2
+            low, high = (
+                self.shuffled(v, Value("poison", v.width), range(k, k + width)) for k in (0, width)
+            )
+            v = join(low, high)
+        return self.element(v, 0)
+
     # -- arithmetic
 
     def op(self, name: str, a: Operand, b: Operand, *, exact: bool = False) -> Value:
