@@ -34,7 +34,7 @@ from .diagram.trace import feedthrough
 from .equations.reader import Reader
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
-DERIVATIVE, NEXT = r"\dot{{{}}}", "{}^{{+}}"  # of the letter of a state
+DERIVATIVE, NEXT_VALUE = r"\dot{{{}}}", "{}^{{+}}"  # of the letter of a state
 _RATE = ("a", "b")  # of the rate a + b v of an ideal relay's input
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
@@ -122,7 +122,7 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     leaf = _symbols(system, slots)
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
-    form = NEXT if next_value else DERIVATIVE
+    form = NEXT_VALUE if next_value else DERIVATIVE
     lines = [
         *_lines(writer, found["x"], [changing(s, form) for s in _names(system.state_labels)]),
         *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
