@@ -207,13 +207,13 @@ class CBody(Body):
         self.write("}")
 
     def index(self, name: str, a: Value, b: Value) -> Value:
-        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", "i")
+        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", kind="i")
 
     def as_number(self, index: Value) -> Value:
         return self.new(f"(double){index.text}")
 
     def as_index(self, number: Value) -> Value:
-        return self.new(f"(uint64_t){number.text}", "i")
+        return self.new(f"(uint64_t){number.text}", kind="i")
 
     def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
         far = self.compare("ogt", self.intrinsic("fabs", x), limit)
