@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import control as ct
@@ -41,7 +41,7 @@ def stacked_axes(
     return figure, axes
 
 
-def control_plot(figure: Figure, axes: Sequence[Axes]) -> ct.ControlPlot:
+def control_plot(figure: Figure, axes: list[Axes]) -> ct.ControlPlot:
     """Return what plots of python-control return, of axes above each other."""
     lines = np.empty((len(axes), 1), dtype=object)
     for k, ax in enumerate(axes):
