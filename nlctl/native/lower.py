@@ -25,7 +25,7 @@ from .diagram.program import Program
 from .diagram.schedule import Schedule
 from .equations.blocks import Equations, equations
 from .equations.located import Conditions
-from .opaque.calls import Call
+from .opaque.called import Call
 from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}

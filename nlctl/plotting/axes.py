@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import control as ct
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -38,6 +39,14 @@ def stacked_axes(
         set_style(ax)
         ax.margins(x=0.01)
     return figure, axes
+
+
+def control_plot(figure: Figure, axes: list[Axes]) -> ct.ControlPlot:
+    """Return what plots of python-control return, of axes above each other."""
+    lines = np.empty((len(axes), 1), dtype=object)
+    for k, ax in enumerate(axes):
+        lines[k, 0] = list(ax.lines)
+    return ct.ControlPlot(lines, np.array(axes)[:, None], figure)
 
 
 def set_style(ax: Axes) -> None:

@@ -32,8 +32,6 @@ from ..integrate.state import RUNNING
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
-__all__ = ["Attempt", "Jump", "asked", "jump_of", "new_paces", "probe_of", "snapshot"]
-
 PROBE = 200  # steps tried that are looked at, at the end of a window
 _PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
 _JUMPS = 10  # of them with a jump
@@ -178,11 +176,8 @@ class _Places(LaneEquations):
         return jump if found else None
 
     def _stands_out(self, jump: Jump, i: int) -> bool:
-        """Whether component `i` jumps by more than it changes next to the jump.
-
-        What changes by rounding does so everywhere, and what is smooth changes by more over a
-        longer way.
-        """
+        """Whether component `i` jumps by more than it changes next to the jump."""
+        # What changes by rounding does so everywhere, and what is smooth by more over a longer way.
         with np.errstate(all="ignore"):
             points = [jump.sides(wider) for wider in _BESIDE]
             below, above = (

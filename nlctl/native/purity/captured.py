@@ -7,6 +7,7 @@ looks whether they are still what they were.
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from .values import PLAIN
+from .values import PLAIN, KnownValue, captured
 
 GONE = object()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
@@ -37,10 +38,7 @@ class Captured:
     def now(self) -> Any:
         """What it is."""
         if isinstance(self.holder, CellType):
-            try:
-                return self.holder.cell_contents
-            except ValueError:  # emptied
-                return GONE
+            return in_cell(self.holder, GONE)
         if type(self.holder) is dict:
             return self.holder.get(self.name, GONE)
         return getattr(self.holder, self.name, GONE)
@@ -53,6 +51,14 @@ class Captured:
             owner = owner.func
         name = getattr(owner, "__qualname__", "")
         return f"{name}.{self.name}" if name else self.name
+
+
+def in_cell(cell: CellType, empty: Any = None) -> Any:
+    """Return what is in the cell of a closure, something else if it is not filled."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return empty
 
 
 def noted(holder: object, name: str, value: object) -> Captured:
@@ -163,3 +169,35 @@ def _same_held(now: Any, held: Any) -> bool:
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))
+
+
+class Walk(ABC):
+    """A walk through a function and all that it calls: what its parts share, and how to walk on."""
+
+    def __init__(self) -> None:
+        self.read: dict[tuple[int, str], Captured] = {}
+        self.unbound: list[str] = []
+        self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
+
+    def captured(self, holder: object, name: str, value: object) -> KnownValue:
+        """Return what is known of a value that is read from around a function, and note it."""
+        if (id(holder), name) not in self.read:
+            self.read[id(holder), name] = noted(holder, name, value)
+        return captured(value)
+
+    def note(self, notes: Iterable[Captured]) -> None:
+        """Keep notes of what a function or an object consists of."""
+        for note in notes:
+            self.read.setdefault((id(note.holder), note.name), note)
+
+    @abstractmethod
+    def call(
+        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
+        """Return what is known of the result of a call."""
+
+    @abstractmethod
+    def function(
+        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
+        """Return what is known of the result of somebody's Python function."""
