@@ -15,7 +15,6 @@ import typer
 from nlctl.wording import counted
 
 from ..papers import paper_key
-from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
 from .own_page import (
     HORIZON_OF_PAGE,
@@ -31,11 +30,14 @@ from .studies import (
     INCOMPLETE,
     INTERRUPTED,
     Json,
+    Junit,
     Trust,
+    check_junit,
     check_run_path,
     check_study_path,
     exit_codes,
     run_folder,
+    write_claims,
 )
 from .study_report import Stamp, stamped
 
@@ -62,13 +64,6 @@ Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser."
 Force = Annotated[
     bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
 ]
-
-
-def register_reports(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.command("report")(report)
-    app.command("compare")(compare_command)
-    app.command("gallery")(gallery)
 
 
 def report(
@@ -224,8 +219,8 @@ def _paper(
         check_report_options(out, pdf=pdf, force=force)
         from ..papers import named_paper
         from ..report.render import write_report
+        from .progress import progress_bar
         from .study_report import notify
-        from .terminal import progress_bar
 
         reproduction = named_paper(name)
         if live:
@@ -287,8 +282,8 @@ def _study(
 ) -> WrittenPage:
     """Report a study."""
     from ..pages.study.claims import claims
+    from .progress import sweep_bar
     from .study_report import report_study
-    from .sweep_progress import sweep_bar
 
     check_memory(TO_BEGIN)
     if study.suffix == ".toml":
