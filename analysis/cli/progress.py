@@ -74,7 +74,7 @@ def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
         update(completed=done[0])
 
     with _bar(
-        what, console, lambda: f"{100 * done[0] / total:.0f} %", *columns, total=total
+        what, Console(stderr=True), lambda: f"{100 * done[0] / total:.0f} %", *columns, total=total
     ) as update:
         yield add
 
