@@ -103,8 +103,11 @@ def sweep_bar(
             found=found_text(progress, confidence),
         )  # fmt: skip
 
-    rows, found = (TextColumn(f"{{task.fields[{name}]}}") for name in ("rows", "found"))
-    columns = (rows, TimeRemainingColumn(), found)
+    columns = (
+        TextColumn("{task.fields[rows]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[found]}"),
+    )
     console = console or Console(stderr=True)
     with _bar(what, console, line, *columns, total=None, rows="", found="") as update:
         yield show

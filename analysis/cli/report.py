@@ -381,7 +381,7 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
 def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     """Print where the page is; print it to PDF and show it, as wanted."""
     from ..report.browser import open_page, write_pdf
-    from ..studies.intact.page import recorded_print
+    from ..studies.intact.contents import recorded_print
 
     say(page)
     if pdf:
@@ -430,7 +430,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 def _check_run(path: Path) -> None:
     """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
-    from ..studies.intact.page import check_page, is_run
+    from ..studies.intact.contents import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()
@@ -458,10 +458,10 @@ def _no_report(path: Path) -> UsageError:
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is."""
-    from ..pages.trend import trend_figure
+    from ..pages.compared import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
-    from ..studies.intact.page import check_page
+    from ..studies.intact.contents import check_page
     from .terminal import check_writable
 
     check_writable(folder)

@@ -242,7 +242,7 @@ def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
     from nlctl.errors import UsageError
 
-    from ..studies.intact.page import is_run
+    from ..studies.intact.contents import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))

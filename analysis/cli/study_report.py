@@ -44,13 +44,13 @@ def report_study(
     live: bool | Sequence[str] = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study."""
+    from ..pages.study.histories import loop_again, rows_again
     from ..pages.study.loop import loop_of
-    from ..pages.study.redrawn import loop_again, rows_again
     from ..pages.study.report import study_report
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result
-    from ..studies.intact.page import recorded_page
+    from ..studies.intact.contents import recorded_page
 
     if live:
         from nlctl.export.web import check_linker

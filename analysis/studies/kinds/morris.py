@@ -12,8 +12,7 @@ from nlctl.wording import counted
 from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
-from ..file.asked import Asked
-from ..file.field_types import Whole
+from ..file.asked import Asked, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text

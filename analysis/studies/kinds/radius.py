@@ -12,8 +12,7 @@ from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness.search.largest_scale import largest_scale
 from ...robustness.search.radius import robustness_radius
-from ..file.asked import Varied
-from ..file.field_types import Confidence, Size, Whole
+from ..file.asked import Confidence, Size, Varied, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text

@@ -13,8 +13,7 @@ from ...report.document import Item
 from ...robustness import Design, decide, test_verdict
 from ...robustness.runs.progress import Progress, until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ..file.asked import Asked
-from ..file.field_types import Confidence
+from ..file.asked import Asked, Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items

@@ -34,8 +34,7 @@ from ...robustness import (
 )
 from ...robustness.runs.experiment import by_diagram, simulate_rows
 from ...robustness.statistics.guarantee import rounded_up
-from ..file.asked import Asked
-from ..file.field_types import Confidence, Pair, Size, Whole
+from ..file.asked import Asked, Confidence, Pair, Size, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text

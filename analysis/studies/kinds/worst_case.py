@@ -19,8 +19,7 @@ from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
-from ..file.asked import Varied
-from ..file.field_types import Flag, Number, Whole
+from ..file.asked import Flag, Number, Varied, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
