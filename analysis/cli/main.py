@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import typer
 
 from .loops import USUAL_STEP
-from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line, error_text, say
+from .printing import error_line, say
 from .report import Input, Set, compare_command, gallery, report
 from .studies import (
     FAILS,
     OPEN,
+    exit_codes,
     replay_command,
     run_command,
     schema,
@@ -322,22 +322,9 @@ def _say_warnings() -> None:
 def main() -> None:
     """Run the command line; what the user can put right ends in one sentence and exit code 2."""
     # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
-    from nlctl.errors import DivergedError, UsageError
-
     _say_warnings()
     try:
-        app()
-    except (UsageError, DivergedError, OSError) as error:
-        error_line(f"nlctl: {error_text(error)}")
-        raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        error_line("nlctl: interrupted")
-        raise SystemExit(130) from None
-    except Exception as error:
-        if is_short_of_memory(error):
-            error_line(f"nlctl: {TOO_LITTLE} ({error or type(error).__name__})")
-            raise SystemExit(2) from None
-        from .terminal import trace_of
-
-        error_line(trace_of(error))
-        raise SystemExit(3) from None
+        with exit_codes(json=False):
+            app()
+    except typer.Exit as ended:
+        raise SystemExit(ended.exit_code) from None

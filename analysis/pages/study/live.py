@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import pandas as pd
-
 from nlctl.response import input_output_response
 from nlctl.wording import counted
 
 from ...report.document import Report, Section
-from ...robustness import Prepared, arguments, nominal
-from ...robustness.search.evaluation import as_table
+from ...robustness import Prepared, nominal
+from ...robustness.uncertainty.space import arguments_of_row
 from ...studies.result import Result
 from ..live import live_item, live_numbers, live_program
 from .histories import Histories
@@ -33,11 +31,7 @@ def with_study_live(
     experiment = prepared.experiment
     space = experiment.space
     diagram: Any = loop_of(prepared).diagram
-    row: pd.DataFrame = as_table(space, [nominal(space)])
-    given = {
-        what: {name: values[0] for name, values in value.items()}
-        for what, value in arguments(space, row).items()
-    }
+    given = arguments_of_row(space, nominal(space))
     response = input_output_response(
         diagram, experiment.timepts, experiment.inputs, given["initial_state"],
         params=given["params"], rtol=experiment.rtol, atol=experiment.atol,

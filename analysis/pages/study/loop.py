@@ -42,16 +42,14 @@ class Published:
 
 def loop_of(prepared: Prepared) -> StudyLoop:
     """Return the loop of an experiment; with choices, that of the nominal ones."""
-    nominal = {choice.name: choice.nominal for choice in prepared.experiment.space.choices}
-    compiled = next(
-        (loop for labels, loop in prepared.loops if dict(labels) == nominal), prepared.loops[0][1]
-    )
     build: Any = prepared.experiment.build
     while isinstance(build, functools.partial):
         build = build.func
     build = inspect.unwrap(build)
     module = str(getattr(build, "__module__", ""))
-    named = StudyLoop(diagram=compiled.system, maker=str(getattr(build, "__qualname__", build)))
+    named = StudyLoop(
+        diagram=prepared.nominal_loop.system, maker=str(getattr(build, "__qualname__", build))
+    )
     try:
         path = Path(inspect.getsourcefile(build) or "")
         content = path.read_bytes()

@@ -26,7 +26,7 @@ from nlctl.sensitivities import sensitivity_response
 from ..runs.experiment import Prepared, by_diagram
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
-from ..uncertainty.space import arguments, checked_row, ends
+from ..uncertainty.space import arguments_of_row, checked_row, ends
 from .evaluation import as_table
 
 _REPEATS = 4  # linear programs at most
@@ -278,15 +278,13 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
     """
     study = of_type("first_order", "prepared", prepared, Prepared, "prepare(experiment)").experiment
     row = checked_row(study.space, row)
-    table = as_table(study.space, [row])
-    ((loop, _),) = by_diagram(prepared, table)
-    given = arguments(study.space, table)
+    ((loop, _),) = by_diagram(prepared, as_table(study.space, [row]))
+    given = arguments_of_row(study.space, row)
     names = [quantity.name for quantity in study.space.quantities]
     try:
         run = sensitivity_response(
-            loop, study.timepts, study.inputs,
-            {name: float(values[0]) for name, values in given["initial_state"].items()} or None,
-            with_respect_to=names, params={k: v[0] for k, v in given["params"].items()},
+            loop, study.timepts, study.inputs, given["initial_state"] or None,
+            with_respect_to=names, params=given["params"],
             rtol=study.rtol, atol=study.atol, max_steps=study.max_steps,
             method="auto" if study.method == "taylor" else study.method,  # one that can have them
         )  # fmt: skip

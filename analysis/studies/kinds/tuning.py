@@ -12,7 +12,6 @@ from pydantic import Field
 
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
-from nlctl.native import Compiled
 from nlctl.sensitivities import Tuned, tune
 from nlctl.wording import counted
 
@@ -162,12 +161,6 @@ def _varied_names(space: Space, asked: Tuning) -> list[str]:
     return [*quantities[: -len(asked.gains)], *(c.name for c in space.choices)]
 
 
-def _nominal_loop(prepared: Prepared) -> Compiled:
-    """Return the diagram with the nominal options."""
-    middle = {c.name: c.nominal for c in prepared.experiment.space.choices}
-    return next(loop for labels, loop in prepared.loops if labels == middle)
-
-
 def _tuned(asked: Tuning, ground: Ground, prepared: Prepared) -> Tuned:
     """Find gains on a few samples; integers are nominal in these."""
     experiment, size = prepared.experiment, len(asked.gains)
@@ -179,7 +172,7 @@ def _tuned(asked: Tuning, ground: Ground, prepared: Prepared) -> Tuned:
         samples = {q.name: [q.nominal] * asked.samples if q.is_integer else table[q.name]
                    for q in varied}  # fmt: skip
     tuned = tune(
-        _nominal_loop(prepared), {q.name: (q.nominal, *q.box) for q in gains}, experiment.spec,
+        prepared.nominal_loop, {q.name: (q.nominal, *q.box) for q in gains}, experiment.spec,
         asked.budget, experiment.timepts, experiment.inputs, samples=samples,
         cost=_metric(asked, experiment) if asked.lower else None, starts=asked.starts,
         seed=ground.seed, rtol=experiment.rtol, atol=experiment.atol,
