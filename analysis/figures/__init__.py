@@ -2,7 +2,6 @@
 
 from nlctl.plotting.bands import LIMIT, Limit, most_frequent, quantile
 
-from .faults import fault_margins, fault_pairs
 from .proof import (
     bounds,
     burst,
@@ -15,7 +14,15 @@ from .proof import (
 )
 from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
 from .runs import CLIP, fans, margins_figure, overlaid, running_estimate
-from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .searches import (
+    degradation,
+    deviations,
+    failure_map_figure,
+    fault_margins,
+    fault_pairs,
+    radius_steps,
+    search,
+)
 from .trend import trend
 from .tuning import bought, margins_of_both, tried
 

@@ -33,7 +33,7 @@ from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
 from .reproduction import CaseRun, checks, numerics, run_all
 from .reproduction import compile_cases_ahead as compile_cases
-from .rival_record import checked_rivals
+from .rivals import checked_rivals
 from .sampling_limits import checked_record
 
 QUICK = ("example-1-quick", "example-2-quick")
