@@ -12,7 +12,7 @@ from hypothesis import settings
 
 # The same examples in every run, and no clocks; more of them once a week.
 settings.register_profile(
-    "nlctl", deadline=None, derandomize=True, database=None, max_examples=many(50, part=3)
+    "nlctl", deadline=None, derandomize=True, database=None, max_examples=many(50)
 )
 settings.load_profile("nlctl")
 

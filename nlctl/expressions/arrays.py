@@ -343,6 +343,8 @@ def traced(graph: Graph, value: object) -> Tracer:
     """Return numbers, tracers and nested lists of them as a tracer."""
     if isinstance(value, Tracer):
         return value
+    if type(value) is float or type(value) is bool:
+        return scalar(graph, graph.const(value))
     if isinstance(value, Special):
         raise Untraceable(f"{type(value).__name__} instead of an array")
     if isinstance(value, list | tuple):

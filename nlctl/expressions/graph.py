@@ -26,6 +26,7 @@ BOOLEAN = {"mul": "and", "maximum": "or", "minimum": "and", "absolute": "",
            "add": None, "sub": None, "neg": None}  # fmt: skip  # of truth values alone
 # operations that make integers of integers
 INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remainder")
+_NEUTRAL = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}
 
 ORDERS = ("lt", "le", "gt", "ge")
 SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
@@ -139,18 +140,19 @@ class Graph:
         value: int | None = None,
     ) -> Expr:
         """Return the one expression that is made of these parts."""
-        key = (op, tuple(a.index for a in args), repr(data), size, kind)
-        if key not in self._known:
+        key = (op, args, None if data is None else repr(data), size, kind)
+        known = self._known.get(key)
+        if known is None:
             if len(self.nodes) >= self.limit:
                 raise Untraceable("too long to be written out")
             self._check_lengths(op, args, data, size)
             varies = varies or any(a.varies for a in args)
-            self._known[key] = Expr(
+            known = self._known[key] = Expr(
                 op=op, args=args, data=data, size=size, kind=kind,
                 index=len(self.nodes), varies=varies, value=value,
             )  # fmt: skip
-            self.nodes.append(self._known[key])
-        return self._known[key]
+            self.nodes.append(known)
+        return known
 
     def like(self, node: Expr, *args: Expr) -> Expr:
         """Return the operation of an expression, of other arguments."""
@@ -174,7 +176,7 @@ class Graph:
             ends = (start, start + step * ((size or 1) - 1))
             fits = all(0 <= i < self.lengths[array] for i in ends)
         elif op in ("const", "table", "leaf", "call", "solve", "sum"):
-            fits = True
+            return
         else:
             fits = all(a.size in (None, size) for a in args)
         if not fits:
@@ -196,9 +198,10 @@ class Graph:
 
     def op(self, name: str, *args: Expr) -> Expr:
         """Return an operation on numbers, or on the elements of vectors."""
-        if name in INTEGER and all(a.kind == "i" for a in args):
+        kinds = {a.kind for a in args}
+        if kinds == {"i"} and name in INTEGER:
             return self._of_integers(name, *args)
-        if args and all(a.kind == "b" for a in args) and name in BOOLEAN:
+        if kinds == {"b"} and name in BOOLEAN:
             return self._of_truth_values(name, *args)
         kind, args = self._kinds(name, args)
         sizes = {a.size for a in args if a.size is not None}
@@ -263,7 +266,7 @@ class Graph:
     def number(self, a: Expr) -> Expr:
         """Return an expression as a float."""
         if a.op == "const":
-            return self.const(float(a.data))
+            return a if a.kind == "f" else self.const(float(a.data))
         return self.op("select", a, self.const(1.0), self.const(0.0)) if a.kind == "b" else a
 
     def _simplified(self, name: str, *args: Expr) -> Expr | None:
@@ -276,8 +279,8 @@ class Graph:
             if a.size is None and all(arg.op == "concat" for arg in args[1:]):
                 return self._choice_of_pieces(*args)
             return args[2] if is_const[0] else self._inner_select(*args)
+        neutral = _NEUTRAL.get(name)
         for this, other, is_number in ((a, b, is_const[-1]), (b, a, is_const[0])):
-            neutral = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}.get(name)
             is_reversed = this is b and name in ("div", "sub") and len(args) == 2
             if is_number and not is_reversed and neutral is not None and other.data == neutral:
                 return this

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Special, Tracer, as_array, is_complex, mapped, traced
+from .arrays import Special, Tracer, as_array, is_complex, mapped, scalar, traced
 from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
 
 _Range = tuple[float, float]
@@ -86,6 +86,8 @@ def elementwise(graph: Graph, name: str, *operands: Any) -> Tracer:
     if special is not None:
         return special.operation(graph, name, operands)
     arrays = [traced(graph, v) for v in operands]
+    if all(not a.values.shape and a.axis is None for a in arrays):  # most are numbers
+        return scalar(graph, graph.op(name, *(a.only for a in arrays)))
     longs = {(a.ndim - a.axis, a.length) for a in arrays if a.axis is not None}
     if len(longs) > 1 or (longs and _is_mixed(arrays, *longs)):
         arrays, longs = [a.short() for a in arrays], set()

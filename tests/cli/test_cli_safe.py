@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from command_line import nlctl, nlctl_here
+from examples import some
 from studies_example import HEAD, write
 
 from nlctl.analysis.cli.printing import in_json, printable
@@ -50,10 +51,10 @@ def ordered(done, folder, text):
 def test_received_folders_give_no_orders_to_a_terminal(done, tmp_path, text):
     """Whatever reads them: report, compare, verify, in words and in JSON."""
     folder = ordered(done, tmp_path / "out", text)
-    for command in (
-        ("report", folder), ("compare", folder, done), ("compare", folder, done, "--json"),
-        ("verify", folder), ("replay", folder, 1), ("report", f"{folder}{text}"),
-    ):  # fmt: skip
+    for command in some([
+        ("report", folder), ("compare", folder, done), ("replay", folder, 1),
+        ("compare", folder, done, "--json"), ("verify", folder), ("report", f"{folder}{text}"),
+    ]):  # fmt: skip
         told = nlctl_here(*command)
         assert "Traceback" not in told.stderr
         for out in (told.stdout, told.stderr):

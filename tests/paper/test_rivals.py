@@ -120,7 +120,7 @@ def test_of_several_samples_the_mean_cost_and_the_worst_limit_count():
     found = evolved_gains(
         nlctl.compile(loop),
         {"p.k": (0.1, 100.0)},
-        np.linspace(0, 20, 2001),
+        np.linspace(0, 10, 501),
         Metric(key="iae", signal="e", unit="s", meaning="", function=absolute_integral),
         limited=Metric(key="peak", signal="u", unit="1", meaning="", function=peak),
         limit=6.0,

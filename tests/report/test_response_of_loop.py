@@ -93,7 +93,7 @@ def test_python_controls_own_response_is_taken_where_it_is_right():
 def test_plain_python_controls_relaxed_memory_is_taken():
     """It is off by 2e-4: less than what tells loops apart."""
     loop, start = nlctl.paper.example_2(), nlctl.initial_state(nlctl.paper.example_2())
-    times = np.linspace(0, 4, 81)
+    times = np.linspace(0, 2, 41)
     tight = {"rtol": 1e-8, "atol": 1e-10}
     plain = ct.input_output_response(loop, times, 0, start, method="LSODA", solve_ivp_kwargs=tight)
     check_response(loop, plain)

@@ -10,8 +10,6 @@ from user_function_native import accepted, run
 ENTRIES = {entry.name: entry for entry in user_functions.ENTRIES}
 PURE = [entry for entry in ENTRIES.values() if entry.pure]
 IMPURE = [entry for entry in ENTRIES.values() if not entry.pure]
-# in the everyday tests the size at which arrays become loops
-SIZES = [n if n == 9 else pytest.param(n, marks=pytest.mark.ci) for n in user_functions.SIZES]
 GROUPS = 48  # of entries that are compiled one by one
 
 machine_code = pytest.mark.skipif(
@@ -19,8 +17,20 @@ machine_code = pytest.mark.skipif(
 )
 
 
-def named(entries):
-    return {"argvalues": entries, "ids": [f"{entry.theme}-{entry.name}" for entry in entries]}
+def sized(entries):
+    """Entries with sizes: 9, at which arrays become loops, each day, the others once a week."""
+    return [
+        pytest.param(entry, n, id=f"{entry.theme}-{entry.name}-{n}", marks=when(i + n, n))
+        for i, entry in enumerate(entries)
+        for n in user_functions.SIZES
+    ]
+
+
+def when(number, n):
+    """Another quarter of the entries of each other size in each `.ci/run`."""
+    if n == 9:
+        return ()
+    return pytest.mark.weekly if number % 4 else pytest.mark.ci
 
 
 def hold(entry, n, dt=0):
@@ -31,22 +41,19 @@ def hold(entry, n, dt=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", SIZES)
-@pytest.mark.parametrize("entry", **named(PURE))
+@pytest.mark.parametrize(("entry", "n"), sized(PURE))
 def test_a_pure_function_agrees_or_is_refused(entry, n):
     """At points of several scales, also with other parameters; python-control is as before."""
     hold(entry, n)
 
 
-@pytest.mark.parametrize("n", SIZES)
-@pytest.mark.parametrize("entry", **named([entry for entry in PURE if entry.discrete]))
+@pytest.mark.parametrize(("entry", "n"), sized([entry for entry in PURE if entry.discrete]))
 def test_in_discrete_time_as_well(entry, n):
     """The same numbers are the next state."""
     hold(entry, n, 0.1)
 
 
-@pytest.mark.parametrize("n", SIZES)
-@pytest.mark.parametrize("entry", **named(IMPURE))
+@pytest.mark.parametrize(("entry", "n"), sized(IMPURE))
 def test_an_impure_function_is_refused(entry, n):
     """Its memory stays as it was: python-control goes on as with a fresh instance."""
     hold(entry, n)
@@ -86,8 +93,8 @@ def size(n):
 @machine_code
 @pytest.mark.parametrize("n", [size(n) for n in user_functions.SIZES])
 def test_traced_functions_in_one_diagram_in_machine_code(n):
-    """Alone, side by side, and in a short run: a third of them, and once a week all."""
-    found = report("joint", n, some(accepted(n, opaque=False)))
+    """Alone, side by side, and in a short run: a tenth of them, and once a week all."""
+    found = report("joint", n, some(accepted(n, opaque=False), part=10))
     assert {kind for kind, _ in found.values()} == {"equal"}
 
 
