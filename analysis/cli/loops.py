@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from nlctl.upstream.systems import System
 
 USUAL_STEP = 0.01  # s, between samples of a run where none is given
 _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
@@ -88,7 +93,7 @@ def sampled_times(until: float, step: float, loop: Any) -> Any:
     return np.linspace(0, until, round(until / step) + 1)
 
 
-def input_values(diagram: Any, texts: Sequence[str]) -> Any:
+def input_values(diagram: System, texts: Sequence[str]) -> np.ndarray:
     """Return the constant value of each input of a diagram; 0 where none is given."""
     import numpy as np
 

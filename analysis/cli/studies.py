@@ -25,6 +25,7 @@ from .printing import error_line, error_text, in_json, printable, say
 
 if TYPE_CHECKING:
     from ..report.document import Claim
+    from ..studies.result import Result
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
@@ -387,7 +388,7 @@ def _dask_client(address: str) -> Any:
         ) from None
 
 
-def _show(result: Any, json: bool) -> None:
+def _show(result: Result, json: bool) -> None:
     """Print the verdict, then every finding in its own words."""
     for note in result.notes:
         error_line(f"nlctl: {note}")

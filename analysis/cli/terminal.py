@@ -8,7 +8,7 @@ import tempfile
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
@@ -19,6 +19,7 @@ from nlctl.host.files import replace_file
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
@@ -56,7 +57,7 @@ def check_figure(path: Path) -> None:
     check_file(path)
 
 
-def write_figure(path: Path, figure: Any) -> None:
+def write_figure(path: Path, figure: Figure) -> None:
     """Write a matplotlib figure in one step, in the format that its name ends in."""
     replace_file(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower()))
 

@@ -255,7 +255,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Compare, key: str) -> Iterator[Item]:
     """Yield rates of violation, paired differences, wins and tests."""
     t, confidence = finding.tables, 100 * finding.numbers["confidence"]
     ranking = t["ranking"]

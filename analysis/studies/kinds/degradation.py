@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field, model_validator
 
@@ -85,7 +84,7 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     )
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: AskedDegradation) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
         "measured": f"{row['violations']:.0f} of {counted(int(row['runs']), 'run')} at size "
@@ -96,7 +95,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: AskedDegradation, key: str) -> Iterator[Item]:
     """Yield the probability of a violation against the size of the uncertainty."""
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field
 
@@ -60,7 +59,7 @@ def _run(asked: Morris, ground: Ground) -> Finding | None:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Morris, key: str) -> Iterator[Item]:
     """Yield the elementary effects."""
     table = finding.tables["effects"]
     caption = MORRIS_CAPTION.format(of=finding.numbers["of"])

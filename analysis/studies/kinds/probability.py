@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -54,7 +54,7 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     )
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Probability) -> dict[str, str]:
     n = finding.numbers
     low, high = n["singly"]
     bound = f"at most {rounded_up(high)}" if high < 1 else ""

@@ -96,7 +96,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: AskedRadius, key: str) -> Iterator[Item]:
     """Yield which sizes were tried, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
     if n["upper"] == 0:  # the nominal values violate: no other size was tried

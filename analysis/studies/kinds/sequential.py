@@ -51,7 +51,7 @@ def _stop(asked: Sequential, design: Design) -> Callable[[Progress], Any]:
     return until_decided(design, asked.limit, asked.confidence)
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Sequential) -> dict[str, str]:
     n = finding.numbers
     return {
         "measured": f"{n['violations']} of {counted(n['runs'], 'run')}; "

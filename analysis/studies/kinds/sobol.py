@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field
 
@@ -67,7 +66,7 @@ def _run(asked: Sobol, ground: Ground) -> Finding | None:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Sobol, key: str) -> Iterator[Item]:
     """Yield the shares of the variance."""
     table = finding.tables["indices"]
     caption = SOBOL_CAPTION.format(

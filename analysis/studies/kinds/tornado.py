@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -153,7 +152,7 @@ def _metrics_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
     return [m for m in (*requirements, *experiment.metrics) if m.key == asked.of]
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Tornado, key: str) -> Iterator[Item]:
     """Yield the tornado."""
     n, table = finding.numbers, finding.tables["effects"]
     caption = _CAPTION.format(of=n["of"], value=n["value"])

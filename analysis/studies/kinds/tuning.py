@@ -252,7 +252,7 @@ def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Tuning) -> dict[str, str]:
     fresh = finding.numbers["fresh_after"]
     high = fresh["singly"][1]
     return {
@@ -263,7 +263,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterator[Item]:
     """Yield before and after, which gain has bought what, and how it was found."""
     n, tables = finding.numbers, finding.tables
     is_cost = n["goal"] != "margin"
