@@ -10,6 +10,7 @@ _WORDS = {"+": "additions", "-": "subtractions", "*": "products", "/": "division
 _OPERATION = re.compile(r" ([-+*/]) |\b([a-z]\w*)\(")
 _FUNCTION = re.compile(r"^static \w+ (\w+)\([^)]*\)\n\{\n(.*?)^\}", re.MULTILINE | re.DOTALL)
 _TURNS = re.compile(r"for \(int k = 0; k < (\d+)")
+_LINEAR = re.compile(r"^\s*nlctl_(lu|lu_solve)\(&\w+\[\d+\], (\d+)(?:, (\d+))?\);")
 _FREE = ("nlctl_bits", "nlctl_real", "sizeof")
 
 
@@ -41,6 +42,8 @@ def _counts(body: str, known: Mapping[str, Counter[str]]) -> Counter[str]:
         if turns or line.strip() == "}":
             times = int(turns[1]) if turns else 1
             continue
+        if linear := _LINEAR.match(line):
+            total[_of_matrix(*linear.groups())] += times
         statement = re.sub(r"\[[^]]*\]|/\*.*?\*/", "", line).replace("+=", "= x +")
         statement = statement.partition("return")[2] or statement.partition("=")[2]
         for sign, name in _OPERATION.findall(f" {statement}"):
@@ -49,3 +52,9 @@ def _counts(body: str, known: Mapping[str, Counter[str]]) -> Counter[str]:
             elif name not in _FREE:
                 total[sign or name] += times
     return total
+
+
+def _of_matrix(name: str, rows: str, columns: str | None) -> str:
+    if name == "lu":
+        return f"LU factorisation of {rows} x {rows}"
+    return f"back substitution of {rows} x {columns}"

@@ -7,9 +7,15 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from .conditions import JUMPING
-from .graph import ORDERS, Expr, needed
+from .graph import LINEAR, OF_FACTORS, ORDERS, Expr, needed
 
-_WHOLE = ("sum", "call", "solve")  # each element of the result depends on all that goes in
+_WHOLE = (
+    "sum",
+    "call",
+    "solve",
+    *LINEAR,
+    *OF_FACTORS,
+)  # each element of the result depends on all that goes in
 
 
 def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from .arrays import scalar
 from .elimination import linear_solution
 from .functions import FUNCTIONS
 from .graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+from .linear_systems import changed_solution, solution
 from .stage import Stage
 
 
@@ -42,8 +44,9 @@ def partials(graph: Graph) -> Callable[[Expr, int], Expr]:
 def linear(graph: Graph, node: Expr, parts: Sequence[Expr | None]) -> Expr | None:
     """Return what a linear operation makes of parts, None for one that is 0."""
     a, b, zero = parts[0], parts[-1], graph.const(0.0)
-    if node.op == "concat":
-        return graph.joined([(p or zero, n) for p, n in zip(parts, node.data, strict=True)])
+    if node.op in ("concat", "lu"):  # as derivative of factors stands that of the matrix
+        sizes = node.data if node.op == "concat" else node.data[1]
+        return graph.joined([(p or zero, n) for p, n in zip(parts, sizes, strict=True)])
     if node.op == "add":
         return _sum(graph, a, b)
     if node.op == "sub":
@@ -66,7 +69,7 @@ def _difference(graph: Graph, a: Expr | None, b: Expr | None) -> Expr:
     return graph.op("sub", a, b) if a and b else a or graph.op("neg", b or graph.const(0.0))
 
 
-_LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum")
+_LINEAR = ("add", "sub", "neg", "item", "slice", "concat", "sum", "lu")
 
 
 class _Reader:
@@ -148,6 +151,23 @@ class _Reader:
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:
         yes, no = self._zero_if_none(a), self._zero_if_none(b)
         return self.graph.op("select", node.args[0], yes, no)
+
+    def _lu_solve(self, node: Expr, matrix: Expr | None, *right: Expr | None) -> Expr:
+        """X' = A^-1 (B' - A' X)."""
+        sizes = node.data[1][1:]
+        pieces = [(self._zero_if_none(part), n) for part, n in zip(right, sizes, strict=True)]
+        return changed_solution(self.graph, node, matrix, pieces)
+
+    def _lu_det(self, node: Expr, matrix: Expr) -> Expr:
+        """det' = det tr(A^-1 A'), Jacobi's formula; NaN where A is singular."""
+        graph, lu = self.graph, node.args[0]
+        n = lu.data[0]
+        whole = solution(graph, lu, n, [(graph.item(matrix, k), 1) for k in range(n * n)])
+        diagonal = (graph.item(whole, k) for k in range(0, n * n, n + 1))
+        return graph.op("mul", node, reduce(lambda a, b: graph.op("add", a, b), diagonal))
+
+    def _lu_regular(self, node: Expr, matrix: Expr) -> None:
+        """It is the same almost everywhere."""
 
     def _function(self, node: Expr, parts: list[Expr | None]) -> Expr | None:
         change: Expr | None = None

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from .graph import Expr, Untraceable, needed, numpy_function
+from .graph import LINEAR, OF_FACTORS, Expr, Untraceable, needed, numpy_function
+from .linear_systems import values as of_linear_system
 
 
 def evaluate_expressions(
@@ -41,13 +42,15 @@ def value_of(
         array, start, step = node.data
         rows = [start + step * i for i in range(node.size)] if node.size else start
         return arrays[array][rows]
-    if node.op == "item":
+    if node.op in ("item", *OF_FACTORS):
         return parts[0][node.data]
     if node.op == "slice":
         start, step = node.data
         return parts[0][[start + step * i for i in range(node.size or 1)]]
     if node.op == "concat":
         return _joined(parts, node.data)
+    if node.op in LINEAR:
+        return of_linear_system(node, _joined(parts, node.data[1]))
     if node.op == "sum":
         return parts[0].sum(axis=0)
     if node.op in ("call", "solve"):

@@ -29,6 +29,8 @@ INTEGER = ("add", "sub", "mul", "neg", "minimum", "maximum", "absolute", "remain
 _NEUTRAL = {"mul": 1.0, "div": 1.0, "add": 0.0, "sub": 0.0}
 
 ORDERS = ("lt", "le", "gt", "ge")
+LINEAR = ("lu", "lu_solve")  # of whole matrices, see `linear_systems`
+OF_FACTORS = ("lu_det", "lu_regular")  # numbers that are read from factors
 SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
 
 
@@ -46,8 +48,8 @@ class Expr:
 
     # ``"const"``, ``"table"`` (a vector of constants), ``"leaf"`` (read from an array),
     # ``"item"``, ``"slice"``, ``"concat"``, ``"sum"``, ``"call"`` (of an opaque function),
-    # ``"solve"`` (signals that depend on each other), an operation of `NUMPY`, or NumPy's
-    # name of a function
+    # ``"solve"`` (signals that depend on each other), one of `LINEAR` and `OF_FACTORS`, an
+    # operation of `NUMPY`, or NumPy's name of a function
     op: str
     args: tuple[Expr, ...]
     # what else it needs: a constant, (array, start, step) of a leaf, index or (start, step)
@@ -175,7 +177,7 @@ class Graph:
             array, start, step = data
             ends = (start, start + step * ((size or 1) - 1))
             fits = all(0 <= i < self.lengths[array] for i in ends)
-        elif op in ("const", "table", "leaf", "call", "solve", "sum"):
+        elif op in ("const", "table", "leaf", "call", "solve", "sum", *LINEAR, *OF_FACTORS):
             return
         else:
             fits = all(a.size in (None, size) for a in args)

@@ -144,19 +144,26 @@ def _assign(self: Tracer, key: Any, value: Any) -> None:
         return _assign_at(self, key, value)
     if self.origin is not None:
         return _assign_to_part(self, key, value)
+    if self.ndim > 1:
+        _keep_elements(self)
     if self.axis is None:
         cells = value.elements()
         if value.axis is None and not cells.shape:
             cells = value.only
         self.cells[tuple(full_index(key, self.ndim))] = cells
         return None
-    if self.ndim > 1:
-        raise Untraceable("assignment to a part of a large matrix")
     (along,) = full_index(key, 1)
     whole = range(self.length)
     k = None if isinstance(along, slice) else whole[along]
     _write(self, whole[along] if k is None else range(k, k + 1), value)
     return None
+
+
+def _keep_elements(self: Tracer) -> None:
+    """Keep the elements of a large matrix individually; parts that were read before are stale."""
+    if self.axis is not None:
+        self.values, self.axis, self.length = self.elements(), None, 1
+        self.version += 1
 
 
 def _assign_at(self: Tracer, key: Any, value: Tracer) -> None:

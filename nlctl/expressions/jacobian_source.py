@@ -12,7 +12,18 @@ import numpy as np
 from .arrays import leaf_vector
 from .derivatives import tangents
 from .functions import FUNCTIONS
-from .graph import COMPARISONS, LOGIC, NUMPY, SMALL, Expr, Graph, Untraceable, needed
+from .graph import (
+    COMPARISONS,
+    LINEAR,
+    LOGIC,
+    NUMPY,
+    OF_FACTORS,
+    SMALL,
+    Expr,
+    Graph,
+    Untraceable,
+    needed,
+)
 from .trace import trace
 
 _SIGNS = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
@@ -60,12 +71,20 @@ def _source(rows: list[list[Expr | None]], names: str) -> str:
 
 def _written(node: Expr, parts: list[str]) -> str:
     """Return one expression in NumPy's words."""
-    if node.size is not None:
+    if node.op in LINEAR:
+        return _of_linear_system(node, parts)
+    if node.size is not None and node.op != "table":
         raise Untraceable("it computes with vectors of more than eight numbers")
     if node.op == "const":
         return {"nan": "np.nan", "inf": "np.inf", "-inf": "(-np.inf)"}.get(
             text := repr(node.data), f"({text})"
         )
+    if node.op == "table":
+        return f"({', '.join(map(repr, node.data))},)"
+    if node.op == "item":
+        return f"{parts[0]}[{node.data}]"
+    if node.op in OF_FACTORS:
+        return f"np.linalg.det({parts[0]})" if node.op == "lu_det" else "1.0"
     if node.op == "leaf":
         return f"{node.data[0]}[{node.data[1]}]"
     if node.op in _SIGNS and "b" not in [arg.kind for arg in node.args]:
@@ -76,6 +95,18 @@ def _written(node: Expr, parts: list[str]) -> str:
     if not hasattr(np, name):
         raise Untraceable(f"NumPy has no {name}")
     return f"np.{name}({', '.join(parts)})"
+
+
+def _of_linear_system(node: Expr, parts: list[str]) -> str:
+    """Return a matrix, or what solves linear equations with it, row by row."""
+    before = node.op == "lu_solve"
+    pairs = zip(node.args[before:], parts[before:], strict=True)
+    entries = ", ".join(f"*{text}" if arg.size else text for arg, text in pairs)
+    if node.op == "lu":
+        return f"np.array([{entries}]).reshape({node.data[0]}, {node.data[0]})"
+    rows, columns = node.data[0]
+    right = f"np.array([{entries}]).reshape({rows}, {columns})"
+    return f"np.linalg.solve({parts[0]}, {right}).reshape({rows * columns})"
 
 
 def _compiled(source: str) -> Callable:

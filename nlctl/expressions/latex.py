@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from .functions import FUNCTIONS
@@ -216,6 +216,33 @@ class LatexWriter:
         rows.append(rf"{self._written(rest, index, depth)[0]} & \text{{otherwise}}")
         return _cases(rows), ATOM
 
+    def _lu(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
+        return self._matrix(expr.args, expr.data[1], expr.data[0], depth), ATOM
+
+    def _lu_det(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
+        return rf"\det {self._lu(expr.args[0], None, depth)[0]}", FACTOR
+
+    def _lu_solve(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
+        assert index is not None
+        columns, (first, step, _) = expr.data[0][1], index
+        matrix = self._lu(expr.args[0], None, depth)[0]
+        right = self._matrix(expr.args[1:], expr.data[1][1:], columns, depth)
+        text = rf"\left({matrix}^{{-1}} {right}\right)"
+        if columns == 1 or step:
+            rows = text if columns == 1 else rf"\operatorname{{vec}}\left({text}^{{T}}\right)"
+            return rf"{rows}_{{{index_text(index)}}}", ATOM
+        return rf"{text}_{{{first // columns + 1},{first % columns + 1}}}", ATOM
+
+    def _matrix(
+        self, args: Sequence[Expr], lengths: Sequence[int], columns: int, depth: int
+    ) -> str:
+        """Return a matrix of entries that are given row by row."""
+        places = [(arg, k) for arg, n in zip(args, lengths, strict=True) for k in range(n)]
+        entries = [self._written(arg, (k, 0, ""), depth)[0] for arg, k in places]
+        rows = [" & ".join(entries[at : at + columns]) for at in range(0, len(entries), columns)]
+        body = r" \\ ".join(rows)
+        return rf"\begin{{pmatrix}} {body} \end{{pmatrix}}"
+
     def _not(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         return rf"\text{{not }} {self._held(expr.args[0], index, depth, ATOM)}", FACTOR
 
@@ -259,7 +286,7 @@ def _is_guard(choice: Expr) -> bool:
     """Whether a choice is there for arguments at which Python's own function raises an error."""
     undefined = choice.args[2].op == "const" and choice.args[2].data != choice.args[2].data
     parts = needed([choice.args[0]]) if undefined else ()
-    return any(e.op == "const" and e.data == math.inf for e in parts)
+    return any(e.op == "lu_regular" or (e.op == "const" and e.data == math.inf) for e in parts)
 
 
 def _both(first: str, second: str) -> str:

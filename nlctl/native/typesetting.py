@@ -293,7 +293,7 @@ def _known(
 ) -> dict[Expr, str]:
     """Return names for parts of the equations: the author's, and letters for what is used twice."""
     exprs = needed(expr for array in found.values() for expr, _ in array.pieces())
-    plain = ("leaf", "const", "table", "concat", "item", "slice")
+    plain = ("leaf", "const", "table", "concat", "item", "slice", "lu", "lu_regular")
     taken = {leaf(e.data[0], (e.data[1], 0, "")) for e in exprs if e.op == "leaf" and not e.size}
     known: dict[Expr, str] = {}
     for expr in exprs:

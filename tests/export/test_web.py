@@ -94,6 +94,21 @@ def test_example_1_has_the_same_numbers_to_the_bit(in_node):
     assert found["ends"] == ""
 
 
+def coupled(t, x, u, params):
+    """Seven masses whose matrix depends on where they are."""
+    mass = np.cos(x[:7, None] - x[:7]) + 3.0 * np.eye(7)
+    return np.concatenate([x[7:], np.linalg.solve(mass, np.sin(t) - x[:7] - x[7:])])
+
+
+@pytest.mark.ci
+def test_linear_equations_have_the_same_numbers_to_the_bit(in_node):
+    plant = ct.nlsys(coupled, None, inputs=[], outputs=14, states=14, name="plant")
+    program = web_program(nlctl.interconnect([plant], outputs=["y[0]", "y[3]"]), TIMES)
+    (found,) = in_node(program)
+    assert np.array_equal(samples(found, program), here(program))
+    assert np.ptp(samples(found, program)) > 0.1
+
+
 def pulses(t, x, u, params):
     return [np.where(t % 0.5 < 0.2, 1.0, 0.0) - x[0]]
 

@@ -1,6 +1,7 @@
 """Sets of solutions: closed forms, random trajectories, and what must not be called proved."""
 
 import itertools
+import time
 
 import control as ct
 import numpy as np
@@ -143,6 +144,30 @@ def test_a_solution_that_escapes_is_undecided():
     assert np.all(np.isinf(found.high))
 
 
+def test_no_piece_is_begun_after_max_seconds():
+    """However many may be tried: what is not proved by then is said, and nothing is claimed."""
+    escape, begun = Box.of(x1=(0.9, 1.1)), time.perf_counter()
+    found = reachable_set(
+        lambda x: (x[0] ** 2,), escape, 1.2, max_pieces=10**9, max_seconds=0.2
+    )  # it would be divided for ever
+    assert 0.2 <= time.perf_counter() - begun < 20.0
+    assert found.status == "undecided"
+    assert 0 < found.pieces < 10**9
+    assert "max_seconds" in found.reason
+    assert np.all(np.isinf(found.high))
+    start = Box.of(x1=(0.0, 1.0), x2=(0.0, 0.0))
+    none = reachable_set(oscillator, start, 1.0, max_seconds=1e-9)
+    assert (none.status, none.pieces) == ("undecided", 0)
+
+
+def test_time_that_suffices_changes_nothing():
+    start = Box.of(x1=(0.9, 1.1), x2=(0.0, 0.1))
+    free, timed = (reachable_set(oscillator, start, 1.0, max_seconds=s) for s in (None, 1e3))
+    assert timed.status == free.status == "proved"
+    np.testing.assert_array_equal(timed.high, free.high)
+    np.testing.assert_array_equal(timed.low, free.low)
+
+
 def test_what_has_no_value_is_undecided():
     found = reachable_set(
         lambda x: (-np.sqrt(x[0]) - 0.1,), Box.of(x1=(0.5, 0.6)), 3.0, max_pieces=9
@@ -163,6 +188,9 @@ def test_rates_with_cases_are_refused(function):
         ({"within": Box.of(x9=(0.0, 1.0))}, "x9"),
         ({"start": (0.0, 1.0)}, "start"),
         ({"max_pieces": 0}, "max_pieces"),
+        ({"max_seconds": 0.0}, "max_seconds"),
+        ({"max_seconds": -1.0}, "max_seconds"),
+        ({"max_seconds": np.nan}, "max_seconds"),
     ],
 )
 def test_wrong_arguments_are_named(change, message):

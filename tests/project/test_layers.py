@@ -79,7 +79,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
     ],
     "nlctl.expressions": [
         ["graph", "source"],
-        ["functions", "elimination"],
+        ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing"],
         [
             "conditions",

@@ -1,5 +1,6 @@
 """Exported controllers, compiled and run on recorded inputs: on this machine, on a chip."""
 
+import ctypes
 import shutil
 import subprocess
 from pathlib import Path
@@ -92,3 +93,33 @@ def _run(folder, build, run, inputs, times):
     subprocess.run(build, cwd=folder, check=True, capture_output=True, text=True)
     subprocess.run(run, cwd=folder, check=True, stdin=subprocess.DEVNULL, timeout=300)
     return np.fromfile(folder / "out.bin").reshape(len(times), -1)
+
+
+def shared(folder, equations):
+    """Compile equations to a library that can be called."""
+    for file, text in c_files(equations).items():
+        (folder / file).write_text(text)
+    command = [needed_program(("gcc", "clang")), *STRICT, "-O2", "-shared", "-fPIC",
+               f"{equations.name}.c", "-lm", "-o", "library.so"]  # fmt: skip
+    subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    return ctypes.CDLL(str(folder / "library.so"))
+
+
+def evaluated(folder, equations, points):
+    """Return rates and outputs at some points (t, x, u)."""
+    library, name, low = shared(folder, equations), equations.name, equations.lowered
+    parameters = np.array([*equations.parameters.values()])
+    c, dx, y = np.zeros(low.size), np.zeros(low.rows["x"]), np.zeros(low.rows["y"] + 1)
+    g, m = np.zeros(low.rows["g"] + 1), np.zeros(low.rows["m"] + 1)
+
+    def pointer(array):
+        return ctypes.c_void_p(array.ctypes.data)
+
+    library[f"{name}_prepare"](pointer(parameters), pointer(c))
+    found = []
+    for t, x, u in points:
+        now = ctypes.c_double(t)
+        library[f"{name}_rates"](now, *map(pointer, (x, u, c, dx, g, m)))
+        library[f"{name}_outputs"](now, *map(pointer, (x, u, c, y)))
+        found.append((dx.copy(), y[: len(equations.outputs)].copy()))
+    return found

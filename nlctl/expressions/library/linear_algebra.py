@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, traced
-from ..elimination import eliminated, is_zero, substituted
-from ..graph import Graph, Untraceable
+from ..arrays import Tracer, as_array, scalar, traced
+from ..elimination import eliminated, substituted
+from ..graph import SMALL, Expr, Graph, Untraceable
+from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
 from .table import Facade, constant_value, of
 
 __all__: list[str] = []
 
 _Rows = list[list[Any]]
-_LARGEST = 20  # rows of a matrix that depends on the state
-_SPARSE = 12  # ... that has more zeros than others, up to which numbers are written out
-_MOST = 1200  # n^2 times columns of any matrix for which they are
+_SMALL = 6  # rows of a matrix up to which elimination is written out, not one operation
 
 
 def _rows(graph: Graph, matrix: Any) -> _Rows:
@@ -32,9 +31,6 @@ def _square(graph: Graph, matrix: Any) -> _Rows:
     rows = _rows(graph, matrix)
     if any(len(row) != len(rows) for row in rows):
         raise Untraceable("a matrix that is not square")
-    open_ones = any(e.op != "const" for row in rows for v in row for e in v.values.flat)
-    if open_ones and len(rows) > _LARGEST:
-        raise Untraceable(f"a matrix of more than {_LARGEST} rows")
     return rows
 
 
@@ -50,45 +46,49 @@ def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
 
 def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     """Return the solution of linear equations: elimination with the pivots that LAPACK takes."""
-    right = traced(graph, b)
+    right, rows = traced(graph, b), _square(graph, matrix)
+    if len(rows) > _SMALL:
+        return _solved_as_one(graph, rows, right)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
-    rows = [[*row, *more] for row, more in zip(_square(graph, matrix), columns, strict=True)]
-    if _has_long_rows(rows):
-        return _solved_by_rows(graph, rows, right.ndim)
+    rows = [[*row, *more] for row, more in zip(rows, columns, strict=True)]
     triangular, pivots = eliminated(Facade(graph), rows)
     _guard(graph, pivots)
     x = substituted(triangular)
     return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
 
 
-def _has_long_rows(rows: _Rows) -> bool:
-    """Whether rows are computed as arrays: zeros, which save work, are not seen then."""
-    n = len(rows)
-    zeros = sum(is_zero(v) for row in rows for v in row[:n])
-    return n > _SPARSE if 2 * zeros > n * n else n * n * len(rows[0]) > _MOST
+def _factors(graph: Graph, rows: _Rows) -> Expr:
+    """Return the factors of a matrix; NumPy raises an error where there are none."""
+    entries = [(graph.number(v.only), 1) for row in rows for v in row]
+    return factors(graph, entries, len(rows))
 
 
-def _solved_by_rows(graph: Graph, rows: _Rows, ndim: int) -> Tracer:
-    """Return the solution by the same elimination of whole rows: n^2 expressions, not n^3."""
-    np_, n = Facade(graph), len(rows)
-    long = [traced(graph, row).as_long() for row in rows]
-    for i in range(n):
-        for k in range(i + 1, n):
-            larger = np_.abs(long[k][i]) > np_.abs(long[i][i])
-            long[i], long[k] = (
-                np_.where(larger, long[k], long[i]),
-                np_.where(larger, long[i], long[k]),
-            )
-        for k in range(i + 1, n):
-            long[k] = long[k] - (long[k][i] / long[i][i]) * long[i]
-    _guard(graph, [long[i][i] for i in range(n)])
-    x: list[Any] = [None] * n
-    for i in reversed(range(n)):
-        rest = long[i][n:]
-        for j in range(i + 1, n):
-            rest = rest - long[i][j] * x[j]
-        x[i] = rest / long[i][i]
-    return traced(graph, [v[0] for v in x] if ndim == 1 else [list(v) for v in x])
+def _solved_as_one(graph: Graph, rows: _Rows, right: Tracer) -> Tracer:
+    """Return the solution as one operation."""
+    if not right.ndim or len(right) != len(rows) or right.ndim > 2:
+        raise Untraceable("right-hand sides that do not fit to their matrix")
+    lu = _factors(graph, rows)
+    graph.guards.append(regular(graph, lu))
+    columns = 1 if right.ndim == 1 else right.shape[1]
+    pieces = [p for row in (right if right.ndim == 2 else [right]) for p in row.pieces()]
+    whole = solution(graph, lu, len(rows), pieces)
+    starts = range(0, len(rows) * columns, columns)
+    if right.ndim == 1:
+        items = Tracer(graph, as_array(whole), 0, len(rows))
+        return items if len(rows) > SMALL else items.short()
+    lines = [Tracer(graph, as_array(graph.part(whole, k, 1, columns)), 0, columns) for k in starts]
+    return traced(graph, lines if columns > SMALL else [line.short() for line in lines])
+
+
+def entries_written_out(graph: Graph, rows: _Rows, op: str) -> list[Any]:
+    """Return what an operation computes of a matrix, with its right-hand sides in the rows."""
+    if op == "lu_det":
+        return [_determinant(graph, rows)]
+    triangular, pivots = eliminated(Facade(graph), [list(row) for row in rows])
+    if op == "lu_regular":
+        singular = _any_is_zero(Facade(graph), pivots)
+        return [Facade(graph).where(singular, 0.0, 1.0)]
+    return [v for row in substituted(triangular) for v in row]
 
 
 def of_triangle(
@@ -165,6 +165,12 @@ def inv(graph: Graph, a: Any) -> Tracer:
 def det(graph: Graph, a: Any) -> Any:
     """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
     rows = _square(graph, a)
+    if len(rows) > _SMALL:
+        return scalar(graph, determinant(graph, _factors(graph, rows)))
+    return _determinant(graph, rows)
+
+
+def _determinant(graph: Graph, rows: _Rows) -> Any:
     np_ = Facade(graph)
     _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
     product: Any = 1.0

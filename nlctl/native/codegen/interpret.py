@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...expressions.graph import Expr, numpy_function
+from ...expressions.graph import LINEAR, Expr, numpy_function
+from ...expressions.linear_systems import values as of_linear_system
 from .plan import CALLS, Function, FunctionPlan, LoopOfLevel
 
 _Opaque = Callable[[np.ndarray, int, int], None]  # of c, a row of it, and the member
@@ -57,12 +58,21 @@ class _Run:
     def _number(self, node: Expr) -> None:
         if node.op in CALLS and node not in self.plan.known:
             _, row = self.plan.stored[node]
+            if node.op in LINEAR:
+                self._linear(node, row)
+                return
             for lane in range(self.lanes):
                 self.calls[node.data[0]](self.memory["c"], row, lane)
             return
         where = self.plan.place(node)
         self.values[node] = self._operation(node) if where is None else self._row(*where)
         self._store(node)
+
+    def _linear(self, node: Expr, row: int) -> None:
+        end = row + sum(node.data[1])
+        self._check("c", row, end + (node.size or 1) - 1)
+        c = self.memory["c"]
+        c[end : end + (node.size or 1)] = of_linear_system(node, c[row:end])
 
     def _store(self, node: Expr) -> None:
         for array, row in self.plan.places.get(node, ()):

@@ -12,12 +12,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ...expressions.graph import Expr, needed
+from ...expressions.graph import LINEAR, OF_FACTORS, Expr, needed
 
 _Loop = tuple[int, int]  # level and length
-CALLS = ("call", "solve")  # their arguments lie in memory, in front of their results
+CALLS = ("call", "solve", *LINEAR)  # their arguments lie in memory, in front of their results
 STORED = ("concat", *CALLS)  # vectors that are made in memory
-READ = (*STORED, "leaf", "table", "item", "slice")  # what a loop reads and does not compute
+ITEMS = ("item", *OF_FACTORS)  # numbers that are read from a vector
+READ = (*STORED, "leaf", "table", *ITEMS, "slice")  # what a loop reads and does not compute
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +85,7 @@ class FunctionPlan:
             return self.known[node]
         if node.op == "leaf":
             return node.data[0], node.data[1]
-        if node.op == "item":
+        if node.op in ITEMS:
             array, row, _ = self.elements(node.args[0])
             return array, row + node.data
         return None
@@ -93,7 +94,8 @@ class FunctionPlan:
         """Return where the elements of a vector in memory are: array, first row, distance."""
         if vector in self.stored:
             array, row = self.stored[vector]
-            return array, row + (sum(vector.data[1]) if vector.op in CALLS else 0), 1
+            called = vector.op in CALLS and vector not in self.known
+            return array, row + (sum(vector.data[1]) if called else 0), 1
         if vector.op == "slice":
             array, row, step = self.elements(vector.args[0])
             return array, row + step * vector.data[0], step * vector.data[1]
@@ -146,7 +148,7 @@ def plan_function(
     stored = dict(known)
     places = {s.expr: s.row for s in stores if s.array == "c"}  # it is to lie there anyway
     for node in _in_memory(nodes, known):
-        if node in places:
+        if node in places and node.op not in CALLS:
             stored[node] = ("c", places[node])
         else:
             stored[node], rows = ("c", rows), rows + _rows(node)
@@ -194,7 +196,7 @@ def _in_memory(nodes: Sequence[Expr], known: Collection[Expr]) -> list[Expr]:
         if node.op in CALLS:
             vectors[node] = None
         for arg in node.args:
-            apart = node.op in ("item", "slice") or (arg.op in STORED and node.op not in STORED)
+            apart = node.op in (*ITEMS, "slice") or (arg.op in STORED and node.op not in STORED)
             if apart and arg.size and arg not in known:
                 vectors[arg] = None
     return list(vectors)
@@ -208,7 +210,7 @@ def _levels(nodes: Sequence[Expr], known: Collection[Expr]) -> dict[Expr, int]:
         for arg in node.args if node not in known else ():
             ready = arg in known or arg.op in CALLS or arg.size is None
             copied = node.op in CALLS and arg.size is not None
-            waits = copied or (node.op in ("item", "slice") and not ready)
+            waits = copied or (node.op in (*ITEMS, "slice") and not ready)
             joined = arg.op == "concat" and node.op not in STORED and not waits
             later = (node.op == "sum") + waits + joined
             level[node] = max(level[node], level[arg] + later)
@@ -227,7 +229,7 @@ def _written(
         if node not in known and node.op not in CALLS:
             inner += split(Store(array=array, row=row, expr=node, size=node.size or 1), known)
     for node in nodes:
-        if node.op in CALLS and node in stored:
+        if node.op in CALLS and node in stored and node not in known:
             row = stored[node][1]
             for arg, size in zip(node.args, node.data[1], strict=True):
                 inner += split(Store(array="c", row=row, expr=arg, size=size), known)

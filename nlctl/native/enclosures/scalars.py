@@ -14,7 +14,18 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
 
-from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, Untraceable, needed
+from ...expressions.arrays import scalar
+from ...expressions.graph import (
+    COMPARISONS,
+    LINEAR,
+    LOGIC,
+    OF_FACTORS,
+    Expr,
+    Graph,
+    Untraceable,
+    needed,
+)
+from ...expressions.library.linear_algebra import entries_written_out
 
 _EXACT = (*COMPARISONS, *LOGIC, "select", "neg", "absolute", "minimum", "maximum", "floor", "ceil",
           "trunc", "rint", "sign", "copysign", "heaviside")  # fmt: skip
@@ -85,9 +96,29 @@ def _elements(graph: Graph, node: Expr, elements: Mapping[Expr, list[Expr]]) -> 
         return [part[i if len(part) > 1 else 0] for part, n in widths for i in range(n)]
     if node.op == "sum":
         return [reduce(lambda a, b: graph.op("add", a, b), parts[0])]
+    if node.op in (*LINEAR, *OF_FACTORS):
+        return _of_linear_system(graph, node, parts)
     return [
         _of_numbers(graph, node, [p[i if len(p) > 1 else 0] for p in parts]) for i in range(size)
     ]
+
+
+def _of_linear_system(graph: Graph, node: Expr, parts: Sequence[list[Expr]]) -> list[Expr]:
+    """Return what is computed of a matrix, written out; its entries stand for its factors."""
+    later = node.data[1][1:] if node.op in LINEAR else ()
+    lengths = node.data[1] if node.op == "lu" else (len(parts[0]), *later)
+    given = [p[i if len(p) > 1 else 0] for p, n in zip(parts, lengths, strict=True)
+             for i in range(n)]  # fmt: skip
+    if node.op == "lu":
+        return given
+    n = node.args[0].data[0]
+    entries = [scalar(graph, graph.number(e)) for e in given]
+    rows = [entries[i * n : (i + 1) * n] for i in range(n)]
+    if node.op == "lu_solve":
+        m = node.data[0][1]
+        right = [entries[n * n + i * m : n * n + (i + 1) * m] for i in range(n)]
+        rows = [[*row, *more] for row, more in zip(rows, right, strict=True)]
+    return [graph.number(v.only) for v in entries_written_out(graph, rows, node.op)]
 
 
 def _of_numbers(graph: Graph, node: Expr, args: list[Expr]) -> Expr:

@@ -96,7 +96,7 @@ def _routine(lowered: Lowered, name: str, loaded: Loaded, native: Native) -> Rou
     opaque = [
         Opaque(call=lowered.calls[node.data[0]], row=row, native=native)
         for node, (_, row) in function.plan.stored.items()
-        if node.op == "call"
+        if node.op == "call" and node not in function.plan.known
     ]
     return Routine(
         address=loaded.addresses[name],

@@ -88,7 +88,8 @@ def _plain(given: Any) -> Any:
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none
 _EXACT = {"leaf", "item", "slice", "concat", "select", "neg", "absolute", "sign", "copysign",
-          "minimum", "maximum", "floor", "ceil", "trunc", "rint", *COMPARISONS, *LOGIC}  # fmt: skip
+          "minimum", "maximum", "floor", "ceil", "trunc", "rint", "lu", "lu_regular",
+          *COMPARISONS, *LOGIC}  # fmt: skip
 Functions = Mapping[str, Callable[[np.ndarray], np.ndarray]]
 
 
@@ -139,7 +140,9 @@ class _Reader:
         values: dict[Expr, np.ndarray] = {}
         with np.errstate(all="ignore"):
             for node in needed(results):
-                parts = [self.rounded(arg, values[arg]) for arg in node.args]
+                # of a matrix every entry: its elimination is that of one nearby
+                nudge = self.nudged if node.op == "lu" else self.rounded
+                parts = [nudge(arg, values[arg]) for arg in node.args]
                 values[node] = value_of(node, parts, self.arrays, self.functions)
                 if node.op == "sum":  # relative to its terms: their order is not said
                     scale = np.broadcast_to(np.abs(parts[0]).sum(axis=0), (ROUNDINGS,))
@@ -151,6 +154,10 @@ class _Reader:
         is_whole = node.op in ("const", "table") and np.all(value == np.trunc(value))
         if node.op in _EXACT or node.kind != "f" or is_whole:
             return value
+        return self.nudged(node, value)
+
+    def nudged(self, node: Expr, value: np.ndarray) -> np.ndarray:
+        """Return a value with other last digits behind its first column, whatever it is."""
         return value * (1.0 + self.ways(node.size))
 
     def ways(self, size: int | None) -> np.ndarray:

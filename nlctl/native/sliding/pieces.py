@@ -43,6 +43,7 @@ def affine(expr: Expr, leaf: Expr) -> bool:
             node.op in _LINEAR
             or (node.op == "mul" and sum(by) == 1)
             or (node.op == "div" and not by[1])
+            or (node.op == "lu_solve" and not by[0])
             or (node.op == "select" and not by[0])
         )
         if not linear:

@@ -22,13 +22,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 from ...expressions.arrays import scalar
 from ...expressions.conditions import at_integers, switching_function
 from ...expressions.derivatives import linear, partials
 from ...expressions.functions import FUNCTIONS
-from ...expressions.graph import COMPARISONS, LOGIC, Expr, Graph, needed
+from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, needed
+from ...expressions.linear_systems import solution
 from ...expressions.stage import Stage
+from ...wording import counted
 from ..codegen.plan import Store
 
 ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = (
@@ -226,7 +229,13 @@ class _Reader:
                 return None
             zero = self.graph.const(0.0)
             return self.graph.op("select", side, *(p or zero for p in parts))
+        if node.op in OF_FACTORS:
+            return self._of_factors(node)
         terms = [self.term(a) for a in node.args]
+        if node.op == "lu":
+            return linear(self.graph, node, terms) if any(terms) else None
+        if node.op == "lu_solve":
+            return self._solution(node, terms[0], terms[1:])
         if node.op in ("mul", "div") and all(a.varies for a in node.args[node.op == "div" :]):
             return self._product(node, *terms) if node.op == "mul" else self._quotient(node, *terms)
         return self._linear(node, terms)
@@ -271,6 +280,32 @@ class _Reader:
             numerator = graph.op("sub", a, inner) if a else graph.op("neg", inner)
         reciprocal = self.value(graph.op("div", graph.const(1.0), under))
         return graph.op("mul", numerator, reciprocal) if numerator else None
+
+    def _of_factors(self, node: Expr) -> None:
+        """Refuse a determinant; whether a matrix is regular does not change within a step."""
+        if node.op == "lu_det" and node.varies:
+            rows = counted(node.args[0].data[0], "row")
+            raise NoSeriesError(f"no Taylor coefficients of the determinant of {rows} are known")
+
+    def _solution(
+        self, node: Expr, matrix: Expr | None, right: Sequence[Expr | None]
+    ) -> Expr | None:
+        """A_0 X_k = B_k - sum_{j=1}^{k} A_j X_{k-j}, with the factors of A_0."""
+        graph, lu = self.graph, self.value(node.args[0])
+        zero, (n, m), sizes = graph.const(0.0), node.data[0], node.data[1][1:]
+        given = [(term or zero, size) for term, size in zip(right, sizes, strict=True)]
+        if matrix is None:
+            return solution(graph, lu, n, given) if any(right) else None
+        change, before = graph.joined(given), self.value(node)
+        rows = []
+        for i, j in product(range(n), range(m)):
+            left = graph.part(matrix, i * n, 1, n)
+            column = graph.part(node, j, m, n)
+            inner = graph.op("add", self._sum(left, ("node", column)),
+                             graph.op("mul", left, graph.part(before, j, m, n)))  # fmt: skip
+            moved = graph.sum(inner, n)
+            rows.append((graph.op("sub", graph.item(change, i * m + j), moved), 1))
+        return solution(graph, lu, n, rows)
 
     def _function(self, node: Expr) -> Expr | None:
         """Return the coefficient of a function of the table, as its row says."""

@@ -21,6 +21,7 @@ _COMPARED = {
 }  # fmt: skip
 _LOGIC = {"and": "&&", "or": "||", "xor": "!="}
 _BITS = {"and": "&", "or": "|", "xor": "^", "add": "+", "shl": "<<"}
+_COUNTED = {"add": "+", "sub": "-", "mul": "*"}
 _NAME = re.compile(r"\b[ve]\d+\b")
 SUPPORT = """\
 static uint64_t nlctl_bits(double x) { uint64_t y; memcpy(&y, &x, sizeof y); return y; }
@@ -197,6 +198,44 @@ class CBody:
         self.write(f"double {second.text};")
         return self.new(f"{full}({', '.join([*passed, f'&{second.text}'])})"), second
 
+    def routine(
+        self, name: str, make: Callable[..., None], where: str, sizes: Sequence[int], step: int
+    ) -> None:
+        """Call a function of numbers in memory."""
+        full = f"nlctl_{name}"
+        names = [f"n{i}" for i in range(len(sizes))]
+        if full not in self.module.functions:
+            inner = CBody(self.module)
+            make(inner, step, *(Value(n, 0, "i") for n in names))
+            taken = ", ".join(["double *a", *(f"uint64_t {n}" for n in names)])
+            self.module.functions[full] = f"static void {full}({taken})\n{{\n{inner.text()}}}\n"
+        self.write(f"{full}({', '.join([f'&{where}', *map(str, sizes)])});")
+
+    def counted(self, start: Value, end: Value, turn: Callable[[Value], None]) -> None:
+        self._count += 1
+        k = f"k{self._count}"
+        self.write(f"for (uint64_t {k} = {start.text}; {k} < {end.text}; ++{k}) {{")
+        self._inside(lambda: turn(Value(k, 0, "i")))
+
+    def when(self, condition: Value, then: Callable[[], None]) -> None:
+        self.write(f"if ({condition.text}) {{")
+        self._inside(then)
+
+    def _inside(self, part: Callable[[], None]) -> None:
+        self.indent += "  "
+        part()
+        self.indent = self.indent[:-2]
+        self.write("}")
+
+    def index(self, name: str, a: Value, b: Value) -> Value:
+        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", "i")
+
+    def as_number(self, index: Value) -> Value:
+        return self.new(f"(double){index.text}")
+
+    def as_index(self, number: Value) -> Value:
+        return self.new(f"(uint64_t){number.text}", "i")
+
     def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
         far = self.compare("ogt", self.intrinsic("fabs", x), limit)
         return tuple(
@@ -219,7 +258,7 @@ class CBody:
             self.lines[-1] += f" /* {self.labels[where]} */"
         return value
 
-    def store(self, value: Value, where: str) -> None:
+    def store(self, value: Value, where: str, *, alone: bool = False) -> None:
         self.write(f"{where} = {value.text};")
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from ....expressions.graph import COMPARISONS, LOGIC, Expr
+from ....expressions.graph import COMPARISONS, LINEAR, LOGIC, Expr
 from ..plan import CALLS, FunctionPlan
 from .functions import CALLED, applied, sin_cos
+from .linear_systems import ROUTINES
 from .text import Body, Value
 
 _COMPARE = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+_MERGED = 32  # numbers that are written to memory
 PACKED = 4  # numbers of one member whose sines, powers, ... are computed together
 
 
@@ -23,6 +25,8 @@ class Writer:
         self.b, self.plan, self.lanes, self.exact = b, plan, lanes, exact
         self.width = 0 if lanes == 1 else lanes
         self.names: dict[Expr, Value] = {}
+        # to merge neighbours takes the compiler a time that grows with the square of their number
+        self.alone = sum(s.array == "c" and s.size == 1 for s in plan.stores) > _MERGED
         # sines and cosines of those that have been computed, by the angle's name
         self.pairs: dict[str, dict[str, Value]] = {}
         kinds = Counter(
@@ -50,16 +54,28 @@ class Writer:
         """Write a number where it is to lie."""
         for array, row in self.plan.places.get(node, ()):
             value = self.b.wide(self.names[node], self.width) if self.width else self.names[node]
-            self.b.store(value, self.b.address(array, row * self.lanes))
+            alone = array == "c" and self.alone
+            self.b.store(value, self.b.address(array, row * self.lanes), alone=alone)
 
     def _call(self, node: Expr) -> None:
         """Call a function member by member; arguments and results are in memory."""
+        if node.op in LINEAR:
+            self._linear(node)
+            return
         name, _ = node.data
         if node.op == "call":
             self.b.module.declared[f"declare void @{name}(ptr, i64, i64)"] = None
         _, row = self.plan.stored[node]
         for lane in range(self.lanes):
             self.b.write(f"call void @{name}(ptr %c, i64 {row}, i64 {lane})")
+
+    def _linear(self, node: Expr) -> None:
+        """Compute factors or a solution in memory, member by member."""
+        (_, row), sizes = self.plan.stored[node], node.data[0]
+        given = (sizes,) if isinstance(sizes, int) else sizes
+        for lane in range(self.lanes):
+            where = self.b.address("c", row * self.lanes + lane)
+            self.b.routine(node.op, ROUTINES[node.op], where, given, self.lanes)
 
     def operation(self, node: Expr) -> Value:
         """Return an operation on what has names already."""

@@ -291,6 +291,22 @@ class Body:
             f"define internal {kind} {full}({taken}) {how} nounwind {{\nentry:\n{inner.text()}}}\n"
         )
 
+    def routine(
+        self, name: str, make: Callable[..., None], where: str, sizes: Sequence[int], step: int
+    ) -> None:
+        """Call a function of numbers in memory, each so many behind the one before."""
+        full = f"@nlctl.{name}.{step}{'.portable' if self.portable else ''}"
+        names = [f"i64 %n{i}" for i in range(len(sizes))]
+        if full not in self.module.functions:
+            inner = Body(self.module, self.portable)
+            make(inner, step, *(Value(f"%n{i}", 0, "i") for i in range(len(sizes))))
+            self.module.functions[full] = (
+                f"define internal void {full}({', '.join(['ptr %a', *names])}) noinline nounwind "
+                f"{{\nentry:\n{inner.text()}  ret void\n}}\n"
+            )
+        given = [f"ptr {where}", *(f"i64 {n}" for n in sizes)]
+        self.write(f"call void {full}({', '.join(given)})")
+
     def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
         """Return values, but those of the C library where |x| is larger than a limit, as seldom."""
         far = self.any(self.compare("ogt", self.intrinsic("fabs", x), limit))
@@ -336,9 +352,9 @@ class Body:
         """Return the number, or as many as a vector has, at an address."""
         return self.new(f"load {llvm_type(width)}, ptr {where}, align 8", width)
 
-    def store(self, value: Value, where: str) -> None:
-        """Write a number or vector to an address."""
-        self.write(f"store {value}, ptr {where}, align 8")
+    def store(self, value: Value, where: str, *, alone: bool = False) -> None:
+        """Write a number or vector to an address; alone it is not merged with its neighbours."""
+        self.write(f"store {'volatile ' if alone else ''}{value}, ptr {where}, align 8")
 
     # -- control
 
@@ -351,3 +367,39 @@ class Body:
         """Begin a block."""
         self.lines.append(f"{block}:")
         self.block = block
+
+    def counted(self, start: Value, end: Value, turn: Callable[[Value], None]) -> None:
+        """Repeat what is written for each integer from `start` to before `end`."""
+        before, head, inside, after = self.block, *map(self.label, ("count", "turn", "counted"))
+        self.write(f"br label %{head}")
+        self.begin(head)
+        index, first = Value(f"%i.{head}", 0, "i"), len(self.lines)
+        self.lines.append("")
+        more = self.new(f"icmp slt {index}, {end.text}", 0, "b")
+        self.write(f"br {more}, label %{inside}, label %{after}")
+        self.begin(inside)
+        turn(index)
+        following = self.new(f"add {index}, 1", 0, "i")
+        ways = f"[{start.text}, %{before}], [{following.text}, %{self.block}]"
+        self.lines[first] = f"{index.text} = phi i64 {ways}"
+        self.write(f"br label %{head}")
+        self.begin(after)
+
+    def when(self, condition: Value, then: Callable[[], None]) -> None:
+        """Do what is written only where a condition holds."""
+        inside, after = map(self.label, ("then", "end"))
+        self.write(f"br {condition}, label %{inside}, label %{after}")
+        self.begin(inside)
+        then()
+        self.write(f"br label %{after}")
+        self.begin(after)
+
+    def index(self, name: str, a: Value, b: Value) -> Value:
+        """Return ``add``, ``sub`` or ``mul`` of two integers."""
+        return self.new(f"{name} {a}, {b.text}", 0, "i")
+
+    def as_number(self, index: Value) -> Value:
+        return self.new(f"uitofp {index} to double")
+
+    def as_index(self, number: Value) -> Value:
+        return self.new(f"fptoui {number} to i64", 0, "i")
