@@ -83,7 +83,6 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["arrays", "operators", "masked", "indexing"],
         [
             "conditions",
-            "continuity",
             "dependence",
             "evaluate",
             "latex",
