@@ -34,10 +34,9 @@ from .pages.live import live_item, live_numbers, live_program
 from .pages.proof import certificate_section, ledger_section, ledger_text
 from .pages.run import outputs_of_run, run_section
 from .pages.study.claims import claims as study_claims
-from .pages.study.histories import Histories
+from .pages.study.histories import Histories, loop_again, rows_again
 from .pages.study.methods import limits as study_limits
 from .pages.study.methods import methods
-from .pages.study.redrawn import loop_again, rows_again
 from .pages.study.report import numbers, study_sections
 from .report.document import Claim, Figure, Live, Paragraph, Report, Section, versions
 from .response_of_loop import check_response, own_parameters

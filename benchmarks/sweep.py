@@ -25,7 +25,7 @@ import numpy as np
 from rich.console import Console
 
 import nlctl
-from nlctl.analysis.cli.sweep_progress import sweep_bar
+from nlctl.analysis.cli.progress import sweep_bar
 from nlctl.analysis.robustness import (
     Design,
     Experiment,

@@ -16,7 +16,7 @@ import pandas as pd
 from page_tables import markdown_table
 
 from nlctl import paper
-from nlctl.analysis.paper.rival_record import (
+from nlctl.analysis.paper.rivals import (
     KEY,
     RIVAL_ACTUATORS,
     RIVALS_RECORD,

@@ -20,6 +20,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeVar, dataclass_transform, get_args, get_origin, overload
 
 _T = TypeVar("_T", bound=type)
+_F = TypeVar("_F", bound=Callable[..., Any])
+_PARAMETERS = "Parameters\n----------\n"
 _MODULES = {"np": "", "pd": "pandas.", "ct": "control.", "Any": "object"}
 _SHAPE = re.compile(r"(\([\w, ()+.*-]*\))(?:: |$)(.*)", re.DOTALL)
 _SECTION = re.compile(r"^\w+\n-+$", re.M)
@@ -57,6 +59,31 @@ def with_returned(function: Any) -> str | None:
     return _with_section(
         inspect.cleandoc(text), f"Returns\n-------\n{name}\n    {summary}", after_parameters=True
     )
+
+
+def with_parameters_of(other: Any) -> Callable[[_F], _F]:
+    """Return a decorator: parameters that a docstring does not describe are as another one has."""
+
+    def completed(function: _F) -> _F:
+        text, others = (inspect.cleandoc(one.__doc__ or "") for one in (function, other))
+        if text:
+            known = _parameters(others) | _parameters(text)
+            names = inspect.signature(function).parameters
+            entries = dict.fromkeys(known[name] for name in names if name in known)
+            head, _, rest = text.partition(_PARAMETERS)
+            behind = _SECTION.search(rest)
+            rest = f"\n\n{rest[behind.start() :]}" if behind else ""
+            function.__doc__ = head + _PARAMETERS + "\n".join(entries) + rest
+        return function
+
+    return completed
+
+
+def _parameters(text: str) -> dict[str, str]:
+    """Return the entries of a section Parameters, by the names that they describe."""
+    section = _SECTION.split(text.partition(_PARAMETERS)[2])[0].strip()
+    entries = re.split(r"\n(?=\S)", section)
+    return {name.strip(" *"): e for e in entries for name in e.partition(" : ")[0].split(",")}
 
 
 class _Docstring:

@@ -368,7 +368,7 @@ def checked_times(timepts: Any) -> np.ndarray:
     times = times.copy()
     if times.ndim != 1 or times.size < 2:
         raise ParameterError(f"timepts needs at least two times, got shape {times.shape}")
-    if not np.all(np.isfinite(times)) or not np.all(np.diff(times) > 0):
+    if not np.isfinite(times[[0, -1]]).all() or not (times[1:] > times[:-1]).all():
         raise ParameterError("timepts needs finite times in increasing order")
     return times
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from nlctl.attributes import described_record
 from nlctl.errors import ParameterError, UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from nlctl.upstream.systems import System
 
 USUAL_STEP = 0.01  # s, between samples of a run where none is given
 _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
@@ -87,7 +93,7 @@ def sampled_times(until: float, step: float, loop: Any) -> Any:
     return np.linspace(0, until, round(until / step) + 1)
 
 
-def input_values(diagram: Any, texts: Sequence[str]) -> Any:
+def input_values(diagram: System, texts: Sequence[str]) -> np.ndarray:
     """Return the constant value of each input of a diagram; 0 where none is given."""
     import numpy as np
 
@@ -142,3 +148,43 @@ def number_of(name: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise ParameterError(f"{name} needs a number, got '{text}'") from None
+
+
+@described_record
+class Simulated:
+    """A loop, what was set of it, and its run."""
+
+    loop: Any
+    response: Any
+    params: Mapping[str, Any]  # Parameters and initial states that were set.
+    start: Mapping[str, float]  # Parameters and initial states that were set.
+
+
+def simulated(
+    name: str,
+    settings: Sequence[str],
+    inputs: Sequence[str],
+    until: float,
+    step: float,
+    engine: str = "auto",
+) -> Simulated:
+    """Make the loop of a name, and run it under a bar."""
+    from nlctl.response import input_output_response
+
+    from .progress import progress_bar
+
+    loop = named_loop(name)
+    times = sampled_times(until, step, loop)
+    params, start = assignments(loop, settings)
+    u = input_values(loop, inputs)[:, None] + 0 * times
+    with progress_bar(f"simulating {name}", until) as advance:
+        reached = [0.0]
+
+        def progress(t: float) -> None:
+            advance(t - reached[0])
+            reached[0] = t
+
+        response = input_output_response(
+            loop, times, u, start, params=params, engine=engine, progress=progress
+        )
+    return Simulated(loop=loop, response=response, params=params, start=start)

@@ -9,11 +9,19 @@ from typing import Annotated, Any
 import typer
 
 from .loops import USUAL_STEP
-from .memory import TOO_LITTLE, is_short_of_memory
-from .printing import error_line, error_text, say
-from .report import Input, Set, register_reports
-from .studies import FAILS, OPEN, register_studies
-from .tune import register_tuning
+from .printing import error_line, say
+from .report import Input, Set, compare_command, gallery, report
+from .studies import (
+    FAILS,
+    OPEN,
+    exit_codes,
+    replay_command,
+    run_command,
+    schema,
+    validate,
+    verify_command,
+)
+from .tune import tune_command
 
 UNPROVED = {"violated": FAILS, "undecided": OPEN}  # exit code by the answer of a ledger
 
@@ -69,7 +77,7 @@ def simulate(
 
     A table of its signals is printed: peaks, root mean squares, and last values.
     """
-    from .simulation import simulated
+    from .loops import simulated
     from .terminal import check_figure, check_file, show_metrics, write_figure
 
     if plot is not None:
@@ -288,9 +296,12 @@ def _write_csv(path: Path, times, signals) -> None:
     replace_file(path, lambda file: table.to_csv(file, index=False))
 
 
-register_reports(app)
-register_studies(app)
-register_tuning(app)
+for name, command in {
+    "report": report, "compare": compare_command, "gallery": gallery, "run": run_command,
+    "validate": validate, "replay": replay_command, "verify": verify_command, "schema": schema,
+    "tune": tune_command,
+}.items():  # fmt: skip
+    app.command(name)(command)
 
 
 def _say_warnings() -> None:
@@ -311,22 +322,9 @@ def _say_warnings() -> None:
 def main() -> None:
     """Run the command line; what the user can put right ends in one sentence and exit code 2."""
     # An error in a function of the user's, or an internal one, ends with its trace and exit code 3.
-    from nlctl.errors import DivergedError, UsageError
-
     _say_warnings()
     try:
-        app()
-    except (UsageError, DivergedError, OSError) as error:
-        error_line(f"nlctl: {error_text(error)}")
-        raise SystemExit(2) from None
-    except KeyboardInterrupt:
-        error_line("nlctl: interrupted")
-        raise SystemExit(130) from None
-    except Exception as error:
-        if is_short_of_memory(error):
-            error_line(f"nlctl: {TOO_LITTLE} ({error or type(error).__name__})")
-            raise SystemExit(2) from None
-        from .terminal import trace_of
-
-        error_line(trace_of(error))
-        raise SystemExit(3) from None
+        with exit_codes(json=False):
+            app()
+    except typer.Exit as ended:
+        raise SystemExit(ended.exit_code) from None

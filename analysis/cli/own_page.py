@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .loops import USUAL_STEP
-from .simulation import simulated
+from .loops import USUAL_STEP, simulated
 
 if TYPE_CHECKING:
     from ..report.document import Report
@@ -57,7 +56,7 @@ def compose_page(
         proof_of,
     )
     from ..loop_report import loop_report
-    from .terminal import progress_bar
+    from .progress import progress_bar
 
     with progress_bar("checking the loop", 2) as advance:
         checks = checks_of(run.loop, run.response, run.params)

@@ -15,7 +15,6 @@ import typer
 from nlctl.wording import counted
 
 from ..papers import paper_key
-from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, check_memory
 from .own_page import (
     HORIZON_OF_PAGE,
@@ -31,11 +30,14 @@ from .studies import (
     INCOMPLETE,
     INTERRUPTED,
     Json,
+    Junit,
     Trust,
+    check_junit,
     check_run_path,
     check_study_path,
     exit_codes,
     run_folder,
+    write_claims,
 )
 from .study_report import Stamp, stamped
 
@@ -62,13 +64,6 @@ Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser."
 Force = Annotated[
     bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
 ]
-
-
-def register_reports(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.command("report")(report)
-    app.command("compare")(compare_command)
-    app.command("gallery")(gallery)
 
 
 def report(
@@ -224,8 +219,8 @@ def _paper(
         check_report_options(out, pdf=pdf, force=force)
         from ..papers import named_paper
         from ..report.render import write_report
+        from .progress import progress_bar
         from .study_report import notify
-        from .terminal import progress_bar
 
         reproduction = named_paper(name)
         if live:
@@ -287,8 +282,8 @@ def _study(
 ) -> WrittenPage:
     """Report a study."""
     from ..pages.study.claims import claims
+    from .progress import sweep_bar
     from .study_report import report_study
-    from .sweep_progress import sweep_bar
 
     check_memory(TO_BEGIN)
     if study.suffix == ".toml":
@@ -386,7 +381,7 @@ def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
 def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
     """Print where the page is; print it to PDF and show it, as wanted."""
     from ..report.browser import open_page, write_pdf
-    from ..studies.intact.page import recorded_print
+    from ..studies.intact.contents import recorded_print
 
     say(page)
     if pdf:
@@ -435,7 +430,7 @@ def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) ->
 def _check_run(path: Path) -> None:
     """Refuse a run, or its page, of which something was lost or edited."""
     from ..studies import load_result
-    from ..studies.intact.page import check_page, is_run
+    from ..studies.intact.contents import check_page, is_run
 
     folder = path if path.is_dir() else path.parent
     has_page = (folder / "report.json").exists()
@@ -463,10 +458,10 @@ def _no_report(path: Path) -> UsageError:
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is."""
-    from ..pages.trend import trend_figure
+    from ..pages.compared import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
-    from ..studies.intact.page import check_page
+    from ..studies.intact.contents import check_page
     from .terminal import check_writable
 
     check_writable(folder)

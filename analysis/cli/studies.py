@@ -11,18 +11,21 @@ from __future__ import annotations
 import errno
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from nlctl.wording import counted
 
-from .claims_file import Junit, check_junit, write_claims
 from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
-from .printing import error_line, error_text, in_json, say
+from .printing import error_line, error_text, in_json, printable, say
+
+if TYPE_CHECKING:
+    from ..report.document import Claim
+    from ..studies.result import Result
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
 EXIT_CODES = {
@@ -50,15 +53,10 @@ Trust = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 Jobs = Annotated[int, typer.Option(min=0, help="Threads or processes; 0: one per core.")]
-
-
-def register_studies(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.command("run")(run_command)
-    app.command("validate")(validate)
-    app.command("replay")(replay_command)
-    app.command("verify")(verify_command)
-    app.command("schema")(schema)
+Junit = Annotated[
+    Path | None,
+    typer.Option(help="File to write: the claims as JUnit XML, a test case each."),
+]
 
 
 def run_command(
@@ -96,7 +94,7 @@ def run_command(
         check_memory(TO_BEGIN)
         from ..studies import read_study
         from ..studies import run as run_study
-        from .sweep_progress import sweep_bar
+        from .progress import sweep_bar
 
         check_memory()
         check_study_path(study)
@@ -113,7 +111,10 @@ def run_command(
                 watch=sweep_bar,
             )
         _show(result, json)
-        _write_study_claims(junit, result)
+        if junit is not None:
+            from ..pages.study.claims import claims
+
+            write_claims(junit, result.study.study.title, claims(result))
         if not result.complete:
             raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
         if result.answer in EXIT_CODES:
@@ -242,7 +243,7 @@ def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
     from nlctl.errors import UsageError
 
-    from ..studies.intact.page import is_run
+    from ..studies.intact.contents import is_run
 
     if study.is_dir():
         run = shlex.quote(str(study))
@@ -387,7 +388,7 @@ def _dask_client(address: str) -> Any:
         ) from None
 
 
-def _show(result: Any, json: bool) -> None:
+def _show(result: Result, json: bool) -> None:
     """Print the verdict, then every finding in its own words."""
     for note in result.notes:
         error_line(f"nlctl: {note}")
@@ -402,12 +403,24 @@ def _show(result: Any, json: bool) -> None:
     say(f"\n{result.folder}")
 
 
-def _write_study_claims(path: Path | None, result: Any) -> None:
-    """Write the claims of a study where that is wanted."""
+def check_junit(path: Path | None) -> None:
+    """Refuse, before anything is computed, a file of claims that could not be written."""
     if path is not None:
-        from ..pages.study.claims import claims
+        from .terminal import check_file
 
-        write_claims(path, result.study.study.title, claims(result))
+        check_file(path)
+
+
+def write_claims(path: Path | None, title: str, claims: Sequence[Claim]) -> None:
+    """Write claims as JUnit XML where that is wanted, and say on stderr where."""
+    if path is not None:
+        from nlctl.host.files import replace_file
+
+        from ..report.junit import junit
+
+        content = junit(title, claims)
+        replace_file(path, lambda file: file.write(content))
+        print(printable(path), file=sys.stderr)
 
 
 def _duration(seconds: float) -> str:

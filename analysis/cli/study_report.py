@@ -44,13 +44,13 @@ def report_study(
     live: bool | Sequence[str] = False,
 ) -> tuple[Path, Result]:
     """Write the report of a study."""
+    from ..pages.study.histories import loop_again, rows_again
     from ..pages.study.loop import loop_of
-    from ..pages.study.redrawn import loop_again, rows_again
     from ..pages.study.report import study_report
     from ..paper.page.text import PUBLISHED
     from ..report.render import write_report
     from ..studies import load_result
-    from ..studies.intact.page import recorded_page
+    from ..studies.intact.contents import recorded_page
 
     if live:
         from nlctl.export.web import check_linker
@@ -68,7 +68,7 @@ def report_study(
     runs = rows_again(result, prepared, threads)
     report = study_report(result, runs, command + live_words(live), loop, published)
     if live and prepared is not None:
-        from ..pages.study.live import with_study_live
+        from ..pages.study.loop import with_study_live
 
         report = with_study_live(report, result, prepared, runs, [] if live is True else live)
     report = stamped(report, stamp)

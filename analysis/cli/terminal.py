@@ -6,44 +6,22 @@ import os
 import sysconfig
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from nlctl.errors import ParameterError
 from nlctl.host.checkout import SOURCES
 from nlctl.host.files import replace_file
 
-from .progress_lines import progress_lines
-
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.figure import Figure
 
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
-
-
-@contextmanager
-def progress_bar(what: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Show a bar on stderr while the body runs; elsewhere a line now and then."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        done = [0.0]
-
-        def add(amount: float) -> None:
-            done[0] += amount
-
-        with progress_lines(what, lambda: f"{100 * done[0] / total:.0f} %"):
-            yield add
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda amount: bar.advance(task, amount)
 
 
 def check_writable(folder: Path) -> None:
@@ -79,7 +57,7 @@ def check_figure(path: Path) -> None:
     check_file(path)
 
 
-def write_figure(path: Path, figure: Any) -> None:
+def write_figure(path: Path, figure: Figure) -> None:
     """Write a matplotlib figure in one step, in the format that its name ends in."""
     replace_file(path, lambda file: figure.savefig(file, format=path.suffix[1:].lower()))
 

@@ -31,11 +31,6 @@ _EXAMPLE = """
   gains = { "law.beta" = [0.1, 50.0] }"""
 
 
-def register_tuning(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command("tune")(tune_command)
-
-
 def tune_command(
     study: Annotated[
         Path, typer.Argument(metavar="STUDY", help="A study file (.toml) that tunes gains.")
@@ -71,7 +66,7 @@ def _tuned(study: Path, out: Path | None, jobs: int, *, open_: bool, **how: Any)
     check_memory(TO_BEGIN)
     check_study_path(study)
     _check_asks(study)
-    from .sweep_progress import sweep_bar
+    from .progress import sweep_bar
 
     pdf = how.pop("pdf")
     check_report_options(out or run_folder(study), pdf=pdf, force=how["force"])

@@ -2,8 +2,6 @@
 
 from nlctl.plotting.bands import LIMIT, Limit, most_frequent, quantile
 
-from .faults import fault_margins, fault_pairs
-from .overlaid import overlaid
 from .proof import (
     bounds,
     burst,
@@ -15,8 +13,16 @@ from .proof import (
     windowed_maximum,
 )
 from .rankings import paired_differences, screening, set_apart, shares, tornado, violation_rates
-from .runs import CLIP, fans, margins_figure, running_estimate
-from .searches import degradation, deviations, failure_map_figure, radius_steps, search
+from .runs import CLIP, fans, margins_figure, overlaid, running_estimate
+from .searches import (
+    degradation,
+    deviations,
+    failure_map_figure,
+    fault_margins,
+    fault_pairs,
+    radius_steps,
+    search,
+)
 from .trend import trend
 from .tuning import bought, margins_of_both, tried
 

@@ -53,15 +53,6 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     y is not smooth, such as behind a saturation, and of fewer than four, the sample counts.  The
     error is of eighth order in the sampling interval for smooth y, of second order otherwise.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.  The limits there count as values.
-
     Returns
     -------
     float
@@ -95,15 +86,6 @@ def highest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Smallest value of y, see `highest`.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.  The limits there count as values.
-
     Returns
     -------
     float
@@ -124,15 +106,6 @@ def lowest(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Range of y, `highest` less `lowest`.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.  The limits there count as values.
-
     Returns
     -------
     float
@@ -152,15 +125,6 @@ def spread(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
 @of_samples
 def peak(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Largest magnitude max |y|, see `highest`.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -187,14 +151,8 @@ def ultimate_bound(
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
     share : float, optional
         Part of the time that counts as late, in (0, 1].
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.  The limits there count as values.
 
     Returns
     -------
@@ -216,13 +174,6 @@ def ultimate_bound(
 @of_samples
 def final(t: np.ndarray, y: np.ndarray):
     """Value at the last sample.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
 
     Returns
     -------

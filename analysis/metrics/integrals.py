@@ -20,11 +20,6 @@ __all__ = [
 def consecutive_differences(y: np.ndarray):
     """Return y_{i+1} - y_i, as `numpy.diff` does, which takes seconds to compile.
 
-    Parameters
-    ----------
-    y : ndarray, shape (n,)
-        Samples.
-
     Returns
     -------
     ndarray, shape (n - 1,)
@@ -47,13 +42,6 @@ def integral(t: np.ndarray, y: np.ndarray):
     Of an odd number of intervals the last takes the parabola through the last three samples, as
     in `scipy.integrate.simpson`.  Two samples are connected by a line.  Where neighbouring
     intervals differ by more than a factor of 2, weights may be negative.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing, n >= 2.
-    y : ndarray, shape (n,)
-        Samples.
 
     Returns
     -------
@@ -87,13 +75,6 @@ def integral(t: np.ndarray, y: np.ndarray):
 def rms(t: np.ndarray, y: np.ndarray):
     """Root mean square over time.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing, n >= 2.
-    y : ndarray, shape (n,)
-        Samples.
-
     Returns
     -------
     float
@@ -113,13 +94,6 @@ def rms(t: np.ndarray, y: np.ndarray):
 @of_samples
 def absolute_integral(t: np.ndarray, y: np.ndarray):
     """Integral of |y| (IAE of an error); of second order where y changes sign.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing, n >= 2.
-    y : ndarray, shape (n,)
-        Samples.
 
     Returns
     -------
@@ -141,13 +115,6 @@ def absolute_integral(t: np.ndarray, y: np.ndarray):
 def square_integral(t: np.ndarray, y: np.ndarray):
     """Integral of y^2: ISE of an error, energy of an input.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing, n >= 2.
-    y : ndarray, shape (n,)
-        Samples.
-
     Returns
     -------
     float
@@ -167,13 +134,6 @@ def square_integral(t: np.ndarray, y: np.ndarray):
 @of_samples
 def time_weighted_integral(t: np.ndarray, y: np.ndarray):
     """Integral of (t - t_0) |y| (ITAE of an error), time counted from the first sample t_0.
-
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing, n >= 2.
-    y : ndarray, shape (n,)
-        Samples.
 
     Returns
     -------

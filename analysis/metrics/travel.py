@@ -19,15 +19,6 @@ __all__ = ["reversals", "settling_time", "time_within", "total_variation"]
 def total_variation(t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None):
     """Sum of |y_{i+1} - y_i|, the way that y travels; between samples it is a lower bound.
 
-    Parameters
-    ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.
-
     Returns
     -------
     float
@@ -53,14 +44,8 @@ def settling_time(t: np.ndarray, y: np.ndarray, band: float, breaks: np.ndarray 
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
     band : float
         Largest |y| that counts as settled, in the unit of y.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -101,14 +86,8 @@ def time_within(
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
     lower, upper : float
         The interval, in the unit of y.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------
@@ -140,14 +119,8 @@ def reversals(t: np.ndarray, y: np.ndarray, above: float = 0.0, breaks: np.ndarr
 
     Parameters
     ----------
-    t : ndarray, shape (n,)
-        Sample times (s), increasing.
-    y : ndarray, shape (n,)
-        Samples.
     above : float, optional
         Swings up to this size (in the unit of y) do not count.
-    breaks : ndarray, shape (m,), optional
-        Increasing times (s) at which y may jump or bend.
 
     Returns
     -------

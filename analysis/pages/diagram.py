@@ -1,20 +1,21 @@
-"""A loop on a page: its diagram, its parameters, its equations."""
+"""A loop on a page: its diagram, its parameters, its equations as they were run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import control as ct
 import numpy as np
 
+from nlctl import native
 from nlctl.diagrams import parameters
 from nlctl.drawing.picture import draw
 from nlctl.errors import UsageError
 from nlctl.native import typeset
+from nlctl.upstream.systems import System
 
-from ..report.document import Figure, Item, Paragraph, Section, Table
-from ..report.equations import block_items
+from ..report.document import Equation, Figure, Item, Paragraph, Section, Table
 from ..studies.page.text import unit_text
 
 _LONGEST = 60  # characters of a value
@@ -104,3 +105,22 @@ def _value(value: Any) -> Any:
         return value
     text = str(value)
     return text if len(text) <= _LONGEST else f"{'×'.join(map(str, np.shape(value)))} numbers"
+
+
+def equations_of(diagram: System, blocks: Collection[str], number: str = "") -> list[Item]:
+    """Return the equations of some blocks of a diagram, with values in the places of parameters."""
+    return [
+        item
+        for block in native.typeset(diagram, values=True)
+        if block.block in blocks
+        for item in block_items(block, number)
+    ]
+
+
+def block_items(block: native.BlockEquations, number: str = "") -> Iterator[Item]:
+    """Yield a block's equations, and what their symbols stand for."""
+    for i, line in enumerate((*block.inputs, *block.equations)):
+        yield Equation(latex=line, number="" if i else number)
+    if block.where:
+        yield Paragraph(text="where")
+        yield from (Equation(latex=line) for line in block.where)

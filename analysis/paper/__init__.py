@@ -2,7 +2,6 @@
 
 from .cases import BOUND, CASES, HORIZON, METRICS, TAIL, Case
 from .controllers import compared_controllers
-from .numerics import numerics
 from .reproduction import (
     CaseRun,
     Check,
@@ -11,6 +10,7 @@ from .reproduction import (
     compile_cases_ahead,
     expectations,
     measured,
+    numerics,
     run_all,
     run_case,
     sample_times,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import partial
 from typing import Any
 
 from nlctl import actuators, paper
@@ -16,41 +17,27 @@ HORIZON = 20.0
 TAIL = HORIZON / 2
 BOUND = 0.15  # of |e₁| from TAIL on: a sixth of the reference; the paper names none
 
+_number = partial(Metric, unit="1")
 METRICS = (
-    Metric(
-        key="tail_max_e",
-        signal="e",
-        unit="1",
-        meaning="max |e₁| for t ≥ 10 s",
-        function=peak,
-        start=TAIL,
+    _number(
+        key="tail_max_e", signal="e", meaning="max |e₁| for t ≥ 10 s", function=peak, start=TAIL
     ),
-    Metric(
-        key="tail_rms_e",
-        signal="e",
-        unit="1",
-        meaning="RMS of e₁ for t ≥ 10 s",
-        function=rms,
-        start=TAIL,
+    _number(
+        key="tail_rms_e", signal="e", meaning="RMS of e₁ for t ≥ 10 s", function=rms, start=TAIL
     ),
-    Metric(key="rms_e", signal="e", unit="1", meaning="RMS of e₁", function=rms),
-    Metric(key="max_u", signal="u", unit="1", meaning="max |u|", function=peak),
-    Metric(key="zeta_min", signal="zeta", unit="1", meaning="min ζ", function=lowest),
-    Metric(key="zeta_max", signal="zeta", unit="1", meaning="max ζ", function=highest),
-    Metric(key="zeta_end", signal="zeta", unit="1", meaning="ζ(20 s)", function=final),
-    Metric(key="max_r", signal="r", unit="1", meaning="max |r|", function=peak),
-    Metric(
-        key="tail_max_r",
-        signal="r",
-        unit="1",
-        meaning="max |r| for t ≥ 10 s",
-        function=peak,
-        start=TAIL,
+    _number(key="rms_e", signal="e", meaning="RMS of e₁", function=rms),
+    _number(key="max_u", signal="u", meaning="max |u|", function=peak),
+    _number(key="zeta_min", signal="zeta", meaning="min ζ", function=lowest),
+    _number(key="zeta_max", signal="zeta", meaning="max ζ", function=highest),
+    _number(key="zeta_end", signal="zeta", meaning="ζ(20 s)", function=final),
+    _number(key="max_r", signal="r", meaning="max |r|", function=peak),
+    _number(
+        key="tail_max_r", signal="r", meaning="max |r| for t ≥ 10 s", function=peak, start=TAIL
     ),
-    Metric(key="max_delta_hat", signal="delta_hat", unit="1", meaning="max δ̂", function=highest),
-    Metric(key="max_W", signal="W_norm", unit="1", meaning="max ‖Ŵ‖", function=highest),
-    Metric(key="x1_end", signal="x1", unit="1", meaning="x₁(20 s)", function=final),
-    Metric(key="x2_end", signal="x2", unit="1", meaning="x₂(20 s)", function=final),
+    _number(key="max_delta_hat", signal="delta_hat", meaning="max δ̂", function=highest),
+    _number(key="max_W", signal="W_norm", meaning="max ‖Ŵ‖", function=highest),
+    _number(key="x1_end", signal="x1", meaning="x₁(20 s)", function=final),
+    _number(key="x2_end", signal="x2", meaning="x₂(20 s)", function=final),
 )
 
 

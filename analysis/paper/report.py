@@ -16,7 +16,7 @@ from typing import Any
 
 from nlctl import paper
 
-from ..pages.study.redrawn import loop_again, rows_again
+from ..pages.study.histories import loop_again, rows_again
 from ..pages.study.report import study_part
 from ..report.document import Section
 from ..report.svg import draw_ahead
@@ -28,13 +28,12 @@ from ..studies import load_result, read_study, run, shipped
 from ..studies.folder import remove_run
 from . import evidence as proofs
 from .cases import CASES, HORIZON
-from .numerics import numerics
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
-from .reproduction import CaseRun, checks, run_all
+from .reproduction import CaseRun, checks, numerics, run_all
 from .reproduction import compile_cases_ahead as compile_cases
-from .rival_record import checked_rivals
+from .rivals import checked_rivals
 from .sampling_limits import checked_record
 
 QUICK = ("example-1-quick", "example-2-quick")

@@ -8,9 +8,8 @@ import control as ct
 
 from nlctl.diagrams import leaves
 
-from ..pages.diagram import diagram_figure
+from ..pages.diagram import diagram_figure, equations_of
 from ..report.document import Figure, Item, Paragraph, Section, Table
-from ..report.equations import equations_of
 from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part
 
 

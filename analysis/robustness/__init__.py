@@ -9,10 +9,9 @@ from .runs.sweep import Sweep, load, sweep
 from .search.confirmation import Confirmation, confirm
 from .search.degradation import Degradation, degradation_curve
 from .search.failure_map import FailureMap, boundary, failure_map
-from .search.first_order import FirstOrder
+from .search.first_order import FirstOrder, first_order
 from .search.largest_scale import largest_scale
 from .search.radius import Radius, robustness_radius
-from .search.run_with_derivatives import first_order
 from .search.shrink import Shrunk, shrink
 from .search.worst_case import WorstCase, worst_case
 from .statistics.comparison import Comparison, compare, crossed

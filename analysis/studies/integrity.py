@@ -11,8 +11,14 @@ from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from .folder import read_through
-from .intact.contents import CONTENTS, is_part, problems_in, sealed_record
-from .intact.page import PAGE_FILES, page_problems
+from .intact.contents import (
+    CONTENTS,
+    PAGE_FILES,
+    is_part,
+    page_problems,
+    problems_in,
+    sealed_record,
+)
 
 
 @described_record(made_by="verify")

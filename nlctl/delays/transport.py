@@ -105,21 +105,7 @@ class TransportDelay:
         ParameterError
             If `varying` does not return a finite number.
         """
-        if self.varying is None:
-            return 0.0
-        try:
-            longer = float(self.varying(float(t)))
-        except Exception as error:
-            raise ParameterError(
-                f"TransportDelay needs a varying that is known at t = {t:g} s, but it raises "
-                f"{type(error).__name__}: {error}"
-            ) from error
-        if not np.isfinite(longer):
-            raise ParameterError(
-                f"TransportDelay needs a varying that returns a finite number, got {longer:g} at "
-                f"t = {t:g} s"
-            )
-        return longer
+        return 0.0 if self.varying is None else float(self._known("varying", t, 1)[0])
 
     def earlier(self, t: float) -> np.ndarray:
         """Return the signals at a time before the run.
@@ -142,19 +128,24 @@ class TransportDelay:
         count = len(self.inputs)
         if self.history is None:
             return np.full(count, self.before)
+        return np.broadcast_to(self._known("history", t, count), (count,)).astype(float)
+
+    def _known(self, name: str, t: float, count: int) -> np.ndarray:
+        """Return what a function of time of this record returns: a number, or one a signal."""
         try:
-            values = np.asarray(self.history(float(t)), dtype=float).reshape(-1)
+            values = np.asarray(getattr(self, name)(float(t)), dtype=float).reshape(-1)
         except Exception as error:
             raise ParameterError(
-                f"TransportDelay needs a history that is known at t = {t:g} s, but it raises "
+                f"TransportDelay needs a {name} that is known at t = {t:g} s, but it raises "
                 f"{type(error).__name__}: {error}"
             ) from error
         if values.size not in (1, count) or not np.all(np.isfinite(values)):
+            rule = "a finite number" if count == 1 else counted(count, "finite number")
             raise ParameterError(
-                f"TransportDelay needs a history that returns {counted(count, 'finite number')}, "
-                f"got {values.tolist()} at t = {t:g} s"
+                f"TransportDelay needs a {name} that returns {rule}, got "
+                f"{', '.join(map(str, values.tolist()))} at t = {t:g} s"
             )
-        return np.broadcast_to(values, (count,)).astype(float)
+        return values
 
     @staticmethod
     def output(t: float, x: Any, u: Any, p: Any) -> Any:

@@ -13,13 +13,12 @@ through time, each with its own steps.  `response` makes of one run what python-
 """
 
 from .ahead import compile_ahead
-from .compiled import Compiled, compile  # noqa: A004 (what it does)
+from .compiled import Compiled, compile, linearize  # noqa: A004 (what it does)
 from .ensemble import ensemble_response
 from .ensemble_result import Ensemble
 from .frequency import frequency_response
 from .integrate.methods.tableau import Tableau
 from .integrate.state import Status
-from .linearized import linearize
 from .operating_points import (
     OperatingPoint,
     find_operating_point,

@@ -8,7 +8,7 @@ import numpy as np
 from ..annotations import as_annotated
 from .along import derivatives
 from .compiled import Compiled
-from .discrete import compile_discrete
+from .discrete import discrete_loop
 from .machine.evaluations import ENSEMBLE_WIDTH, machine
 from .taylor.turns import series_ahead
 
@@ -44,4 +44,4 @@ def compile_for(compiled: Compiled, p: np.ndarray, width: int) -> None:
             series_ahead(compiled, p[:, :1])
     else:
         machine(compiled, p[:, :1], 1)
-        compile_discrete()
+        discrete_loop()

@@ -8,7 +8,7 @@ sides serves for it as it is.
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,15 +26,17 @@ _ONCE = threading.Lock()  # of several threads that need it one compiles
 
 @dataclass(frozen=True, kw_only=True)
 class Along:
-    """Machine code of derivatives, and what it takes as parameters."""
+    """Machine code of derivatives, for all parameters that it holds for, and some of these."""
 
+    lowered: Lowered
+    prepare: Any
     point: Any  # ``point(t, x, u, c)``, once for each point
     # ``function(t, x, u, c, v, dx)``, every array with a direction in each column.  A direction
     # `v` has the rows of the states, the inputs, and time
     function: Any
-    c: np.ndarray  # shape (rows, DIRECTIONS)
     # how linear equations with the Jacobian matrix of the states are solved
     elimination: Elimination
+    c: np.ndarray = field(default_factory=lambda: np.zeros((0, DIRECTIONS)))  # (rows, DIRECTIONS)
 
     @property
     def entries(self) -> tuple[Any, Any]:
@@ -42,39 +44,26 @@ class Along:
         return entry(self.point), entry(self.function)
 
 
-@dataclass(frozen=True, kw_only=True)
-class AlongCode:
-    """The functions of `Along` for all parameters that they hold for."""
-
-    lowered: Lowered
-    prepare: Any
-    point: Any
-    function: Any
-    elimination: Elimination
-
-
 def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
-    """Return the derivatives for a parameter vector, made when they are first needed.
-
-    None if there are none: an equation was differentiated for an integer parameter that has
-    another value now.  Opaque functions have differences in them.
-    """
+    """Return the derivatives for a parameter vector, made when they are first needed."""
+    # None if there are none: an equation was differentiated for an integer parameter that has
+    # another value now.  Opaque functions have differences in them.
     with _ONCE:
-        made = reading.cache.found(AlongCode, lambda each: True, lambda: _made(reading))
+        made = reading.cache.found(Along, lambda each: True, lambda: _made(reading))
     if not made.lowered.holds_for(p):
         return None
     c = np.zeros((made.lowered.size, DIRECTIONS))
     made.prepare(np.repeat(p[:, None], DIRECTIONS, axis=1), c)
-    return Along(point=made.point, function=made.function, c=c, elimination=made.elimination)
+    return replace(made, c=c)
 
 
-def _made(reading: Reading) -> AlongCode:
+def _made(reading: Reading) -> Along:
     equations = reading.equations
     n, m = reading.system.nstates or 0, reading.schedule.ninputs
     rows = along(equations, "dx", {"x": 0, "u": n, "t": n + m})
     lowered = lower_along(reading.schedule, reading.program, equations, rows, DIRECTIONS)
     prepare, point, function = lowered_code(lowered)
     order = elimination(structure(equations.pieces("dx"), "x", n))
-    return AlongCode(
+    return Along(
         lowered=lowered, prepare=prepare, point=point, function=function, elimination=order
     )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, Literal
 
 import control as ct
@@ -84,19 +83,21 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
     if not wanted:
         return
     with _ONE_AT_A_TIME, np.errstate(all="ignore"):
-        width = trial.width if ct.isctime(compiled.system) else 1
-        (due,) = instants_of(compiled.schedule, compiled.program, trial.time, trial.p[:, None])
-        each = np.repeat(trial.p[:, None], width, axis=1)
-        code, done = machine(compiled, each, width, due.patterns), compiled.cache.of(_Audited)
+        width, p = trial.width if ct.isctime(compiled.system) else 1, trial.p[:, None]
+        read, clocks = compiled.schedule, compiled.program.clocks
+        due = instants_of(read, compiled.program, trial.time, p)[0].patterns if clocks else ()
+        each = np.repeat(p, width, axis=1)
+        code, done = machine(compiled, each, width, due), compiled.cache.of(_Audited)
         if wanted != _EVERY and any(known.code is code for known in done):
             return
-        _, c = prepared_parameters(compiled, trial.p, width, due.patterns)
+        _, c = prepared_parameters(compiled, trial.p, width, due)
         done.append(_Audited(code=code))
         evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
-            known = _relay_outputs(compiled, outputs(point)) if outputs else {}
+            every = outputs(point) if outputs else {}
+            known = {i: float(every[i][0]) for i in relays}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
 
 
@@ -119,23 +120,19 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
     events = code.lowered.rows["g"]
     located = events - compiled.program.events
     declared = declared_rows(compiled.schedule, compiled.program, located)
-    rows, jumping = np.array(compiled.program.sampled, dtype=int), compiled.program.resets
-    memories, room = code.lowered.rows["m"], code.lowered.rows["s"]
+    count, jumping = len(compiled.program.sampled), compiled.program.resets
 
-    def several(t: float, x: np.ndarray, u: np.ndarray) -> PointValues:
-        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), code.width, axis=1) for v in (t, x, u))
-        dx, y = np.empty_like(xx), np.empty((len(compiled.schedule.outputs), code.width))
-        g, m, after = (np.empty((rows, code.width)) for rows in (events, memories, room))
-        code.rhs(tt[0].copy(), xx, uu, c, dx, g, m)
-        code.out(tt[0].copy(), xx, uu, c, y)
-        found = [dx[:, -1], y[:, -1]]
-        for sample in code.samples:
-            s = np.zeros((room, code.width))  # 0 as python-control has it where nothing is due
-            sample(tt[0].copy(), xx, uu, c, s)
-            found.append(s[: rows.size, -1])
-        if code.resets is not None:
-            code.resets(tt[0].copy(), xx, uu, c, after)
-        return *found, *without_nan(np.append(g[:, -1], m[:, -1])[declared], after[:jumping, -1])
+    def several(*point: Any) -> PointValues:
+        dx, g, m = code.values(code.rhs, "dx g m", point, c)
+        (y,) = code.values(code.out, "y", point, c)
+        # next states are 0 as python-control has it where nothing is due
+        due, after = (
+            [code.values(function, "s", point, c)[0] for function in functions]
+            for functions in (code.samples, code.resets)
+        )
+        jumped = np.concatenate([np.zeros(0), *after])[:jumping]
+        sampled = [s[:count] for s in due]
+        return dx, y, *sampled, *without_nan(np.append(g, m)[declared], jumped)
 
     return several
 
@@ -211,11 +208,10 @@ def _by_python_control(compiled: Compiled, point: Any, trial: Trial) -> PointVal
     return rates, np.concatenate([outputs, *arriving]), *after, *without_nan(*declared)
 
 
-def _relay_outputs(compiled: Compiled, found: np.ndarray) -> dict[int, float]:
-    """Return what ideal relays output, by the number of their blocks, of all blocks' outputs."""
-    nodes = compiled.schedule.nodes
-    starts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    return {i: float(found[starts[i]]) for i in relay_places(nodes)}
+def _by_block(compiled: Compiled, values: np.ndarray) -> dict[int, np.ndarray]:
+    """Divide what there is of the outputs of all blocks, by their numbers."""
+    ends = np.cumsum([node.system.noutputs or 0 for node in compiled.schedule.nodes])
+    return dict(enumerate(np.split(values, ends[:-1])))
 
 
 def _compare_sliding(compiled: Compiled, trial: Trial, point: Any) -> None:
@@ -300,17 +296,16 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
     if system.nstates:
         set_parameters(system, dict(trial.params) if trial.params else None)
     schedule = _with_every_output(compiled)
-    y = block_outputs(compiled, trial.p, point)
-    rates, every, *_ = rounding(compiled, replace(trial, meetings=()), point, schedule)
-    counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
+    outputs = every_output(compiled, trial.p)(point)
+    rates, rounded, *_ = rounding(compiled, replace(trial, meetings=()), point, schedule)
+    every = _by_block(compiled, rounded)
     given = list(block_inputs(system, u[: system.ninputs or 0], outputs))
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
         if supplied_of(block) is not None:
             continue
         own = slice(node.state_offset, node.state_offset + (block.nstates or 0))
-        pairs = [(outputs[i], every[counts[i] : counts[i + 1]], outputs_now, block.output_labels)]
+        pairs = [(outputs[i], every[i], outputs_now, block.output_labels)]
         pairs += (
             [(ours[0][own], rates[own], rates_now, block.state_labels)] if block.nstates else []
         )
@@ -323,11 +318,6 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
             differ = first_difference([labels], (a,), (b,), (moved + most,))
             if differ is not None:
                 raise _difference(differ, node.path, t)
-
-
-def block_outputs(compiled: Compiled, p: np.ndarray, point: Any) -> np.ndarray:
-    """Return the outputs of all blocks, from the generator that the run's program is from."""
-    return every_output(compiled, p)(point)
 
 
 def _with_every_output(compiled: Compiled) -> Schedule:
@@ -374,8 +364,8 @@ def rounding(
     return *others, np.append(g, m)[declared_rows(schedule, program, located)], after
 
 
-def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarray]:
-    """Return what computes the outputs of all blocks at a point."""
+def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], dict[int, np.ndarray]]:
+    """Return what computes the outputs of all blocks at a point, as the run's program does."""
     schedule = _with_every_output(compiled)
     found = equations(schedule, compiled.program.layout, p)
     lowered = lower(schedule, compiled.program, 1, found)
@@ -383,11 +373,11 @@ def every_output(compiled: Compiled, p: np.ndarray) -> Callable[[Any], np.ndarra
     c = np.zeros((lowered.size, 1))
     prepare(np.ascontiguousarray(p[:, None]), c)
 
-    def outputs(point: Any) -> np.ndarray:
+    def outputs(point: Any) -> dict[int, np.ndarray]:
         t, x, u = point
         y = np.empty((len(schedule.outputs), 1))
         out(np.array([t]), x[:, None], u[:, None], c, y)
-        return y[:, 0]
+        return _by_block(compiled, y[:, 0])
 
     return outputs
 

@@ -14,23 +14,34 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..annotations import as_annotated
+from ..attributes import with_parameters_of
 from ..diagrams import apart, not_a_system, override
-from ..errors import CompileError, ParameterError, UsageError
+from ..errors import CompileError, ParameterError, UnknownKeywordError, UsageError
 from ..names import unknown
 from ..responses.arguments import checked_params
 from ..responses.watched import Watched
-from ..upstream.control_internals import StandIn, is_system
+from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
 from .describe import called, described
 from .diagram.checks import check_sizes
+from .diagram.parameters import length
 from .diagram.program import program
 from .diagram.schedule import schedule
-from .jacobians import Tangent, linear_system, parameter_jacobian, tangent
+from .jacobians import (
+    Tangent,
+    check_enters_alone,
+    float_parameters,
+    jacobian,
+    over_a_period,
+    tangent,
+    tell_of_differences,
+)
 from .machine.evaluations import evaluations
 from .reading import Reading
 
 LOOPS = ("error", "solve")  # what may be done with algebraic loops
+_NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 Rhs = Callable[..., None]
 
 
@@ -231,9 +242,31 @@ class Compiled(Reading, StandIn):
         -----
         Forward mode on the expressions, so nothing is lost to a step width.
         """
-        return linear_system(self, x0, u0, t, params, copy_names=copy_names, names=names)
+        for name in names:
+            if name not in _NAMED:
+                known = ("copy_names", *_NAMED)
+                raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
+        if isinstance(x0, ct.OperatingPoint):
+            x0, u0 = x0.states, x0.inputs if u0 is None else u0
+        system = self.system
+        n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
+        tell_of_differences(self)
+        directions = np.eye(n + given + length(self.program.layout), n + m)
+        found = jacobian(self, x0, u0, t, params, directions)
+        rates, outputs, dt = found["dx"], found["y"], system.dt
+        if self.program.sampled:
+            rates, outputs, dt = over_a_period(self, found)
+        own = {
+            "name": f"{system.name}$linearized",
+            "inputs": system.input_labels,
+            "outputs": system.output_labels,
+            "states": system.state_labels,
+        }
+        matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
+        return state_space(matrices, dt, (own if copy_names else {}) | names)
 
     @as_annotated
+    @with_parameters_of(linearize)
     def parameter_jacobian(
         self,
         parameters: Sequence[str],
@@ -248,14 +281,6 @@ class Compiled(Reading, StandIn):
         ----------
         parameters : sequence of str
             Qualified names, such as ``"actuator.b_r"``; with an index for entries of arrays.
-        x0 : mapping, array_like or control.OperatingPoint
-            State, as in `linearize`.
-        u0 : array_like, optional
-            Inputs, of shape (ninputs,), as in `linearize`.
-        t : float, optional
-            Time in s.
-        params : mapping, optional
-            Parameters that are overridden.
 
         Returns
         -------
@@ -268,7 +293,19 @@ class Compiled(Reading, StandIn):
             As `linearize`, if there is no such parameter, and if numbers follow from it outside of
             the equations, by a record's `derived`.
         """
-        return parameter_jacobian(self, parameters, x0, u0, t, params)
+        places = float_parameters(self)
+        tell_of_differences(self)
+        self.parameter_vector(params)  # blocks have the run's parameters then
+        start = (self.system.nstates or 0) + self.schedule.ninputs
+        directions = np.zeros((start + length(self.program.layout), len(parameters)))
+        for k, name in enumerate(parameters):
+            if name not in places:
+                raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
+            place, owner = places[name]
+            check_enters_alone(owner, name)
+            directions[start + place, k] = 1.0
+        found = jacobian(self, x0, u0, t, params, directions)
+        return found["dx"], found["y"]
 
     def _call(
         self, function: Rhs, size: int | None, t: float, x: Any, u: Any, params: Any, *more: Any
@@ -378,6 +415,64 @@ def compile(  # noqa: A001 (what it does)
     made = Compiled(schedule=read, program=arrays, original=system, apart=own)
     _ = made.equations  # what expressions would understand otherwise is refused now
     return made
+
+
+@as_annotated
+@with_parameters_of(Compiled.linearize)
+def linearize(
+    system: System,
+    x0: Any,
+    u0: Any = None,
+    t: float = 0.0,
+    params: Mapping[str, Any] | None = None,
+    *,
+    copy_names: bool = True,
+    **names: Any,
+) -> ct.StateSpace:
+    """Linearize a diagram at a point, with exact derivatives of its equations.
+
+    Parameters
+    ----------
+    system : control.InputOutputSystem or Compiled
+        A diagram, or what `compile` made of it.
+
+    Returns
+    -------
+    control.StateSpace
+        In continuous time; of a diagram with sampled blocks in discrete time, the map over the
+        common period of their clocks, whose delays are states of it.  At a kink it has the slopes
+        of the side that the point belongs to.
+
+    Raises
+    ------
+    AlgebraicLoopError
+        If signals depend on each other without a state in between.
+    CompileError
+        If the diagram cannot be compiled.
+    ParameterError
+        If an argument is refused, or the clocks have no common period.
+    UnknownKeywordError, UsageError
+        If there is no such keyword; if signals are delayed, whose past is not a state.
+
+    Warns
+    -----
+    InexactWarning
+        If a function is called as it stands: its derivatives are differences, all others exact.
+
+    Examples
+    --------
+    A lag behind a zero-order hold is what ``ct.sample_system`` makes of it:
+
+    >>> import control as ct
+    >>> lag = ct.ss(-1, 1, 1, 0, inputs="v", outputs="y", name="lag")
+    >>> hold = nlctl.sampled(ct.ss([], [], [], 1.0, 0.1, inputs="u", outputs="v", name="hold"))
+    >>> held = nlctl.interconnect([lag, hold], inputs=["u"], outputs=["y"])
+    >>> linear = nlctl.linearize(held, 0)
+    >>> print(linear.dt, linear.A[0, 0].round(6), linear.B[0, 0].round(6))  # exp(-0.1), 1 - it
+    0.1 0.904837 0.095163
+    """
+    made = as_compiled(system, params)
+    return made.linearize(x0, u0, t, params, copy_names=copy_names, **names)
 
 
 def _restored(content: bytes) -> Compiled:

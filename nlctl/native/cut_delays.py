@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import CompileError, ParameterError, UsageError
-from ..wording import counted
+from ..errors import CompileError, UsageError
 from .compiled import Compiled
 from .diagram.parameters import length
-from .jacobians import Tangent, check_assumed, differentiated_at, open_tangent, point_inputs
+from .jacobians import Tangent, check_assumed, differentiated_at, open_tangent, point_numbers
 
 _STEPS, _CLOSE = 50, 1e-12  # of Newton's method, for what leaves delays
 
@@ -102,10 +101,5 @@ class CutDiagram:
 
     def inputs(self, who: str, name: str, given: Any) -> np.ndarray:
         """Return the inputs at a point, shape (ninputs,)."""
-        u = point_inputs(self.compiled.system, given)
-        if u is None:
-            raise ParameterError(
-                f"{who} needs {counted(self.m, 'finite number')} for {name} of "
-                f"'{self.compiled.system.name}', got {given!r}"
-            )
-        return u.astype(float)
+        what = f"{name} of '{self.compiled.system.name}'"
+        return point_numbers(f"{who} needs", self.m, what, given)

@@ -26,10 +26,8 @@ LOOP = numba.int64(
 def simulate_discrete(
     compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k]).
-
-    Shapes: `times` (m,), `inputs` (ninputs, m), `x0` (nstates,); returns (noutputs, n).
-    """
+    """Compute x[k+1] = f(t[k], x[k], u[k]) and y[k] = h(t[k], x[k], u[k])."""
+    # Shapes: `times` (m,), `inputs` (ninputs, m), `x0` (nstates,); returns (noutputs, n).
     system, count = compiled.system, times.size
     _check_times(system, times)
     code, c = prepared_parameters(compiled, p)
@@ -40,14 +38,9 @@ def simulate_discrete(
     states[:1, :, 0] = x0
     each = np.array(times, dtype=float)[:, None]
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the result says
-        n = _loop()(*code.entries, each, columns, c, states, outputs, g, m)
+        n = discrete_loop()(*code.entries, each, columns, c, states, outputs, g, m)
     code.check(c)
     return outputs[:n, :, 0].T.copy(), states[:n, :, 0].T.copy()
-
-
-def compile_discrete() -> None:
-    """Make the machine code of `simulate_discrete` that all diagrams share."""
-    _loop()
 
 
 def _check_times(system: Any, times: np.ndarray) -> None:
@@ -63,8 +56,8 @@ def _check_times(system: Any, times: np.ndarray) -> None:
 
 
 @functools.cache
-def _loop() -> Any:
-    """Return the loop as machine code; without JIT as it stands."""
+def discrete_loop() -> Any:
+    """Return the loop that all diagrams share as machine code; without JIT unchanged."""
     options = {"error_model": "numpy", "nogil": True}
     wanted = Wanted(function=_iterate, signature=LOOP, options=options)
     (loop,) = machine_code(function_key(_iterate, module_key(address)), [wanted])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 import control as ct
@@ -31,6 +31,7 @@ from .integrate.workspace import Task
 from .integrators import integrators
 from .laid import laid_out, ticks_of
 from .machine.evaluations import machine
+from .machine.routine import entries_of
 from .results import Statistics, Trajectory, at_its_end, made
 from .run import Run
 from .settings import METHODS, Settings
@@ -44,22 +45,29 @@ _PLACES = 1024  # of a run: as many the reference looks at where a loop is at re
 ROUNDS = 2000  # steps between looks at Ctrl-C and the progress
 
 
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What runs of a diagram have in common: all but their initial states and parameters."""
+
+    compiled: Compiled
+    times: np.ndarray  # shape (m,)
+    inputs: np.ndarray  # shape (ninputs, m)
+    settings: Settings
+
+    @cached_property
+    def varied(self) -> list[Variation | None]:
+        """How the delay of each line varies."""
+        return variations(self.compiled, self.times)
+
+
 def trajectory(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    x0: np.ndarray,
-    p: np.ndarray,
-    settings: Settings,
-    progress: Callable[[float], object] | None = None,
-    varied: list[Variation | None] | None = None,
+    course: Course, x0: np.ndarray, p: np.ndarray, progress: Callable[[float], object] | None = None
 ) -> Trajectory:
     """Run one member.  Ctrl-C ends an integration with the status STOPPED."""
+    compiled, settings = course.compiled, course.settings
     if not ct.isctime(compiled.system):
-        return _sampled(compiled, times, inputs, x0, p)
-    varied = variations(compiled, times) if varied is None else varied
-    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
-    run = with_turns(compiled, run, settings)
+        return _sampled(course, x0, p)
+    run = with_turns(compiled, prepared(course, x0[:, None], p[:, None]), settings)
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
@@ -79,11 +87,10 @@ def trajectory(
     return reached
 
 
-def _sampled(
-    compiled: Compiled, times: np.ndarray, inputs: np.ndarray, x0: np.ndarray, p: np.ndarray
-) -> Trajectory:
+def _sampled(course: Course, x0: np.ndarray, p: np.ndarray) -> Trajectory:
     """Run a discrete-time diagram; there is nothing to be set."""
-    outputs, states = simulate_discrete(compiled, times, inputs, x0, p)
+    times, inputs = course.times, course.inputs
+    outputs, states = simulate_discrete(course.compiled, times, inputs, x0, p)
     done = outputs.shape[1]
     run = Statistics(
         status=Status.OK if done == times.size else Status.DIVERGED,
@@ -120,18 +127,16 @@ def go_on(run: Run, rounds: int = ROUNDS) -> Run:
 
 
 def watched(run: Run, paces: np.ndarray) -> Run:
-    """Try a window of steps in every lane; one that chatters at its end gets that status.
-
-    The window is the same number of steps whatever lanes are looked at, so that what becomes of
-    one does not depend on the others.
-    """
+    """Try a window of steps in every lane; one that chatters at its end gets that status."""
+    # It is the same number of steps whatever lanes are looked at, so that what becomes of one does
+    # not depend on the others.
     probe = probe_of(run.task)
     run = go_on(run, ROUNDS - probe)
-    if np.all(run.lanes["status"] >= 0):  # all are over
+    if (run.lanes["status"] >= 0).all():  # all are over
         return run
-    lanes = np.flatnonzero(asked(run.lanes, paces)) if run.task.fixed == 0.0 else ()
+    lanes = asked(run.lanes, paces).nonzero()[0] if run.task.fixed == 0.0 else ()
     if not len(lanes):
-        return go_on(run, probe)
+        return go_on(run, probe) if RUNNING in run.lanes["status"] else run
     attempts = []
     for _ in range(probe):
         run, attempt = snapshot(run.work, partial(go_on, run, 1))
@@ -166,16 +171,9 @@ def finish(run: Run) -> np.ndarray:
     return np.ascontiguousarray(run.work.y[:, : run.task.outputs])
 
 
-def prepared(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    x0: np.ndarray,
-    p: np.ndarray,
-    settings: Settings,
-    varied: list[Variation | None],
-) -> Run:
+def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
     """Lay out a run of as many members as `x0` (states, members) and `p` have columns."""
+    compiled, times, settings = course.compiled, course.times, course.settings
     program, count, read = compiled.program, x0.shape[1], compiled.schedule
     method, terms = _method(compiled, settings), ()
     due = instants_of(read, program, times, p) if program.clocks else []
@@ -185,7 +183,7 @@ def prepared(
     task = with_table(
         Task,
         times=times,
-        inputs=inputs,
+        inputs=course.inputs,
         outputs=compiled.system.noutputs or 0,
         p=c,
         alone=int(count == 1),
@@ -202,7 +200,7 @@ def prepared(
         ),
         clocks=of_program.clocks or ticks_of(compiled.program, code, due),
         resets=of_program.resets,
-        lines=of_program.lines or lines_of(compiled, p, varied, code.signal_entry),
+        lines=of_program.lines or lines_of(compiled, p, course.varied, entries_of((code.out,))),
     )
     if method == "taylor":
         task, terms = with_taylor(task, compiled, p, settings)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from itertools import islice
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import control as ct
@@ -17,7 +18,6 @@ import numpy as np
 from ..annotations import as_annotated
 from ..arguments import ATOL, RTOL, one_of
 from ..arguments import number as checked_number
-from ..delays.variation import Variation
 from ..errors import ParameterError
 from ..names import unknown
 from ..params import checked_times, integer
@@ -28,16 +28,15 @@ from .audit import audit as compare
 from .chattering.detection import new_paces
 from .compiled import Compiled
 from .compiled import compile as compile_diagram
-from .driver import begin, finish, prepared, trajectory, watched
+from .driver import Course, begin, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike
-from .histories import variations
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
 from .members import Members, members
 from .results import Trajectory, made
 from .run import Run
-from .settings import Settings
+from .settings import settings_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,14 +151,14 @@ def ensemble_response(
     one_of("ensemble_response", "hold", hold, HOLDS)
     every = members(compiled, checked_params(params) or {}, given["initial_state"])
     _check_signals(compiled, keep, metrics)
-    settings = Settings(
-        rtol=rtol, atol=atol, max_steps=max_steps, method="auto" if method is None else method,
-        max_step=_longest(max_step),
-    )  # fmt: skip
+    if max_step is not None:
+        checked_number("ensemble_response", "max_step", max_step, above=0)
+    settings = settings_of(method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step)
     grid, u = times, input_array(compiled.system, given["inputs"], times)
     if hold == "zoh" and ct.isctime(compiled.system) and u.size:
         grid, u = held(times, u)
-    asked = _Asked(times=times, grid=grid, inputs=u, settings=settings, metrics=metrics)
+    course = Course(compiled=compiled, times=grid, inputs=u, settings=settings)
+    asked = _Asked(times=times, course=course, metrics=metrics)
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     rows = _run(_runner(every, asked, kept, audit), every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
@@ -188,47 +187,37 @@ def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[Me
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """What each member is asked: times of its samples among those of the run, inputs, metrics."""
+    """What each member is asked: times of its samples among those of the run, and metrics."""
 
     times: np.ndarray
-    grid: np.ndarray
-    inputs: np.ndarray
-    settings: Settings
+    course: Course
     metrics: Sequence[MetricLike]
 
 
 def _runner(
     every: Members, asked: _Asked, kept: Mapping[str, np.ndarray], audit: Audit
-) -> Callable[[range, _Stop], dict[int, dict[str, Any]]]:
+) -> Callable[[range, Event], dict[int, dict[str, Any]]]:
     """Return what runs a group of members, keeps their signals and returns their rows."""
     compiled = every.compiled
     labels = compiled.system.output_labels
-    varied = variations(compiled, asked.grid)  # once for all members
+    _ = asked.course.varied  # once for all members
     _, p = every.batch(range(1), ENSEMBLE_WIDTH)  # checks all members before anything runs
     compile_for(compiled, p, ENSEMBLE_WIDTH)  # once, before the threads start
     audited = {0, every.size // 2, every.size - 1} if audit else ()
 
-    def one(numbers: range, stop: _Stop) -> dict[int, dict[str, Any]]:
+    def one(numbers: range, stop: Event) -> dict[int, dict[str, Any]]:
         rows = {}
-        runs = _group(every, numbers, asked.grid, asked.inputs, asked.settings, varied, stop)
+        runs = _group(every, numbers, asked.course, stop)
         for number, run in zip(numbers, runs, strict=False):
             if number in audited:
                 _audit(every, number, run, audit)
-            run = run if asked.grid is asked.times else _sampled_at(run, asked.times)
+            run = run if asked.course.times is asked.times else _sampled_at(run, asked.times)
             for signal, samples in kept.items():
                 samples[number, : run.time.size] = run.outputs[labels.index(signal)]
             rows[number] = _row(run, labels, asked.metrics)
         return rows
 
     return one
-
-
-def _longest(max_step: float | None) -> float:
-    """Return the longest step, checked."""
-    if max_step is None:
-        return np.inf
-    checked_number("ensemble_response", "max_step", max_step, above=0)
-    return max_step
 
 
 def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:
@@ -250,61 +239,39 @@ def _sampled_at(run: Trajectory, times: np.ndarray) -> Trajectory:
     )  # fmt: skip
 
 
-class _Stop:
-    """Set when the members that are running are no longer wanted."""
-
-    wanted = True
-
-
-def _group(
-    every: Members,
-    numbers: range,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    settings: Settings,
-    varied: list[Variation | None],
-    stop: _Stop,
-) -> Iterator[Trajectory]:
+def _group(every: Members, numbers: range, course: Course, stop: Event) -> Iterator[Trajectory]:
     """Run up to WIDTH members in a batch; yield them in their order."""
     compiled, (x0, p) = every.compiled, every.batch(numbers, ENSEMBLE_WIDTH)
-    alone = settings.method == "rodas5p" or not ct.isctime(compiled.system)
+    alone = course.settings.method == "rodas5p" or not ct.isctime(compiled.system)
     if alone:
         for j in range(len(numbers)):
-            if not stop.wanted:
+            if stop.is_set():
                 return
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
+            yield trajectory(course, x0[:, j], p[:, j])
         return
     found: dict[int, tuple[Run, np.ndarray]] = {}
-    while stop.wanted and (left := [j for j in range(len(numbers)) if j not in found]):
+    while not stop.is_set() and (left := [j for j in range(len(numbers)) if j not in found]):
         first = left[0]  # members whose integers steer the equations otherwise run apart
         fits = np.roll(fitting(compiled, np.roll(p, -first, axis=1), ENSEMBLE_WIDTH), first)
         # others' places are taken by copies: what runs beside a member changes nothing
         columns = np.where(fits, np.arange(ENSEMBLE_WIDTH), first)
-        ran = _ran(compiled, times, inputs, (x0[:, columns], p[:, columns]), settings, varied, stop)
+        ran = _ran(course, x0[:, columns], p[:, columns], stop)
         found |= {int(j): ran for j in np.flatnonzero(fits)}
-    for j in range(len(numbers) if stop.wanted else 0):
+    for j in range(len(numbers) if not stop.is_set() else 0):
         run, outputs = found[j]
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
-            yield trajectory(compiled, times, inputs, x0[:, j], p[:, j], settings, varied=varied)
+            yield trajectory(course, x0[:, j], p[:, j])
         else:
             yield made(run, outputs, j)
 
 
-def _ran(
-    compiled: Compiled,
-    times: np.ndarray,
-    inputs: np.ndarray,
-    members: tuple[np.ndarray, np.ndarray],
-    settings: Settings,
-    varied: list[Variation | None],
-    stop: _Stop,
-) -> tuple[Run, np.ndarray]:
+def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Run, np.ndarray]:
     """Run as many members as there are lanes; return the run and its outputs."""
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
-        run = prepared(compiled, times, inputs, *members, settings, varied)
+        run = prepared(course, x0, p)
         begin(run)
         paces = new_paces(run.lanes)
-        while stop.wanted and np.any(run.lanes["status"] == RUNNING):
+        while not stop.is_set() and np.any(run.lanes["status"] == RUNNING):
             run = watched(run, paces)
         return run, finish(run)
 
@@ -329,14 +296,14 @@ def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) 
 
 
 def _run(
-    one: Callable[[range, _Stop], dict[int, dict[str, Any]]],
+    one: Callable[[range, Event], dict[int, dict[str, Any]]],
     count: int,
     threads: int,
     progress: Callable[[int], object] | None,
 ) -> dict[int, dict[str, Any]]:
     """Run all members in groups; after Ctrl-C return those that are finished."""
     rows: dict[int, dict[str, Any]] = {}
-    stop = _Stop()
+    stop = Event()  # set when the members that are running are no longer wanted
     groups = iter(range(i, min(i + ENSEMBLE_WIDTH, count)) for i in range(0, count, ENSEMBLE_WIDTH))
     pool = ThreadPoolExecutor(threads)
     waiting = {pool.submit(one, group, stop) for group in islice(groups, 2 * threads)}
@@ -349,7 +316,7 @@ def _run(
             if progress is not None:
                 progress(len(rows))
     except KeyboardInterrupt:
-        stop.wanted = False
+        stop.set()
     finally:
         pool.shutdown(cancel_futures=True)
     return rows

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..errors import ParameterError
 from ..host.notebook import table_html
 from ..names import unknown
 from ..params import integer
+from ..plotting.axes import control_plot
 from ..plotting.bands import Limit, bands
 from ..wording import counted
 
@@ -50,27 +51,15 @@ class SpecLike(Protocol):
 ROWS = 8  # rows of its table that an ensemble prints
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
+@described_record(made_by="ensemble_response", repr=False)
 class Ensemble:
-    """Runs of one diagram.
+    """Runs of one diagram."""
 
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        One row per finished member, by its number: what was varied, ``status`` (text), ``time``
-        reached (s), ``steps``, and the metrics; those of a run that did not end well are NaN.
-    time : ndarray of shape (m,)
-    signals : dict of ndarray of shape (members, m)
-        The signals that were kept, NaN after the end of a run.
-
-    Examples
-    --------
-    See `ensemble_response`.
-    """
-
+    # One row per finished member, by its number: what was varied, ``status`` (text), ``time``
+    # reached (s), ``steps``, and the metrics; those of a run that did not end well are NaN.
     table: pd.DataFrame
-    time: np.ndarray
-    signals: Mapping[str, np.ndarray]
+    time: np.ndarray  # (m,): Times of the samples (s).
+    signals: Mapping[str, np.ndarray]  # (members, m): Those kept, NaN after the end of a run.
 
     def to_pandas(self) -> pd.DataFrame:
         """Return the signals as a table, a row for each member and time.
@@ -150,10 +139,7 @@ class Ensemble:
         limits = {} if spec is None else spec.limits
         figure = plt.figure(layout="constrained")
         _, axes = bands(self.time, shown, lines, limits=limits, figure=figure)
-        drawn = np.empty((len(axes), 1), dtype=object)
-        for k, ax in enumerate(axes):
-            drawn[k, 0] = list(ax.lines)
-        return ct.ControlPlot(drawn, np.array(axes)[:, None], figure)
+        return control_plot(figure, axes)
 
     def _shown(self, signals: Sequence[str] | None) -> dict[str, np.ndarray]:
         """Return the signals that a plot shows."""

@@ -20,10 +20,7 @@ _WORDS = {
 
 
 def with_log(task: Any, work: Any) -> Any:
-    """Return a workspace with room for what happens next, in a single run.
-
-    What has been noted stays; the room grows with it.
-    """
+    """Return a workspace with room for what happens next in a single run; what is noted stays."""
     free = work.log.t.size - int(work.lanes["noted"][0])
     least = log_room(task, work.events.g.shape[0])
     if not least or free >= least:

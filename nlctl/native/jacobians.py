@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import control as ct
 import numpy as np
 from scipy.linalg import expm
 
@@ -16,27 +15,21 @@ from ..arguments import number
 from ..blocks import Block
 from ..delays.transport import PAST
 from ..diagrams import supplied_blocks
-from ..errors import CompileError, InexactWarning, ParameterError, UnknownKeywordError, UsageError
+from ..errors import CompileError, InexactWarning, ParameterError, UsageError
 from ..expressions.derivatives import tangents
 from ..expressions.evaluate import evaluate_expressions
 from ..expressions.graph import Expr, Untraceable, needed
-from ..names import unknown
 from ..params import as_numbers, declared_params, equation_arguments, with_overrides
 from ..responses.arguments import state_array
 from ..sampling.clock import common_period, instants
 from ..sampling.system import clocks_of
-from ..upstream.control_internals import state_space
-from ..upstream.systems import System
 from ..wording import counted
 from .codegen.solver import searched
 from .diagram.nodes import Node
-from .diagram.parameters import length
 from .equations.blocks import Equations
 from .lower import DIRECTION
-from .opaque.calls import Call
 from .reading import Reading
 
-_NAMED = ("name", "inputs", "outputs", "states")  # of ct.ss
 STEP = 1e-6  # by which a parameter is moved, to see what follows from it
 _DIFFERENTIATING = threading.Lock()  # a diagram's graph grows by it
 
@@ -66,10 +59,7 @@ def inexact(reading: Reading, results: Sequence[str] = ("dx",)) -> str | None:
 
 def tangent(reading: Reading) -> Tangent:
     """Return a diagram's equations differentiated by states, inputs and parameters."""
-    known = reading.cache.of(Tangent)
-    if not known:
-        known.append(_tangent(reading))
-    return known[0]
+    return reading.cache.found(Tangent, lambda _: True, lambda: _tangent(reading))
 
 
 def _tangent(reading: Reading) -> Tangent:
@@ -138,10 +128,7 @@ def jacobian(
     system, made, t = reading.system, tangent(reading), number("linearize", "t", t)
     p = reading.parameter_vector(params)
     check_assumed(reading, made, p)
-    u = point_inputs(system, u0)
-    if u is None:
-        count = counted(system.ninputs or 0, "finite number")
-        raise ParameterError(f"u0 needs {count} for '{system.name}', got {u0!r}")
+    u = point_numbers("u0 needs", system.ninputs or 0, f"'{system.name}'", u0)
     u = np.append(u, np.zeros(reading.schedule.rates))  # they stand still
     columns = {"t": [t], "x": state_array(system, x0), "u": u, "p": p}
     return differentiated_at(reading, made, columns, directions)
@@ -180,55 +167,20 @@ def differentiated_at(
 def searches_of(equations: Equations) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Return what finds signals of algebraic loops and calls opaque functions, by name."""
     found = {name: searched(one) for name, one in equations.solvers.items()}
-    return found | {name: _of_columns(call) for name, call in equations.calls.items()}
-
-
-def _of_columns(call: Call) -> Callable[[np.ndarray], np.ndarray]:
-    """Return an opaque function of arguments in columns."""
-    return lambda given: np.stack([call.function(column.copy()) for column in given.T], axis=1)
-
-
-def point_inputs(system: System, given: Any) -> np.ndarray | None:
-    """Return the inputs at a point, shape (ninputs,), 0 by default; None if they are not that."""
-    count, u = system.ninputs or 0, as_numbers(0.0 if given is None else given)
-    if u is not None:
-        u = np.full(count, float(u)) if u.ndim == 0 else u.reshape(-1)
-    return u if u is not None and u.size == count and np.all(np.isfinite(u)) else None
-
-
-def linear_system(
-    reading: Reading,
-    x0: Any,
-    u0: Any,
-    t: float,
-    params: Any,
-    *,
-    copy_names: bool,
-    names: Mapping[str, Any],
-) -> ct.StateSpace:
-    """Linearize a compiled diagram with exact derivatives; see `Compiled.linearize`."""
-    for name in names:
-        if name not in _NAMED:
-            known = ("copy_names", *_NAMED)
-            raise unknown("argument", name, known, "of linearize", UnknownKeywordError)
-    if isinstance(x0, ct.OperatingPoint):
-        x0, u0 = x0.states, x0.inputs if u0 is None else u0
-    system = reading.system
-    n, m, given = system.nstates or 0, system.ninputs or 0, reading.schedule.ninputs
-    tell_of_differences(reading)
-    directions = np.eye(n + given + length(reading.program.layout), n + m)
-    found = jacobian(reading, x0, u0, t, params, directions)
-    rates, outputs, dt = found["dx"], found["y"], system.dt
-    if reading.program.sampled:
-        rates, outputs, dt = over_a_period(reading, found)
-    own = {
-        "name": f"{system.name}$linearized",
-        "inputs": system.input_labels,
-        "outputs": system.output_labels,
-        "states": system.state_labels,
+    return found | {
+        name: lambda given, f=call.function: np.stack([f(c.copy()) for c in given.T], axis=1)
+        for name, call in equations.calls.items()
     }
-    matrices = rates[:, :n], rates[:, n:], outputs[:, :n], outputs[:, n:]
-    return state_space(matrices, dt, (own if copy_names else {}) | dict(names))
+
+
+def point_numbers(needs: str, count: int, what: str, given: Any) -> np.ndarray:
+    """Return so many finite numbers, 0 by default, or one for all of them; shape (count,)."""
+    numbers = as_numbers(0.0 if given is None else given)
+    if numbers is not None:
+        numbers = np.full(count, float(numbers)) if numbers.ndim == 0 else numbers.reshape(-1)
+    if numbers is None or numbers.size != count or not np.all(np.isfinite(numbers)):
+        raise ParameterError(f"{needs} {counted(count, 'finite number')} for {what}, got {given!r}")
+    return numbers
 
 
 def tell_of_differences(reading: Reading) -> None:
@@ -282,31 +234,6 @@ def _sampled_map(
         step[places] = found[f"sample{which}"][at : at + array.size]
         at += array.size
     return step
-
-
-def parameter_jacobian(
-    reading: Reading,
-    parameters: Sequence[str],
-    x0: Any,
-    u0: Any = None,
-    t: float = 0.0,
-    params: Any = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Differentiate by parameters; see `Compiled.parameter_jacobian`."""
-    system = reading.system
-    places = float_parameters(reading)
-    tell_of_differences(reading)
-    reading.parameter_vector(params)  # blocks have the run's parameters then
-    start = (system.nstates or 0) + reading.schedule.ninputs
-    directions = np.zeros((start + length(reading.program.layout), len(parameters)))
-    for k, name in enumerate(parameters):
-        if name not in places:
-            raise unknown("parameter", name, places, f"of '{system.name}' that is a float")
-        place, owner = places[name]
-        check_enters_alone(owner, name)
-        directions[start + place, k] = 1.0
-    found = jacobian(reading, x0, u0, t, params, directions)
-    return found["dx"], found["y"]
 
 
 def float_parameters(reading: Reading) -> dict[str, tuple[int, Node]]:

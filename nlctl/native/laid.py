@@ -18,6 +18,7 @@ from .integrate.methods.stiff import UNKNOWN, StiffMethod, stiff_method
 from .integrate.resets import Resets
 from .integrate.samples import Ticks
 from .machine.evaluations import Machine
+from .machine.routine import entries_of
 from .reading import Reading
 
 
@@ -39,14 +40,14 @@ def laid_out(reading: Reading, code: Machine) -> Laid:
 
 def _laid(reading: Reading, code: Machine) -> Laid:
     program, width, lines = reading.program, code.width, reading.schedule.lines
-    nothing = [instants({}, 0.0, 0.0)] * width
+    nothing, signals = [instants({}, 0.0, 0.0)] * width, entries_of((code.out,))
     return Laid(
         code=code,
         rows=_rows(program, code, reading.schedule.watched),
         resets=_resets(program, code),
         stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
         clocks=None if program.clocks else ticks_of(program, code, nothing),
-        lines=None if lines else lines_of(reading, np.zeros((0, width)), [], code.signal_entry),
+        lines=None if lines else lines_of(reading, np.zeros((0, width)), [], signals),
     )
 
 
@@ -80,7 +81,7 @@ def _resets(program: Program, code: Machine) -> Resets:
     owned = np.equal.outer(np.array(program.guards, dtype=int), np.array(owners, dtype=int))
     return with_table(
         Resets,
-        functions=code.reset_entries,
+        functions=entries_of(code.resets),
         states=np.array(rows, dtype=np.int64),
         owned=np.ascontiguousarray(owned.reshape(len(program.guards), len(rows)), np.int64),
     )
@@ -101,6 +102,6 @@ def ticks_of(program: Program, code: Machine, due: list[Instants]) -> Ticks:
             if store.array == "s":
                 written[k, store.row : store.row + store.size] = 1
     return with_table(
-        Ticks, ticks=ticks, which=which, functions=code.sample_entries, due=written,
+        Ticks, ticks=ticks, which=which, functions=entries_of(code.samples), due=written,
         states=np.array(sampled, dtype=np.int64),
     )  # fmt: skip

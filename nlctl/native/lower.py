@@ -25,7 +25,7 @@ from .diagram.program import Program
 from .diagram.schedule import Schedule
 from .equations.blocks import Equations, equations
 from .equations.located import Conditions
-from .opaque.calls import Call
+from .opaque.called import Call
 from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}
@@ -91,7 +91,8 @@ class Lowered:
 
     def holds_for(self, p: Any) -> bool:
         """Whether the program holds for parameters `p`, an array with a row per number."""
-        return all(bool(np.all(np.asarray(p)[i] == v)) for i, v in self.assumed.items())
+        values = np.asarray(p)
+        return all(bool((values[i] == v).all()) for i, v in self.assumed.items())
 
 
 def lower(

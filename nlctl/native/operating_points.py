@@ -12,16 +12,17 @@ from scipy.optimize import OptimizeResult, least_squares, root
 
 from ..annotations import as_annotated
 from ..arguments import number
+from ..attributes import with_parameters_of
 from ..diagrams import state_names
 from ..errors import OperatingPointError, ParameterError, UnknownKeywordError
 from ..names import find_name, unknown
-from ..params import as_numbers
 from ..responses.arguments import checked_params, state_array
 from ..upstream.systems import System
 from ..wording import counted
 from .compiled import Compiled, as_compiled
 from .cut_delays import CutDiagram
 from .happened import row_labels
+from .jacobians import point_numbers
 
 _WHO = "find_operating_point"
 _FOUND = 1e-8  # residual, relative to what it is made of
@@ -191,10 +192,12 @@ def find_operating_point(
         "return_outputs": return_outputs,
     }  # fmt: skip
     named = _with_short_names(named, aliases)
-    cut = _cut(system, t, params)
+    checked_params(params)
+    cut = CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
     asked = _asked(cut, named)
     point = _search(cut, asked, root_method, bool(named["return_outputs"]))
-    if not point.residual <= _tolerance(cut, point):
+    size = np.abs(np.concatenate([point.states, point.inputs])).max(initial=0.0)
+    if not point.residual <= _FOUND * (1.0 + size):
         raise OperatingPointError(
             f"no operating point of '{cut.compiled.system.name}' was found from "
             f"{np.round(asked.x, 6)}: the search ended at {np.round(point.states, 6)}, where what "
@@ -207,6 +210,7 @@ def find_operating_point(
 
 
 @as_annotated
+@with_parameters_of(find_operating_point)
 def find_operating_points(
     system: System | Compiled,
     starts: Iterable[Any],
@@ -218,12 +222,8 @@ def find_operating_points(
 
     Parameters
     ----------
-    system : control.InputOutputSystem or Compiled
-        A diagram, or what `compile` made of it.
     starts : iterable
         Where searches begin, each as `initial_state` of `find_operating_point`.
-    inputs, outputs : array_like, optional
-        As there.
     **given : object
         Its other arguments.
 
@@ -258,12 +258,6 @@ def find_operating_points(
     return tuple(found)
 
 
-def _cut(system: Any, t: float, params: Any) -> CutDiagram:
-    """Return a diagram, compiled, with its delays cut."""
-    checked_params(params)
-    return CutDiagram(_WHO, as_compiled(system, params), number(_WHO, "t", t), params)
-
-
 def _with_short_names(named: dict[str, Any], aliases: Mapping[str, Any]) -> dict[str, Any]:
     """Return arguments by their full names."""
     for name, value in aliases.items():
@@ -292,7 +286,8 @@ def _asked(cut: CutDiagram, named: Mapping[str, Any]) -> _Asked:
     return _Asked(
         x=state_array(system, named["initial_state"]),
         u=cut.inputs(_WHO, "inputs", named["inputs"]),
-        y=_vector("outputs", y, cut.noutputs), dx=_vector("derivs", named["derivs"], cut.n),
+        y=point_numbers(f"{_WHO} needs", cut.noutputs, "outputs", y),
+        dx=point_numbers(f"{_WHO} needs", cut.n, "derivs", named["derivs"]),
         states=np.setdiff1d(np.arange(cut.n), ix), inputs=np.setdiff1d(np.arange(cut.m), iu),
         rates=idx, outputs=iy,
     )  # fmt: skip
@@ -317,16 +312,6 @@ def _place(kind: str, each: Any, names: Sequence[str]) -> int:
             f"{_WHO} got {each} for the place of an {kind}: there are {len(names)}, from 0 on"
         )
     return int(each)
-
-
-def _vector(name: str, given: Any, size: int) -> np.ndarray:
-    if given is None:
-        return np.zeros(size)
-    array = as_numbers(given)
-    array = np.full(size, float(array)) if array is not None and array.ndim == 0 else array
-    if array is None or array.shape != (size,) or not np.isfinite(array).all():
-        raise ParameterError(f"{_WHO} needs {counted(size, 'finite number')} for {name}")
-    return array.astype(float)
 
 
 def _equations(cut: CutDiagram, asked: _Asked) -> tuple[Callable[..., Any], Callable[..., Any]]:
@@ -418,12 +403,6 @@ def _sharpened(residual: Any, slope: Any, z: np.ndarray) -> np.ndarray:
             break
         z, size = further, smaller
     return z
-
-
-def _tolerance(cut: CutDiagram, point: OperatingPoint) -> float:
-    """Return the residual up to which a point counts as found."""
-    x, u = point.states, point.inputs
-    return _FOUND * (1.0 + max(np.abs(x).max(initial=0.0), np.abs(u).max(initial=0.0)))
 
 
 def _kinks(cut: CutDiagram, x: np.ndarray, u: np.ndarray, w: np.ndarray) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from .audit import Audit, Trial
 from .audit import audit as compare
 from .chattering.place import chattering_words
 from .compiled import Compiled, with_watched
-from .driver import trajectory
+from .driver import Course, trajectory
 from .integrate.state import Status
 from .own_errors import own_error
 from .reading import Resolved
@@ -49,17 +49,15 @@ def respond(
     compiled = with_watched(compiled, (*watched, *nan_watchers(watched)), params)
     evaluated = evaluation_array(evaluation_times, times)
     u, resolved = input_array(system, inputs, times), compiled.resolved(params)
-    x0 = (
-        resolved.initial_state.copy()
-        if initial_state is None
-        else state_array(system, initial_state)
-    )
+    own = initial_state is None
+    x0 = resolved.initial_state.copy() if own else state_array(system, initial_state)
     grid = times if evaluated is times else _grid(system, times, evaluated)
     if grid is not times:
         u = interpolated(u, times, grid)
     p = resolved.p
     check_numbers(watched, (float(grid[0]), x0, u[:, 0]), params)
-    reached = trajectory(compiled, grid, u, x0, p, settings, progress)
+    course = Course(compiled=compiled, times=grid, inputs=u, settings=settings)
+    reached = trajectory(course, x0, p, progress)
     trial = Trial(
         time=reached.time, states=reached.states, inputs=reached.inputs, p=p, params=params, width=1
     )

@@ -7,48 +7,30 @@ from typing import Any
 
 import numpy as np
 
+from ..attributes import described_record
 from ..responses.event_log import NO_EVENTS, EventLog
-from .chattering.detection import Jump
+from .chattering.steps import Jump
 from .integrate.state import Status
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Statistics:
-    """What a run took.
+    """What a run took."""
 
-    Attributes
-    ----------
-    status : Status
-    time : float
-        Time that was reached (s).
-    accepted, rejected : int
-        Steps of the integrator; steps tried to locate events count as rejected.
-    events : int
-        What has happened: as many as there are rows in the ``events`` of a single run's response.
-        Guards that have fallen, switching functions and conditions of the equations that have
-        changed their signs, and conditions of t alone.
-    stiff : bool
-        Whether the run ended with the stiff method.
-    jump : Jump or None
-        Where it chatters, of a run that ended as CHATTERING.
-    conditions : int
-        Conditions of the equations that were located, guards included.
-    opaque : bool
-        Whether a function was called as it stands: nobody knows of its conditions.
-    turns : int
-        Steps that were ended where a memory turns or jumps, and nothing else happens: they are no
-        events.
-    """
-
-    status: Status
-    time: float
+    status: Status  # How it has ended.
+    time: float  # Time that was reached (s).
+    # Steps of the integrator; steps tried to locate events count as rejected.
     accepted: int
     rejected: int
+    # What has happened: as many as there are rows in the ``events`` of a single run's response.
+    # Guards that have fallen, switching functions and conditions of the equations that have
+    # changed their signs, and conditions of t alone.
     events: int = 0
-    stiff: bool = False
-    jump: Jump | None = None
-    conditions: int = 0
-    opaque: bool = False
+    stiff: bool = False  # Whether the run ended with the stiff method.
+    jump: Jump | None = None  # Where it chatters, of a run that ended as CHATTERING.
+    conditions: int = 0  # Conditions of the equations that were located, guards included.
+    opaque: bool = False  # Whether a function was called unchanged: its conditions are not known.
+    # Steps that were ended where a memory turns or jumps, and nothing else happens: no events.
     turns: int = 0
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .along import Along
-from .chattering.detection import Jump
+from .chattering.steps import Jump
 from .machine.evaluations import Machine
 from .spare import Spare
 

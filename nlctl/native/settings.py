@@ -60,11 +60,8 @@ class Settings:
     @property
     def pair(self) -> Tableau:
         """The explicit pair that is used, alone or in turn with the stiff method."""
-        return (
-            self.method
-            if isinstance(self.method, Tableau)
-            else EXPLICIT_PAIRS.get(self.method, TSIT5)
-        )
+        own = self.method
+        return own if isinstance(own, Tableau) else EXPLICIT_PAIRS.get(own, TSIT5)
 
     def __post_init__(self) -> None:
         if not isinstance(self.method, Tableau) and self.method not in METHODS:
@@ -106,5 +103,10 @@ def solver_settings(
             )
         if name not in ("rtol", "atol"):
             raise unknown("keyword", name, ["rtol", "atol", *_REFUSED], "in solve_ivp_kwargs")
-    given = {name: value for name, value in settings.items() if value is not None}
-    return Settings(**given | keywords, method="auto" if method is None else method)
+    return settings_of(method, **settings | keywords)
+
+
+def settings_of(method: str | Tableau | None, **given: Any) -> Settings:
+    """Return settings, the usual ones where None is given."""
+    chosen = {name: value for name, value in given.items() if value is not None}
+    return Settings(**chosen, method="auto" if method is None else method)

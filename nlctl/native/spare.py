@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from .integrate.state import new_lanes
 from .integrate.workspace import Work, new_work
 
 _MOST = 2**20  # bytes of a workspace that is kept until the next run
-_THREADS = 4  # runs at the same time whose workspaces are kept
+_KEPT = 4  # workspaces: of threads, and of runs with other times or methods in turn
 
 
 class Spare(NamedTuple):
@@ -27,11 +28,8 @@ class Spare(NamedTuple):
 def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> Spare:
     """Return the workspace of a run, see `new_work`: that of a run that is over, if it fits."""
     sizes = (x0.shape, times.size, *sizes)
-    try:
-        spare = cache.of(Spare).pop()
-    except IndexError:  # there is none, or another thread has just taken it
-        spare = None
-    if spare is None or spare.sizes != sizes:
+    spare = _fitting(cache.of(Spare), sizes)
+    if spare is None:
         work = new_work(x0, times, *sizes[2:])
         arrays = tuple(array for array in _arrays(work) if array.size)
         return Spare(sizes, work, arrays, sum(array.nbytes for array in arrays) <= _MOST)
@@ -44,11 +42,23 @@ def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> S
     return spare
 
 
+def _fitting(kept: list[Spare], sizes: tuple[Any, ...]) -> Spare | None:
+    """Take the workspace of these sizes, if one is kept."""
+    with suppress(IndexError):  # another thread has just taken the last
+        for _ in range(len(kept)):
+            spare = kept.pop(0)
+            if spare.sizes == sizes:
+                return spare
+            kept.append(spare)
+    return None
+
+
 def give_back(cache: Cache, spare: Spare) -> None:
     """Keep the workspace of a run that is over, and of which nothing is read any more."""
     kept = cache.of(Spare)
-    if spare.is_small and len(kept) < _THREADS:
+    if spare.is_small:
         kept.append(spare)
+        del kept[:-_KEPT]  # those that have not been asked for
 
 
 def _arrays(record: Any) -> Iterator[np.ndarray]:

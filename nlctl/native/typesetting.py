@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import copy_context
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import control as ct
 import numpy as np
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..blocks import Block, supplied_of
 from ..diagrams import known_system, overridden
 from ..errors import CompileError
@@ -33,33 +34,19 @@ from .diagram.trace import feedthrough
 from .equations.reader import Reader
 
 _OWN = ("<string>", *(str(Path(__file__).parent.parent / p) for p in ("expressions", "native")))
+DERIVATIVE, NEXT_VALUE = r"\dot{{{}}}", "{}^{{+}}"  # of the letter of a state
 _RATE = ("a", "b")  # of the rate a + b v of an ideal relay's input
 WORTH = 12  # parts from which an expression that is used twice gets a letter
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="typeset")
 class BlockEquations:
-    """The equations of one block.
+    """The equations of one block."""
 
-    Attributes
-    ----------
-    block : str
-        Its name, with the diagrams around it.
-    equations : tuple of str
-        LaTeX: derivatives (or next values) of the states, then outputs.
-    where : tuple of str
-        LaTeX: what the symbols of these equations stand for.
-    inputs : tuple of str
-        LaTeX: what the inputs are connected to, where it is not a signal of the same name.
-
-    Examples
-    --------
-    See `typeset`.
-    """
-
-    block: str
-    equations: tuple[str, ...]
-    where: tuple[str, ...]
+    block: str  # Its name, with the diagrams around it.
+    equations: tuple[str, ...]  # LaTeX: derivatives (or next values) of the states, then outputs.
+    where: tuple[str, ...]  # LaTeX: what the symbols of these equations stand for.
+    # LaTeX: what the inputs are connected to, where it is not a signal of the same name.
     inputs: tuple[str, ...]
 
     @property
@@ -135,9 +122,9 @@ def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:
     leaf = _symbols(system, slots)
     writer = LatexWriter(leaf=leaf, known=_known(found, names, leaf))
     next_value = bool(node.sampled and node.sampled.euler) or not ct.isctime(system)
-    derivative = _next if next_value else _dotted
+    form = NEXT_VALUE if next_value else DERIVATIVE
     lines = [
-        *_lines(writer, found["x"], [derivative(s) for s in _names(system.state_labels)]),
+        *_lines(writer, found["x"], [changing(s, form) for s in _names(system.state_labels)]),
         *_lines(writer, found["y"], _names(system.output_labels[: found["y"].size])),
     ]
     return BlockEquations(
@@ -166,16 +153,10 @@ def _euler(reader: Reader, sampled: Any, slots: dict[str, Slot], values: bool) -
     return leaf_vector(reader.graph, "x", 0, (rates.size,)) + step * rates
 
 
-def _dotted(name: str) -> str:
-    """Return the symbol of a derivative: the dot stands on the letter, not on its index."""
-    head, _, index = name.partition("_")
-    return rf"\dot{{{head}}}_{index}" if index else rf"\dot{{{head}}}"
-
-
-def _next(name: str) -> str:
-    """Return the symbol of a next value: the sign stands on the letter, in front of its index."""
-    head, _, index = name.partition("_")
-    return rf"{head}^{{+}}_{index}" if index else rf"{head}^{{+}}"
+def changing(name: str, form: str) -> str:
+    """Return the symbol of a derivative or next value: the mark is its letter's."""
+    head, mark, index = name.partition("_")
+    return form.format(head) + mark + index
 
 
 def _says_nothing(line: str) -> bool:
@@ -190,7 +171,7 @@ def _names(labels: list[str]) -> list[str]:
 def _lines(writer: LatexWriter, array: Tracer, names: list[str]) -> Iterator[str]:
     """Yield an equation per number, and one per vector."""
     at = 0
-    for expr, size in _split(array):
+    for expr, size in (part for whole in array.pieces() for part in _pieces(*whole)):
         if size == 1 or not expr.size:
             for k in range(at, at + size):
                 yield f"{names[k]} = {writer.formula(expr, by_name=False)}"
@@ -199,11 +180,6 @@ def _lines(writer: LatexWriter, array: Tracer, names: list[str]) -> Iterator[str
             right = writer.formula(expr, (1 - first, 1, "i"), by_name=False)
             yield rf"{vector('i')} = {right}, \quad i = {first}, \dots, {first + size - 1}"
         at += size
-
-
-def _split(array: Tracer) -> Iterator[tuple[Expr, int]]:
-    for expr, size in array.pieces():
-        yield from _pieces(expr, size)
 
 
 def _pieces(expr: Expr, size: int) -> Iterator[tuple[Expr, int]]:

@@ -78,10 +78,7 @@ def with_aliases(
 
 
 def unified(run: RunArguments) -> RunArguments:
-    """Return a run with each of SciPy's arguments in one place.
-
-    ``solve_ivp_kwargs`` may hold ``method`` and ``t_eval``, which are arguments as well.
-    """
+    """Return a run with each of SciPy's arguments in one place, those in solve_ivp_kwargs too."""
     keywords, solver = run.solver["solve_ivp_kwargs"] or {}, dict(run.solver)
     if not isinstance(keywords, Mapping):
         raise ParameterError(f"solve_ivp_kwargs needs a mapping, got {keywords!r}")
@@ -100,10 +97,7 @@ def unified(run: RunArguments) -> RunArguments:
 
 
 def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) -> np.ndarray:
-    """Return the inputs of a run over its times.
-
-    Shapes: `times` (m,); returns (ninputs, m).
-    """
+    """Return the inputs of a run over its m times, of shape (ninputs, m)."""
     count = system.ninputs or 0
     shape = (count, times.size)
     array = as_numbers(inputs)
@@ -117,7 +111,7 @@ def input_array(system: ct.InputOutputSystem, inputs: Any, times: np.ndarray) ->
         raise ParameterError(f"inputs need real numbers, got {_short(inputs)}")
     if array.shape != shape:
         raise ParameterError(f"inputs need shape {shape} for these times, got {array.shape}")
-    for i, k in np.argwhere(~np.isfinite(array))[:1]:
+    for i, k in () if np.isfinite(array).all() else np.argwhere(~np.isfinite(array))[:1]:
         raise ParameterError(
             f"inputs has {array[i, k]} at '{system.input_labels[i]}', t = {times[k]:g} s: "
             "every input needs a finite number at every time"
@@ -145,10 +139,7 @@ def _stacked(entries: Sequence[Any], samples: int) -> np.ndarray:
 
 
 def state_array(system: ct.InputOutputSystem, initial_state: Any = None) -> np.ndarray:
-    """Return the initial state of a run.
-
-    returns (nstates,).
-    """
+    """Return the initial state of a run, of shape (nstates,)."""
     if initial_state is None or isinstance(initial_state, Mapping):
         return state_of(system, initial_state)
     size = system.nstates or 0
@@ -195,11 +186,8 @@ def evaluation_array(evaluation_times: Any, times: np.ndarray) -> np.ndarray:
 
 
 def held(times: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and inputs, linear in between, that step at each of the given times.
-
-    The value before lasts until the float before the time: no run has an instant between the two.
-    Shapes: `times` (m,), `inputs` (ninputs, m); returns (2 m - 1,) and (ninputs, 2 m - 1).
-    """
+    """Return 2 m - 1 times and inputs, linear in between, that step at each of m times."""
+    # The value before lasts until the float before the time: no run has an instant between the two.
     steps, u = np.empty(2 * times.size - 1), np.repeat(inputs, 2, axis=1)
     steps[::2], steps[1::2] = times, np.nextafter(times[1:], -np.inf)
     return steps, np.ascontiguousarray(u[:, :-1])

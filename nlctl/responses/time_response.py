@@ -142,16 +142,14 @@ class Response(ct.TimeResponseData):
     def _plot_rows(self, wanted: Sequence[str | Sequence[str]] | None) -> Any:
         import matplotlib.pyplot as plt
 
+        from ..plotting.axes import control_plot
         from ..plotting.signals import rows_figure
 
         signals, rows = self.rows(wanted)
         figure, axes = rows_figure(self.time, signals, rows, plt.figure(layout="constrained"))
         figure.set_label(_BY_KIND)
         figure.suptitle(self.title or "", fontsize="medium")
-        lines = np.empty((len(axes), 1), dtype=object)
-        for k, ax in enumerate(axes):
-            lines[k, 0] = list(ax.lines)
-        return ct.ControlPlot(lines, np.array(axes)[:, None], figure)
+        return control_plot(figure, axes)
 
     def __repr__(self) -> str:
         t, run = np.atleast_1d(self.time), self.statistics

@@ -10,18 +10,6 @@ import numpy as np
 
 from ..errors import DivergedError, ParameterError
 
-__all__ = [
-    "Watched",
-    "WatchedEvents",
-    "check_moves",
-    "check_numbers",
-    "nan_error",
-    "nan_watchers",
-    "not_a_number",
-    "watched_functions",
-    "watches_nan",
-]  # fmt: skip
-
 EventFunction = Callable[..., Any]  # (t, x, u, params) -> a number
 WatchedEvents = EventFunction | Sequence[EventFunction] | Mapping[str, EventFunction]
 

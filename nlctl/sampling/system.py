@@ -27,9 +27,8 @@ from ..upstream.control_internals import (
 )
 from ..upstream.systems import System
 from .clock import Clock, Moment
-from .discretised import discretise, with_equations
+from .discretised import discretise, rebuilt, staged, with_equations
 from .parameters import Sampling
-from .rebuilt import rebuilt, staged
 
 Happening = frozenset[Moment]
 _MOST_WAITING = 10_000  # samples, each a state of its own

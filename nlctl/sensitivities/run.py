@@ -14,8 +14,7 @@ from ..errors import CompileError, InexactWarning
 from ..expressions.evaluate import evaluate_expressions
 from ..native import Compiled
 from ..native.audit import Trial, audit
-from ..native.driver import begin, prepared, trajectory
-from ..native.histories import variations
+from ..native.driver import Course, begin, prepared, trajectory
 from ..native.integrate.state import Status
 from ..native.jacobians import inexact, searches_of
 from ..native.response import respond
@@ -62,7 +61,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     span = float(run.times[-1] - run.times[0])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
-    integrated = trajectory(differentiated.compiled, run.times, u, start, whole, run.settings)
+    integrated = trajectory(_course(differentiated, run, u), start, whole)
     _audit(compiled, integrated, p, run)
     if integrated.statistics.status not in (Status.OK, Status.ZENO, Status.CHATTERING):
         respond(
@@ -140,6 +139,12 @@ def _start(
     return start, arrays
 
 
+def _course(differentiated: Differentiated, run: RunWithDerivatives, u: np.ndarray) -> Course:
+    """Return the run of a diagram with its derivatives."""
+    settings = run.settings
+    return Course(compiled=differentiated.compiled, times=run.times, inputs=u, settings=settings)
+
+
 def _beginning(
     differentiated: Differentiated,
     run: RunWithDerivatives,
@@ -148,8 +153,7 @@ def _beginning(
     p: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Return what a run begins with, behind all that happens at once."""
-    compiled, varied = differentiated.compiled, variations(differentiated.compiled, run.times)
-    first = prepared(compiled, run.times, u, start[:, None], p[:, None], run.settings, varied)
+    first = prepared(_course(differentiated, run, u), start[:, None], p[:, None])
     with np.errstate(all="ignore"):
         begin(first)
     work = first.work

@@ -101,7 +101,7 @@ def test_an_option_of_a_loop_is_refused_for_a_study(tmp_path):
 
 def test_a_terminal_has_a_bar_and_a_file_has_lines(monkeypatch):
     """What is quick leaves nothing in a file."""
-    from nlctl.analysis.cli.terminal import progress_bar
+    from nlctl.analysis.cli.progress import progress_bar
 
     written = io.StringIO()
     monkeypatch.setattr("sys.stderr", written)

@@ -155,9 +155,9 @@ def test_a_veteran_finds_python_controls_habits(tmp_path):
 def test_progress_is_on_stderr_where_it_is_redirected():
     """Lines after two seconds and then every ten, with what is done; none of what is quick."""
     code = (
-        "import time\nfrom nlctl.analysis.cli import progress_lines as lines\n"
+        "import time\nfrom nlctl.analysis.cli import progress as lines\n"
         "lines.FIRST_LINE, lines.NEXT_LINE = 0.05, 0.1\n"
-        "from nlctl.analysis.cli.terminal import progress_bar\n"
+        "from nlctl.analysis.cli.progress import progress_bar\n"
         "with progress_bar('long', 4) as advance:\n"
         "    advance(1)\n    time.sleep(0.3)\n"
         "with progress_bar('short', 4) as advance:\n    advance(4)\n"

@@ -17,7 +17,7 @@ from nlctl.analysis.report.document import Equation
 from nlctl.analysis.report.mathml import mathml
 from nlctl.errors import UsageError
 from nlctl.expressions.latex import number_text, symbol
-from nlctl.native.typesetting import _dotted
+from nlctl.native.typesetting import DERIVATIVE, changing
 
 
 def test_symbols():
@@ -102,7 +102,8 @@ def judged(system, t, x, u):
     except (ValueError, ArithmeticError, AssertionError):  # it has a formula all the same
         return 0
     found = values(made.equations, made.where, scalars(system, t, x, u))
-    wanted = {_dotted(symbol(n)): v for n, v in zip(system.state_labels, dx, strict=True)}
+    dots = [changing(symbol(label), DERIVATIVE) for label in system.state_labels]
+    wanted = dict(zip(dots, dx, strict=True))
     wanted |= {symbol(n): v for n, v in zip(system.output_labels, y, strict=True)}
     for name, value in found.items():
         assert value == pytest.approx(wanted[name], rel=1e-12, abs=1e-12, nan_ok=True), (

@@ -8,7 +8,7 @@ import nlctl
 from nlctl.errors import AuditError
 from nlctl.expressions.arrays import concatenated
 from nlctl.native.diagram.program import count_switching_functions
-from nlctl.native.equations import watched
+from nlctl.native.equations import blocks as read_blocks
 from nlctl.native.equations.reader import Reader
 
 TIMES = np.linspace(0, 0.4, 5)
@@ -75,8 +75,8 @@ def scaled(kind, what):
 
 
 def scaled_watched(patch):
-    right = watched.trace
-    patch.setattr(watched, "trace", lambda *given: 1.01 * right(*given))
+    right = read_blocks.trace
+    patch.setattr(read_blocks, "trace", lambda *given: 1.01 * right(*given))
 
 
 def declared(node, found):

@@ -29,8 +29,7 @@ from nlctl.native.machine import finish, store
 from nlctl.native.machine.calls import loaded
 from nlctl.native.machine.fingerprint import function_key, module_key, program_key
 from nlctl.native.machine.machine_code import Wanted, kept, machine_code
-from nlctl.native.opaque.called import TAUGHT
-from nlctl.native.opaque.calls import Source
+from nlctl.native.opaque.called import TAUGHT, Source
 
 PACKAGE = Path(nlctl.__file__).parent
 REAL = numba.float64(numba.float64)
@@ -530,7 +529,7 @@ class TestSources:
     def test_an_edit_of_a_code_generator(self, tmp_path):
         """Machine code of programs: nothing in them names what generates it."""
         first = "from __future__ import annotations\n"
-        edits = {"purity/vectors.py": (first, f"{first}\nEDITED = True\n")}
+        edits = {"purity/dicts.py": (first, f"{first}\nEDITED = True\n")}
         integrators, taught = keys_of_copy(tmp_path, edits)
         assert integrators == integrator_key()
         assert taught != module_key(*TAUGHT)

@@ -14,20 +14,18 @@ from tuning import evolved_gains
 import nlctl
 from nlctl.analysis.metrics import Metric, absolute_integral, peak
 from nlctl.analysis.paper.page.rivals import rivals_section
-from nlctl.analysis.paper.rival_record import (
-    RIVAL_ACTUATORS,
-    RIVALS_RECORD,
-    beaten_by,
-    checked_rivals,
-    rivals_study,
-)
 from nlctl.analysis.paper.rivals import (
     KNOWLEDGE,
+    RIVAL_ACTUATORS,
     RIVAL_GAINS,
+    RIVALS_RECORD,
+    beaten_by,
     behind,
+    checked_rivals,
     rival_actuators,
     rival_controllers,
     rival_loop,
+    rivals_study,
 )
 from nlctl.analysis.report.document import Table
 from nlctl.analysis.studies import read_study, run, shipped

@@ -66,7 +66,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["enclosures", "jacobians"],
         ["describe"],
         ["compiled"],
-        ["cut_delays", "ensemble_result", "integrate", "linearized", "members"],
+        ["cut_delays", "ensemble_result", "integrate", "members"],
         ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"]
         + ["spare"],
         ["chattering", "known", "ship"],
@@ -83,7 +83,6 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["arrays", "operators", "masked", "indexing", "edges"],
         [
             "conditions",
-            "continuity",
             "dependence",
             "evaluate",
             "latex",

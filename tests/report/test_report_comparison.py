@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from nlctl.analysis.pages.compared import Compared, comparison_page
 from nlctl.analysis.report import Claim, Figure, History, Report, Section, Table, write_report
-from nlctl.analysis.report.changes import Curves, claim_changes, curves_of
+from nlctl.analysis.report.changes import Curves, claim_changes, curves_of, drawings
 from nlctl.analysis.report.compare import read_report
-from nlctl.analysis.report.drawings import drawings
 
 T = np.linspace(0, 6, 301)
 

@@ -10,9 +10,9 @@ from fontTools.ttLib import TTFont
 from rows import each_row
 
 import nlctl
+from nlctl.analysis.pages.diagram import equations_of
 from nlctl.analysis.paper.page import text as text
 from nlctl.analysis.report import Equation
-from nlctl.analysis.report.equations import equations_of
 from nlctl.analysis.report.mathml import (
     ATTRIBUTES,
     CHARACTERS,

@@ -20,7 +20,6 @@ from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
-from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
@@ -229,8 +228,6 @@ def barrier(
     max_boxes = integer("barrier", "max_boxes", max_boxes, at_least=1)
     unsafe = [unsafe] if isinstance(unsafe, Box) or callable(unsafe) else list(unsafe)
     _check_boxes(box, start, unsafe)
-    if is_jit_disabled():
-        raise ParameterError("barrier needs machine code: unset NUMBA_DISABLE_JIT")
     begun = time.perf_counter()
     whole = not np.isfinite(box.cell).any()
     motion = motion_of("barrier", system, box, params, is_finite=not whole)

@@ -13,13 +13,14 @@ import numpy as np
 from nlctl import native
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
-from nlctl.expressions.continuity import may_jump
+from nlctl.expressions.dependence import may_jump
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.compiled import Compiled
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of
 from nlctl.native.enclosures.rates import state_rates, with_leaves
+from nlctl.upstream.numba_internals import is_jit_disabled
 
 from ...intervals.box import Box
 
@@ -80,7 +81,9 @@ def motion_of(
     *,
     is_finite: bool = True,
 ) -> StateRates:
-    """Return the rates of a diagram or of a function as expressions."""
+    """Return the rates of a diagram or of a function as expressions, for machine code."""
+    if is_jit_disabled():
+        raise ParameterError(f"{who} needs machine code: unset NUMBA_DISABLE_JIT")
     try:
         if isinstance(system, ct.InputOutputSystem | Compiled):
             compiled = system if isinstance(system, Compiled) else native.compile(system)

@@ -17,7 +17,6 @@ from nlctl.errors import ParameterError
 from nlctl.expressions.graph import Untraceable
 from nlctl.native.tubes.series import SeriesCode, series_code
 from nlctl.native.tubes.tube import LEAVES, MUST_LEAVE, REACHED, Tube, tube_from
-from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
@@ -157,8 +156,6 @@ def reachable_set(
         max_seconds = number(who, "max_seconds", max_seconds, above=0)
     if not 0 < horizon < np.inf:
         raise ParameterError(f"reachable_set needs 0 < horizon < inf, got {horizon:g}")
-    if is_jit_disabled():
-        raise ParameterError("reachable_set needs machine code: unset NUMBA_DISABLE_JIT")
     begun = time.perf_counter()
     motion = motion_of(who, system, start, params)
     try:

@@ -13,7 +13,6 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.upstream.numba_internals import is_jit_disabled
 from nlctl.wording import counted
 
 from ...intervals.box import Box
@@ -140,8 +139,6 @@ def region_of_attraction(
     max_boxes = integer("region_of_attraction", "max_boxes", max_boxes, at_least=1)
     if not 0 < tol < 1:
         raise ParameterError(f"region_of_attraction needs 0 < tol < 1, got {tol}")
-    if is_jit_disabled():
-        raise ParameterError("region_of_attraction needs machine code: unset NUMBA_DISABLE_JIT")
     start = time.perf_counter()
     motion = motion_of("region_of_attraction", system, box, params)
     point = _equilibrium(motion, at, box)

@@ -74,6 +74,10 @@ class CheckedLoop:
     # the loop, connected again by name, with all its signals as outputs
     understood: ct.InterconnectedSystem = field(repr=False)
 
+    def spec(self, part: str) -> Any:
+        """Return the record of a part, with the parameters of the run."""
+        return self.roles.spec(part)
+
     def start(self, part: str) -> Sides:
         """Return the ends of the initial states of a part."""
         place = self.roles.places[part]

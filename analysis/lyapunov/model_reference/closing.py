@@ -49,7 +49,7 @@ _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
     read = read_model_reference(loop, options.params, options.inputs, options.starts)
     split = disturbed(_split(read, options), read.disturbance)
-    match = matching(read, split, _checked_weights(options.W, len(read.W_hat_0)))
+    match = matching(read, split, _checked_weights(options.W, len(read.start("weights"))))
     if not outside_ball(match):
         check_decrease(loop, match, options.params)
     return Subject(

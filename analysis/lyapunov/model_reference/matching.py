@@ -56,15 +56,15 @@ class Matching:
     def V_0(self) -> Fraction:  # noqa: N802
         """The largest V = E^T P E + lambda |W_hat - W|^2 / Gamma of the starts, exactly."""
         loop, level = self.loop, self.loop.starts.level
-        if not np.all(np.isfinite([*loop.x_0, *loop.W_hat_0])):
+        if not np.all(np.isfinite([*loop.start("plant"), *loop.start("weights")])):
             assert level is not None
             return exact(level)
         E = [
             (exact(x[0]) - exact(xm[1]), exact(x[1]) - exact(xm[0]))
-            for x, xm in zip(loop.x_0, loop.xm_0, strict=True)
+            for x, xm in zip(loop.start("plant"), loop.start("model"), strict=True)
         ]
         value = loop.form.largest(E)
-        ends = zip(loop.W_hat_0, self.W, strict=True)
+        ends = zip(loop.start("weights"), self.W, strict=True)
         error = sum((max((exact(w) - W) ** 2 for w in side) for side, W in ends), Fraction(0))
         largest = Fraction(int(value.p), int(value.q)) + error / self.Gamma
         return largest if level is None else min(largest, exact(level))
@@ -72,8 +72,8 @@ class Matching:
     @property
     def weights_at_start(self) -> arb:
         """A bound of |W_hat(0)|."""
-        if np.all(np.isfinite(self.loop.W_hat_0)):
-            largest = (max(abs(exact(w)) for w in side) for side in self.loop.W_hat_0)
+        if np.all(np.isfinite(self.loop.start("weights"))):
+            largest = (max(abs(exact(w)) for w in side) for side in self.loop.start("weights"))
             return ball(sum((w * w for w in largest), Fraction(0))).sqrt()
         return (ball(self.V_0 * self.Gamma)).sqrt() + ball(self.W_squared).sqrt()
 

@@ -31,9 +31,8 @@ from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose
 from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
-from ..bounds.starts import Sides, Starts
-from ..loop.checked import read_checked
-from ..loop.content import LoopContent
+from ..bounds.starts import Sides
+from ..loop.checked import CheckedLoop, read_checked
 from ..loop.plant_form import Acceleration, acceleration, on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
@@ -60,36 +59,19 @@ Regressor = Callable[[Mapping[str, Any]], list[Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelReferenceLoop:
-    """The records of a loop of model reference adaptive control, and where it starts."""
+class ModelReferenceLoop(CheckedLoop):
+    """A loop of model reference adaptive control; its pieces are `ADAPTIVE_PIECES`."""
 
-    # places of the blocks: "reference", "plant", "actuator", "model", "error", "basis",
-    # "weights", "law"
-    roles: Roles
     order: int  # order n of the plant and of the model
     # E^T P E of the error, with the P of the loop's own r = b^T P E, and one of the model
     form: QuadraticForm
     model_form: QuadraticForm
     command: float  # proved bound of |yd| for all time
-    starts: Starts  # initial states
-    # ends of the initial states of plant, model and weights; where V(0) bounds those of plant
-    # and weights they may be infinite
-    x_0: Sides
-    xm_0: Sides
-    W_hat_0: Sides
     # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
     acceleration: Acceleration
     # the basis block's own psi_0, psi_1, ... where t, x1, ..., xm1, ..., yd have these
     # values.
     regressor: Regressor = field(repr=False)
-    disturbance: float  # bound of what external inputs add to the plant's v
-    # the loop, connected again by name, with all its signals as outputs
-    understood: ct.InterconnectedSystem = field(repr=False)
-    content: LoopContent = field(repr=False)  # what the loop consists of
-
-    def spec(self, part: str) -> Any:
-        """Return the record of a part, with the parameters of the run."""
-        return self.roles.spec(part)
 
     @property
     def own_feedback(self) -> bool:
@@ -123,20 +105,13 @@ def read_model_reference(
     own_P[:, -1] = current_parameters(roles.places["error"].system).P_b
     P_of_model = lyapunov_matrix(model.a, (1.0,) * order)
     return ModelReferenceLoop(
-        roles=roles,
+        **vars(read),
         order=order,
         form=quadratic_form(roles.paths["error"], error.K, own_P),
         model_form=quadratic_form(roles.paths["model"], model.a, P_of_model),
         command=_bound_of_command(roles.places["reference"], read.start("reference")),
-        starts=read.starts,
-        x_0=read.start("plant"),
-        xm_0=read.start("model"),
-        W_hat_0=read.start("weights"),
         acceleration=acceleration(roles.places["plant"]),
         regressor=_regressor(roles.places["basis"], order),
-        disturbance=read.disturbance,
-        understood=read.understood,
-        content=read.content,
     )
 
 

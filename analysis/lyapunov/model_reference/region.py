@@ -47,7 +47,7 @@ def model_reach(match: Matching) -> arb:
     """Return the level that xm^T P xm does not leave: the command drives the model."""
     loop = match.loop
     drive = ball(abs(exact(loop.spec("model").b))) * loop.command
-    sides = [(exact(low), exact(high)) for low, high in loop.xm_0]
+    sides = [(exact(low), exact(high)) for low, high in loop.start("model")]
     return ball(loop.model_form.largest(sides)).max(loop.model_form.driven(drive))
 
 

@@ -14,6 +14,7 @@ lasts from below.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,13 @@ def signal(response: Any, name: str) -> np.ndarray:
         lost = float(np.asarray(response.time)[~np.isfinite(values)][0])
         raise ParameterError(f"{name} is not finite at t = {lost:g} s: end the response before")
     return values
+
+
+def as_response_of(time: np.ndarray, signals: Any, end: float = np.inf) -> Any:
+    """Return zeta, r and u up to a time as `drift` and `slow_drift` read a response."""
+    names, until = ["zeta", "r", "u"], time <= end + 1e-9
+    outputs = np.array([signals[name][until] for name in names])
+    return SimpleNamespace(time=time[until], outputs=outputs, output_labels=names)
 
 
 @as_annotated

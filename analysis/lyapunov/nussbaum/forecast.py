@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from nlctl import functions
 from nlctl.errors import ParameterError
 
+from .energy import as_response_of
 from .property import lobe_around
 from .slow_drift import slow_drift
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Samples:
-    """What `slow_drift` reads of a response."""
-
-    time: np.ndarray
-    outputs: np.ndarray
-    output_labels = ("zeta", "r", "u")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +80,7 @@ class BurstForecast:
         beyond = np.flatnonzero(zeta >= lobe.high)
         if beyond.size:
             return float(t[beyond[0]])
-        run: Any = _Samples(time=t, outputs=np.array([zeta, r, u]))
+        run = as_response_of(t, {"zeta": zeta, "r": r, "u": u})
         try:
             return float(slow_drift(run, self.N, window=self.window).burst)
         except ParameterError:

@@ -14,6 +14,7 @@ from nlctl.attributes import described_record
 from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
+from .energy import as_response_of
 from .property import Lobe, lobe_around
 from .slow_drift import SlowDrift, slow_drift
 
@@ -144,7 +145,7 @@ def long_run(
     whole = _watched(compiled, times, start, progress, settings)
     time, signals = whole.time, _signals(whole)
     predictions = tuple(
-        slow_drift(_Beginning(time, signals, look), N, window=window)
+        slow_drift(as_response_of(time, signals, look), N, window=window)
         for look, window in LOOKS.items()
         if look <= last
     )
@@ -203,12 +204,3 @@ class _Watch:
         if self.stands_still:
             raise KeyboardInterrupt
         self.reached = t
-
-
-class _Beginning:
-    """The beginning of a run, as `slow_drift` reads a response."""
-
-    def __init__(self, time: np.ndarray, signals: Mapping[str, np.ndarray], end: float) -> None:
-        until = time <= end + 1e-9
-        self.time, self.output_labels = time[until], list(LONG_RUN_SIGNALS)
-        self.outputs: Any = np.array([signals[name][until] for name in LONG_RUN_SIGNALS])

@@ -100,25 +100,17 @@ class SlowDrift:
     window: float  # Length of a window (s).
     rates: tuple[float, ...]  # Mean of A' over each window (1/s), the first windows left out.
     # Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
-    # reverses before; and the earliest and the latest time when mean rate and dependence on 1/|N|
-    # are moved by two standard errors each, and the time that is left by 5 % more. It is meant to
-    # hold the burst in nine of ten loops at least, and has done so in simulated ones
-    # (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue as
-    # they were.
+    # reverses before.
     burst: float
-    # Forecast of the time (s) at which the budget is spent, infinite where the drift stops or
-    # reverses before; and the earliest and the latest time when mean rate and dependence on 1/|N|
-    # are moved by two standard errors each, and the time that is left by 5 % more. It is meant to
+    # The earliest and the latest such time, when mean rate and dependence on 1/|N| are moved by two
+    # standard errors each, and the time that is left by 5 % more. The range is meant to
     # hold the burst in nine of ten loops at least, and has done so in simulated ones
     # (tests/lyapunov/test_slow_drift_forecast.py), as long as disturbance and reference continue as
     # they were.
     burst_range: tuple[float, float]
     balance: Balance  # The law fitted to all windows.
-    # zeta at which the balance stops the drift, and its range over fits with a part of the windows
-    # left out; None if it does not stop in this lobe.
-    rest: float | None
-    # zeta at which the balance stops the drift, and its range over fits with a part of the windows
-    # left out; None if it does not stop in this lobe.
+    rest: float | None  # zeta at which the balance stops the drift; None if not in this lobe.
+    # Its range over fits with a part of the windows left out; None likewise.
     rest_range: tuple[float, float] | None
     peak: float  # max |r| of the burst, sqrt(2 k G |int N|) over the next lobe.
     # Largest distance between int |N| dzeta and -int r u dt over the response, over the largest of

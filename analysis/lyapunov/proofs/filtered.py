@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -26,37 +26,30 @@ from ..bounds.decomposition import Decomposition
 from ..bounds.error_bounds import error_bounds, filter_poles, reference_bounds
 from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_function, range_of_quotient
-from ..bounds.starts import Starts
 from ..loop.checked import ADDED, CheckedLoop
-from ..loop.content import LoopContent
 from ..loop.plant_form import Acceleration, acceleration
-from ..loop.roles import Roles
 from .result import Certificate, Row, per_second, rows_of_split
 from .saved import Content, split_content, starts_content, texts
 
 
 @dataclass(frozen=True, kw_only=True)
-class FilteredLoop:
+class FilteredLoop(CheckedLoop):
     """A loop whose controller sees the plant through the filtered error r of (14)."""
 
-    roles: Roles = field(repr=False)
     reference: SumOfSines
-    starts: Starts  # initial states
     e0: tuple[arb, ...]  # initial errors e_1(0), ..., e_n(0): of all starts
     # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
     acceleration: Acceleration
-    content: LoopContent = field(repr=False)  # what the loop consists of
-    disturbance: float = 0.0  # bound of what external inputs add to the plant's v
 
     @property
     def law(self) -> Any:
         """The control law."""
-        return self.roles.spec("law")
+        return self.spec("law")
 
     @property
     def lambdas(self) -> tuple[float, ...]:
         """lambda_1, ..., lambda_{n-1} of the filtered error."""
-        return self.roles.spec("filtered_error").lambdas
+        return self.spec("filtered_error").lambdas
 
     @property
     def r_0(self) -> arb:
@@ -71,21 +64,16 @@ class FilteredLoop:
 
 def as_filtered(read: CheckedLoop) -> dict[str, Any]:
     """Return the fields of a `FilteredLoop`."""
-    plant = read.roles.places["plant"]
-    return {
-        "roles": read.roles,
-        "reference": read.roles.spec("reference"),
-        "starts": read.starts,
+    return vars(read) | {
+        "reference": read.spec("reference"),
         "e0": _initial_errors(read),
-        "acceleration": acceleration(plant),
-        "disturbance": read.disturbance,
-        "content": read.content,
+        "acceleration": acceleration(read.roles.places["plant"]),
     }
 
 
 def _initial_errors(read: CheckedLoop) -> tuple[arb, ...]:
     """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
-    reference = read.roles.spec("reference")
+    reference = read.spec("reference")
     yd = reference.output(0.0, (), (), equation_arguments(reference))
     # the radius covers what double precision has lost in yd(0)
     ends = zip(read.start("plant"), yd, strict=False)

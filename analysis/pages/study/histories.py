@@ -1,8 +1,8 @@
-"""Some rows of a study simulated again, with their signals kept: what its fans are drawn from."""
+"""The loop of a run made again, and some of its rows simulated again, with signals kept."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from nlctl.attributes import described_record
+from nlctl.errors import UsageError
 from nlctl.native import Status
 
 from ... import metrics
@@ -17,6 +18,9 @@ from ...figures import Limit
 from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
 from ...robustness.search.evaluation import as_table, margins_of
 from ...robustness.uncertainty.space import nominal
+from ...studies.result import Result
+from ...studies.run import reopened
+from ...studies.sealed import RunFolderError, as_written
 
 _MOST = 4  # signals
 IN_UNIT = (  # metrics whose unit is that of their signal
@@ -103,3 +107,38 @@ def _kept(
 def _signals(requirements: Sequence[Any]) -> list[str]:
     """Return the signals that the spec looks at, each once."""
     return list(dict.fromkeys(s for r in requirements for s in r.signals))[:_MOST]
+
+
+def loop_again(
+    result: Result, *, trust: bool = False, notify: Callable[[str], object]
+) -> Prepared | None:
+    """Return the loop of a run again; None if it has gone."""
+    try:
+        run = reopened(result.folder, trust=trust)
+    except RunFolderError:
+        raise
+    except UsageError as error:  # what was found is shown all the same
+        notify(f"the report has no fans and no diagram: {error}")
+        return None
+    if run.versions:
+        notify(
+            f"'{result.folder}' was computed with other versions ({run.versions}): fans are drawn "
+            "with those of today"
+        )
+    return run.prepared
+
+
+def rows_again(
+    result: Result, prepared: Prepared | None, threads: int | None = None
+) -> Histories | None:
+    """Simulate some rows of the main table again; None without rows or loop."""
+    if prepared is None or result.rows is None or not result.rows.done:
+        return None
+    with as_written(f"'{result.folder}'"):
+        witnesses = [
+            look(f)
+            for f in result.findings
+            if (look := result.asked[f.key].definition.witness) is not None and f.is_answered
+        ]
+    witness = min(witnesses, key=lambda pair: pair[1], default=None)
+    return histories(prepared, result.rows.table, witness, threads=threads)

@@ -21,11 +21,10 @@ from ...studies.result import LISTED, Result
 from ...studies.sealed import as_written
 from . import methods as how
 from . import text as text
-from .claims import claims, verdict
+from .claims import claims, traceability, verdict
 from .histories import Histories
 from .loop import Published, StudyLoop, loop_sections
 from .rows import fan_items, margin_items, row_items, setup_items
-from .traceability import traceability
 
 OUTCOMES = {  # by the light
     "pass": "shown",

@@ -18,10 +18,9 @@ from ...studies.page.tables import known
 from ...studies.page.text import clipped, margin_text, status_text, violate
 from ...studies.result import Result
 from . import text as text
-from .claims import refusal
+from .claims import has_ids, refusal
 from .histories import Histories
 from .loop import Published
-from .traceability import has_ids
 
 WORST = 10  # rows that are listed
 _PARTS = {0.5: "median", 0.95: "95 %", 1.0: "largest"}  # quantiles of the metrics

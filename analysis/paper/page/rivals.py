@@ -8,8 +8,7 @@ import pandas as pd
 
 from ...report.document import Paragraph, Section, Table
 from .. import TAIL
-from ..rival_record import RIVAL_ACTUATORS, beaten_by, failed_text
-from ..rivals import KNOWLEDGE
+from ..rivals import KNOWLEDGE, RIVAL_ACTUATORS, beaten_by, failed_text
 
 _TITLES = {"example_1": "Example 1", "example_2": "Example 2"}
 

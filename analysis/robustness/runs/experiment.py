@@ -104,6 +104,12 @@ class Prepared:
     # One for each combination of the choices.
     loops: tuple[tuple[Mapping[str, str], Compiled], ...]
 
+    @property
+    def nominal_loop(self) -> Compiled:
+        """The one with the nominal option of every choice."""
+        middle = {choice.name: choice.nominal for choice in self.experiment.space.choices}
+        return next(loop for labels, loop in self.loops if labels == middle)
+
 
 @as_annotated
 def prepare(experiment: Experiment) -> Prepared:

@@ -20,7 +20,7 @@ from nlctl.response import input_output_response
 from ...metrics import breaks_of
 from ..runs.experiment import Experiment, Prepared, by_diagram, evaluate
 from ..stl.spec import margins, unfinished_margin
-from ..uncertainty.space import arguments, checked_row
+from ..uncertainty.space import arguments_of_row, checked_row
 from .evaluation import as_table
 
 TIGHTER = 100.0  # tolerances are divided by this
@@ -118,7 +118,7 @@ def confirm(
             )
         )
     if python_control:
-        replays.append(_in_python_control(prepared, tighter, table))
+        replays.append(_in_python_control(prepared, tighter, row))
     table_of_replays = pd.DataFrame(replays)
     return Confirmation(row=dict(row), replays=table_of_replays, reason=_reason(table_of_replays))
 
@@ -138,10 +138,10 @@ def _replay(
 
 
 def _in_python_control(
-    prepared: Prepared, experiment: Experiment, table: pd.DataFrame
+    prepared: Prepared, experiment: Experiment, row: Mapping[str, Any]
 ) -> dict[str, Any]:
-    ((loop, _),) = by_diagram(prepared, table)
-    given = arguments(experiment.space, table)
+    ((loop, _),) = by_diagram(prepared, as_table(experiment.space, [row]))
+    given = arguments_of_row(experiment.space, row)
     end = float(experiment.timepts[-1])
     replay = partial(_replay, "python-control", experiment, method=_REFERENCE)
     try:
@@ -153,8 +153,8 @@ def _in_python_control(
             method=_REFERENCE,
             rtol=experiment.rtol,
             atol=experiment.atol,
-            initial_state={name: values[0] for name, values in given["initial_state"].items()},
-            params={name: values[0] for name, values in given["params"].items()},
+            initial_state=given["initial_state"],
+            params=given["params"],
         )
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)

@@ -17,10 +17,17 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
+from nlctl.annotations import as_annotated
+from nlctl.arguments import of_type
 from nlctl.attributes import described_record
+from nlctl.errors import AuditError, DivergedError, UsageError
+from nlctl.sensitivities import sensitivity_response
 
+from ..runs.experiment import Prepared, by_diagram
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
+from ..uncertainty.space import arguments_of_row, checked_row, ends
+from .evaluation import as_table
 
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
@@ -228,3 +235,78 @@ def _together(parts: list[_Atoms]) -> _Atoms:
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("signal", "k", "factor", "value")
     ))  # fmt: skip
+
+
+@as_annotated
+def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
+    """Simulate a row with the derivatives of all outputs by all quantities of its space.
+
+    Parameters
+    ----------
+    prepared : Prepared
+        The experiment, compiled: what `prepare` returns.
+    row : mapping
+        ``{name: value}``, a number or label for each name of the space.
+
+    Returns
+    -------
+    FirstOrder
+        What `worst_case` asks as ``derivatives=functools.partial(first_order, prepared)``.  Where
+        there is no derivative its `reason` says why.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        If the row lacks a quantity, has another one, or a number is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import nlctl
+    >>> from nlctl.analysis.robustness import (
+    ...     Experiment, Requirement, Space, Spec, Uncertain, always, first_order, in_band, prepare
+    ... )
+    >>> space = Space(quantities=(Uncertain(name="lag.T", bounds=(0.5, 1.5), nominal=1.0),))
+    >>> low = Requirement(key="low", formula=always(in_band("v", upper=0.9)), until=1.0)
+    >>> experiment = Experiment(
+    ...     space=space, build=lambda: nlctl.actuators.cascade({"lag": nlctl.Lag()}),
+    ...     spec=Spec(requirements=(low,)), timepts=np.linspace(0, 1, 101), inputs=1.0,
+    ... )
+    >>> made = first_order(prepare(experiment), {"lag.T": 1.0})
+    >>> print(round(made.derivatives["v"][-1, 0], 6), round(-np.exp(-1), 6))  # -exp(-1/T)/T^2
+    -0.367879 -0.367879
+    """
+    study = of_type("first_order", "prepared", prepared, Prepared, "prepare(experiment)").experiment
+    row = checked_row(study.space, row)
+    ((loop, _),) = by_diagram(prepared, as_table(study.space, [row]))
+    given = arguments_of_row(study.space, row)
+    names = [quantity.name for quantity in study.space.quantities]
+    try:
+        run = sensitivity_response(
+            loop, study.timepts, study.inputs, given["initial_state"] or None,
+            with_respect_to=names, params=given["params"],
+            rtol=study.rtol, atol=study.atol, max_steps=study.max_steps,
+            method="auto" if study.method == "taylor" else study.method,  # one that can have them
+        )  # fmt: skip
+    except AuditError:
+        raise
+    except (UsageError, DivergedError) as error:
+        return _none(prepared, str(error))
+    low, high = ends(study.space).to_numpy()
+    return FirstOrder(
+        t=run.time,
+        signals=dict(zip(run.signals, run.values, strict=True)),
+        derivatives={
+            signal: (run.derivatives[i] * (high - low)[:, None]).T
+            for i, signal in enumerate(run.signals)
+        },
+        requirements=study.spec.requirements,
+        reason=run.message or "",
+    )
+
+
+def _none(prepared: Prepared, reason: str) -> FirstOrder:
+    return FirstOrder(
+        t=np.empty(0), signals={}, derivatives={},
+        requirements=prepared.experiment.spec.requirements, reason=reason,
+    )  # fmt: skip

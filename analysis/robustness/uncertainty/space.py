@@ -243,6 +243,12 @@ def arguments(space: Space, table: pd.DataFrame) -> dict[str, dict[str, np.ndarr
     return {"params": params, "initial_state": states}
 
 
+def arguments_of_row(space: Space, row: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the ``params`` and ``initial_state`` of one run for a row, see `arguments`."""
+    given = arguments(space, pd.DataFrame([row], columns=space.names))
+    return {part: {name: v[0] for name, v in values.items()} for part, values in given.items()}
+
+
 def checked_rows(space: Space, table: pd.DataFrame) -> dict[str, np.ndarray]:
     """Return the numbers of a table of rows by quantity, all finite."""
     of_type("a run of rows", "table", table, pd.DataFrame, "design.table")

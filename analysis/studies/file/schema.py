@@ -10,8 +10,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 
 from nlctl.arguments import ATOL, RTOL
 
-from .asked import Asked
-from .field_types import Id, Number, Pair, Size, Strict, Whole
+from .asked import Asked, Id, Number, Pair, Size, Strict, Whole
 
 RESERVED = {"rows"}
 """Keys that no analysis has: the folder of the main table."""

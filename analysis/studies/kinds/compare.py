@@ -31,8 +31,7 @@ from ...robustness.statistics.comparison import Comparison, compare, crossed
 from ...robustness.statistics.paired import TRUSTED_ROWS
 from ...robustness.statistics.verdict import better_verdict
 from ..build import choice, inputs_of, metrics_of
-from ..file.asked import Asked
-from ..file.field_types import Confidence, Names, Whole
+from ..file.asked import Asked, Confidence, Names, Whole
 from ..file.schema import Choices
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
@@ -256,7 +255,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Compare, key: str) -> Iterator[Item]:
     """Yield rates of violation, paired differences, wins and tests."""
     t, confidence = finding.tables, 100 * finding.numbers["confidence"]
     ranking = t["ranking"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field, model_validator
 
@@ -14,8 +13,7 @@ from ...report.document import Item, Table, captioned
 from ...robustness import bound_verdict, independent
 from ...robustness.search.degradation import degradation_curve
 from ...robustness.statistics.guarantee import design_assumptions, rounded_down, rounded_up
-from ..file.asked import Varied
-from ..file.field_types import Confidence, Flag, Size, Whole
+from ..file.asked import Confidence, Flag, Size, Varied, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
@@ -86,7 +84,7 @@ def _run(asked: AskedDegradation, ground: Ground) -> Finding:
     )
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: AskedDegradation) -> dict[str, str]:
     row = finding.tables["curve"].loc[asked.at]
     return {
         "measured": f"{row['violations']:.0f} of {counted(int(row['runs']), 'run')} at size "
@@ -97,7 +95,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: AskedDegradation, key: str) -> Iterator[Item]:
     """Yield the probability of a violation against the size of the uncertainty."""
     n, curve = finding.numbers, finding.tables["curve"]
     together = "all together" if n["simultaneous"] else "each by itself"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,8 +16,7 @@ from ...report.document import Item, Paragraph, captioned
 from ...robustness import Space
 from ...robustness.search.failure_map import boundary, failure_map
 from ...robustness.stl.spec import violates
-from ..file.asked import Asked
-from ..file.field_types import Pair, Whole
+from ..file.asked import Asked, Pair, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.tables import known
@@ -88,7 +86,7 @@ def _run(asked: Map, ground: Ground) -> Finding:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Map, key: str) -> Iterator[Item]:
     """Yield the map of margins over two quantities."""
     names = (finding.numbers["x"], finding.numbers["y"])
     points = finding.tables["points"]

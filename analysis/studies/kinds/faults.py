@@ -28,8 +28,7 @@ from ...robustness.stl.spec import Requirement, violates
 from ...robustness.stl.text import parse_formula
 from ...robustness.stl.violation_time import ViolationTime, violation_time
 from ..build import faults_of
-from ..file.asked import Asked
-from ..file.field_types import Flag, Names, Size
+from ..file.asked import Asked, Flag, Names, Size
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
@@ -291,7 +290,7 @@ def _answer(asked: Faults, violating: pd.DataFrame) -> dict[str, str]:
     return {"answer": "refuted" if set(asked.tolerates) & set(violating["first"]) else "shown"}
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Faults) -> dict[str, str]:
     """Return the least margin under the faults that are claimed to be tolerated."""
     effects = finding.tables["effects"]
     every = _single(effects).sort_values("margin", kind="stable").to_dict("records")
@@ -301,7 +300,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     return {"measured": measured, "limit": "> 0", "margin": margin}
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Faults, key: str) -> Iterator[Item]:
     """Yield the margins under each fault and each pair, and when what is violated."""
     effects = finding.tables["effects"].sort_values("margin", kind="stable")
     several = len(asked.onsets) > 1
@@ -353,7 +352,7 @@ def _matrix(effects: pd.DataFrame, onset: float) -> pd.DataFrame:
     return pd.DataFrame(square, index=names, columns=names)
 
 
-def _columns(asked: Any, result: Result) -> dict[str, str]:
+def _columns(asked: Faults, result: Result) -> dict[str, str]:
     """Return the titles of the columns of times, by the requirement or detector."""
     titles = {str(key): f"{key} after (s)" for key in result.requirements.index}
     return titles | {name: f"detected by {name} after (s)" for name in asked.detects}

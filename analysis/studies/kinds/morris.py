@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field
 
@@ -12,8 +11,7 @@ from nlctl.wording import counted
 from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, elementary_effects, morris
-from ..file.asked import Asked
-from ..file.field_types import Whole
+from ..file.asked import Asked, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
@@ -61,7 +59,7 @@ def _run(asked: Morris, ground: Ground) -> Finding | None:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Morris, key: str) -> Iterator[Item]:
     """Yield the elementary effects."""
     table = finding.tables["effects"]
     caption = MORRIS_CAPTION.format(of=finding.numbers["of"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
@@ -12,8 +12,7 @@ from nlctl.wording import counted
 from ...report.document import Item
 from ...robustness import bound_verdict, violation_probability
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ..file.asked import Asked
-from ..file.field_types import Confidence
+from ..file.asked import Asked, Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
@@ -55,7 +54,7 @@ def _run(asked: Probability, ground: Ground) -> Finding:
     )
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Probability) -> dict[str, str]:
     n = finding.numbers
     low, high = n["singly"]
     bound = f"at most {rounded_up(high)}" if high < 1 else ""

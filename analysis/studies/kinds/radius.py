@@ -12,8 +12,7 @@ from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness.search.largest_scale import largest_scale
 from ...robustness.search.radius import robustness_radius
-from ..file.asked import Varied
-from ..file.field_types import Confidence, Size, Whole
+from ..file.asked import Confidence, Size, Varied, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
@@ -97,7 +96,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: AskedRadius, key: str) -> Iterator[Item]:
     """Yield which sizes were tried, and the row at the edge of the smallest violation."""
     n, steps = finding.numbers, finding.tables["steps"]
     if n["upper"] == 0:  # the nominal values violate: no other size was tried

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -63,7 +62,7 @@ def _run(asked: Regional, ground: Ground) -> Finding:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Regional, key: str) -> Iterator[Item]:
     """Yield what sets failing rows apart; nothing if all rows pass or all fail."""
     if "differences" not in finding.tables:
         return

@@ -13,8 +13,7 @@ from ...report.document import Item
 from ...robustness import Design, decide, test_verdict
 from ...robustness.runs.progress import Progress, until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
-from ..file.asked import Asked
-from ..file.field_types import Confidence
+from ..file.asked import Asked, Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
@@ -52,7 +51,7 @@ def _stop(asked: Sequential, design: Design) -> Callable[[Progress], Any]:
     return until_decided(design, asked.limit, asked.confidence)
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Sequential) -> dict[str, str]:
     n = finding.numbers
     return {
         "measured": f"{n['violations']} of {counted(n['runs'], 'run')}; "

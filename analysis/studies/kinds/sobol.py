@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from pydantic import Field
 
@@ -12,8 +11,7 @@ from nlctl.wording import counted
 from ... import figures as figures
 from ...report.document import Item, captioned
 from ...robustness import Design, Space, saltelli, sobol_indices
-from ..file.asked import Asked
-from ..file.field_types import Confidence, Whole
+from ..file.asked import Asked, Confidence, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
@@ -68,7 +66,7 @@ def _run(asked: Sobol, ground: Ground) -> Finding | None:
     )
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Sobol, key: str) -> Iterator[Item]:
     """Yield the shares of the variance."""
     table = finding.tables["indices"]
     caption = SOBOL_CAPTION.format(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,8 @@ from nlctl.wording import counted
 
 from ... import figures as figures
 from ...report.document import Item, captioned
-from ...robustness import Experiment, Space, Uncertain, arguments, from_table, nominal
+from ...robustness import Experiment, Space, Uncertain, from_table, nominal
+from ...robustness.uncertainty.space import arguments_of_row
 from ..file.asked import Asked
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, column, finding_of
@@ -63,10 +63,7 @@ def _run(asked: Tornado, ground: Ground) -> Finding | None:
     done = ground.run_design(design)
     if not done.complete:
         return None
-    loop = next(
-        loop for labels, loop in prepared.loops if all(middle[k] == v for k, v in labels.items())
-    )
-    gradient, without = _gradient(asked, prepared.experiment, loop, varied)
+    gradient, without = _gradient(asked, prepared.experiment, prepared.nominal_loop, varied)
     at_ends = column(done, asked.of)
     table = _table(varied, gradient, at_ends[1:].reshape(-1, 2) - at_ends[0])
     reach = table[["low", "high"]].abs().max(axis=1)
@@ -103,8 +100,7 @@ def _gradient(
 ) -> tuple[MetricGradient, str]:
     """Return the derivatives of the nominal run, and by what there are none."""
     metrics = _metrics_of(asked, experiment)
-    given = arguments(experiment.space, pd.DataFrame([nominal(experiment.space)]))
-    one = {part: {name: v[0] for name, v in lack.items()} for part, lack in given.items()}
+    one = arguments_of_row(experiment.space, nominal(experiment.space))
     signals = list(dict.fromkeys(s for m in metrics for s in m.signals))
     names = [quantity.name for quantity in varied]
 
@@ -156,7 +152,7 @@ def _metrics_of(asked: Tornado, experiment: Experiment) -> list[MetricLike]:
     return [m for m in (*requirements, *experiment.metrics) if m.key == asked.of]
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Tornado, key: str) -> Iterator[Item]:
     """Yield the tornado."""
     n, table = finding.numbers, finding.tables["effects"]
     caption = _CAPTION.format(of=n["of"], value=n["value"])

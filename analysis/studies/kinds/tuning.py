@@ -12,7 +12,6 @@ from pydantic import Field
 
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
-from nlctl.native import Compiled
 from nlctl.sensitivities import Tuned, tune
 from nlctl.wording import counted
 
@@ -34,8 +33,7 @@ from ...robustness import (
 )
 from ...robustness.runs.experiment import by_diagram, simulate_rows
 from ...robustness.statistics.guarantee import rounded_up
-from ..file.asked import Asked
-from ..file.field_types import Confidence, Pair, Size, Whole
+from ..file.asked import Asked, Confidence, Pair, Size, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, Setup, finding_of
 from ..page import text as text
@@ -163,12 +161,6 @@ def _varied_names(space: Space, asked: Tuning) -> list[str]:
     return [*quantities[: -len(asked.gains)], *(c.name for c in space.choices)]
 
 
-def _nominal_loop(prepared: Prepared) -> Compiled:
-    """Return the diagram with the nominal options."""
-    middle = {c.name: c.nominal for c in prepared.experiment.space.choices}
-    return next(loop for labels, loop in prepared.loops if labels == middle)
-
-
 def _tuned(asked: Tuning, ground: Ground, prepared: Prepared) -> Tuned:
     """Find gains on a few samples; integers are nominal in these."""
     experiment, size = prepared.experiment, len(asked.gains)
@@ -180,7 +172,7 @@ def _tuned(asked: Tuning, ground: Ground, prepared: Prepared) -> Tuned:
         samples = {q.name: [q.nominal] * asked.samples if q.is_integer else table[q.name]
                    for q in varied}  # fmt: skip
     tuned = tune(
-        _nominal_loop(prepared), {q.name: (q.nominal, *q.box) for q in gains}, experiment.spec,
+        prepared.nominal_loop, {q.name: (q.nominal, *q.box) for q in gains}, experiment.spec,
         asked.budget, experiment.timepts, experiment.inputs, samples=samples,
         cost=_metric(asked, experiment) if asked.lower else None, starts=asked.starts,
         seed=ground.seed, rtol=experiment.rtol, atol=experiment.atol,
@@ -260,7 +252,7 @@ def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: Tuning) -> dict[str, str]:
     fresh = finding.numbers["fresh_after"]
     high = fresh["singly"][1]
     return {
@@ -271,7 +263,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterator[Item]:
     """Yield before and after, which gain has bought what, and how it was found."""
     n, tables = finding.numbers, finding.tables
     is_cost = n["goal"] != "margin"

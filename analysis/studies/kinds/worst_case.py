@@ -19,8 +19,7 @@ from ...robustness.search.confirmation import confirm
 from ...robustness.search.evaluation import margins_of
 from ...robustness.search.shrink import shrink
 from ...robustness.search.worst_case import worst_case
-from ..file.asked import Varied
-from ..file.field_types import Flag, Number, Whole
+from ..file.asked import Flag, Number, Varied, Whole
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page import text as text
@@ -94,7 +93,7 @@ def _no_low_margin(limit: float | None, margin: float, is_confirmed: bool) -> di
     return {"answer": "not shown yet", "needs": needs}
 
 
-def _measured(finding: Finding, asked: Any) -> dict[str, str]:
+def _measured(finding: Finding, asked: AskedWorstCase) -> dict[str, str]:
     n = finding.numbers
     ended = margin_text(n["margin"]) == DID_NOT_END
     return {
@@ -108,7 +107,7 @@ def _measured(finding: Finding, asked: Any) -> dict[str, str]:
     }
 
 
-def _items(finding: Finding, result: Result, asked: Any, key: str) -> Iterator[Item]:
+def _items(finding: Finding, result: Result, asked: AskedWorstCase, key: str) -> Iterator[Item]:
     """Yield how the worst row was found, whether it is confirmed, and what of it is needed."""
     n = finding.numbers
     lowest = finding.tables["best"]["margin"].to_numpy(dtype=float)

@@ -1,9 +1,9 @@
-"""A study validated against its loop: every name, every formula, every analysis."""
+"""A study validated against its loop: every name, every formula, every id, every analysis."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -40,7 +40,6 @@ from ..file.errors import KeyPath, Problem
 from ..file.schema import RESERVED, Faulty, Study
 from ..kind import Setup
 from ..resolve import check_complete, loop_function, option, uncertain
-from .ids import id_problems
 
 _T = TypeVar("_T")
 _MOST_ROWS = 10_000_000  # of a design or a search
@@ -317,3 +316,30 @@ def _named(asked: Asked, keys: Sequence[str]) -> list[tuple[str, str]]:
         value = getattr(asked, key)
         names += [(key, name) for name in ((value,) if isinstance(value, str) else value)]
     return names
+
+
+def id_problems(study: Study, *, whole: bool) -> Iterator[Problem]:
+    """Yield what is wrong with ids; `whole` says that no requirement of the file is missing."""
+    owners: dict[str, str] = {}
+    for key, rule in study.spec.items():
+        if rule.id in owners:
+            message = f"needs an id of its own, '{rule.id}' is that of '{owners[rule.id]}'"
+            yield Problem(place=("spec", key, "id"), message=message)
+        if rule.id:
+            owners.setdefault(rule.id, key)
+    for place, asked in enumerate(study.analysis):
+        for name in dict.fromkeys(asked.id):
+            if not name:
+                message = "needs the id of a requirement, got an empty one"
+            elif asked.id.count(name) > 1:
+                message = f"needs each id once, got '{name}' again"
+            elif whole and name not in owners:
+                where = "(spec.NAME.id gives a requirement its id)"
+                message = str(unknown("requirement id", name, owners, where))
+            else:
+                continue
+            yield Problem(place=("analysis", place, "id"), message=message)
+        if asked.id and not asked.claim:
+            message = f"'{asked.kind}' claims nothing that could answer {', '.join(asked.id)}: "
+            message += "say what it claims, such as by limit, or leave the id out"
+            yield Problem(place=("analysis", place, "id"), message=message)

@@ -13,8 +13,7 @@ import numpy as np
 from ... import native
 from ...annotations import as_annotated
 from ...errors import CompileError, ParameterError
-from ...native.driver import prepared
-from ...native.histories import variations
+from ...native.driver import Course, prepared
 from ...native.integrate.log import new_log
 from ...native.integrate.memory import with_fields
 from ...native.integrate.methods.lu import WHOLE
@@ -198,9 +197,8 @@ def _laid_out(
     compiled: native.Compiled, times: Any, u: Any, start: Any, p: Any, settings: Settings
 ) -> Run:
     """Return a run before it begins, with room for what another one of a page may need."""
-    run = prepared(
-        compiled, times, u, start[:, None], p[:, None], settings, variations(compiled, times)
-    )
+    course = Course(compiled=compiled, times=times, inputs=u, settings=settings)
+    run = prepared(course, start[:, None], p[:, None])
     task, work = run.task, run.work
     conditions = compiled.lowered.conditions
     timed = task.timed

@@ -32,8 +32,6 @@ from ..integrate.state import RUNNING
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
-__all__ = ["Attempt", "Jump", "asked", "jump_of", "new_paces", "probe_of", "snapshot"]
-
 PROBE = 200  # steps tried that are looked at, at the end of a window
 _PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
 _JUMPS = 10  # of them with a jump
@@ -63,15 +61,15 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
     `_LONG` windows on: what usual runs take must not cost them anything.
     """
-    gone = lanes["t"] - paces["t"]
-    paces["t"] = lanes["t"]
-    paces["longest"] = np.maximum(paces["longest"], gone)
-    paces["windows"] += 1
-    paces["slow"] = np.where(gone < _SLOW * paces["longest"], paces["slow"] + 1, 0)
-    due = [(n & (n - 1)) == 0 for n in (paces["windows"], paces["slow"])]
-    return (lanes["status"] == RUNNING) & (
-        (due[0] & (paces["windows"] >= _LONG)) | ((paces["slow"] > 0) & due[1])
-    )
+    before, longest, windows, slow = (paces[name] for name in _PACES.names or ())
+    gone = lanes["t"] - before
+    before[:] = lanes["t"]
+    np.maximum(longest, gone, out=longest)
+    windows += 1
+    slow[:] = (slow + 1) * (gone < _SLOW * longest)
+    due = [(n & (n - 1)) == 0 for n in (windows, slow)]
+    asked_now = (due[0] & (windows >= _LONG)) | ((slow > 0) & due[1])
+    return (lanes["status"] == RUNNING) & asked_now
 
 
 def probe_of(task: Any) -> int:
@@ -178,11 +176,8 @@ class _Places(LaneEquations):
         return jump if found else None
 
     def _stands_out(self, jump: Jump, i: int) -> bool:
-        """Whether component `i` jumps by more than it changes next to the jump.
-
-        What changes by rounding does so everywhere, and what is smooth changes by more over a
-        longer way.
-        """
+        """Whether component `i` jumps by more than it changes next to the jump."""
+        # What changes by rounding does so everywhere, and what is smooth by more over a longer way.
         with np.errstate(all="ignore"):
             points = [jump.sides(wider) for wider in _BESIDE]
             below, above = (

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ...accumulation import SECOND_ORDER, Crowd, accumulation_words
+from ...accumulation import SECOND_ORDER, accumulation_words
 from ...diagrams import overridden
 from ...upstream.control_internals import rates_now
 from ...upstream.systems import System
-from ..audit import block_outputs
+from ..audit import every_output
 from ..compiled import Compiled
 from ..diagram.block_inputs import block_inputs
 from ..diagram.program import count_switching_functions, memory
 from ..equations.relays import relay_places
 from ..happened import row_labels
 from .steps import Jump
-
-__all__ = ["chattering_words"]
 
 _ONE_AT_A_TIME = threading.Lock()  # python-control keeps a run's parameters in the blocks
 _WIDER = (0.0, *(4.0**k for k in range(14)))  # in distances between neighbouring states
@@ -36,7 +33,11 @@ def chattering_words(
     """Return which signal jumps between which values, and what to do."""
     relays = relay_places(compiled.schedule.nodes)
     if jump.crowd is not None:
-        return _accumulation(compiled, jump.crowd)
+        labels = row_labels(compiled, compiled.lowered.conditions)
+        row = jump.crowd.row
+        which = labels[row] if row < len(labels) else ("", "a condition")
+        why = "and what is compared is within tolerances of 0"
+        return accumulation_words(which, jump.crowd, why)
     if relays and _keeps_on_switching(compiled, p, jump):
         return f"{_committed(compiled, p, jump)}: its switches accumulate; {SECOND_ORDER}"
     advice = (
@@ -46,13 +47,6 @@ def chattering_words(
     )
     found = _committed(compiled, p, jump) or _changed(compiled, p, params, jump)
     return f"{found}; {advice}"
-
-
-def _accumulation(compiled: Compiled, crowd: Crowd) -> str:
-    """Return whose switches come ever closer together, and how."""
-    labels = row_labels(compiled, compiled.lowered.conditions)
-    which = labels[crowd.row] if crowd.row < len(labels) else ("", "a condition")
-    return accumulation_words(which, crowd, "and what is compared is within tolerances of 0")
 
 
 def _keeps_on_switching(compiled: Compiled, p: np.ndarray, jump: Jump) -> bool:
@@ -131,9 +125,7 @@ def _blocks(
     """Yield for each block what it is given, and its outputs and rates with their names."""
     t, x, u = point
     nodes = compiled.schedule.nodes
-    y = block_outputs(compiled, p, point)
-    counts = np.cumsum([0, *(node.system.noutputs or 0 for node in nodes)])
-    outputs = {i: y[a:b] for i, (a, b) in enumerate(pairwise(counts))}
+    outputs = every_output(compiled, p)(point)
     given = block_inputs(system, u[: system.ninputs or 0], outputs)
     for i, (node, (block, inputs)) in enumerate(zip(nodes, given, strict=True)):
         own = x[node.state_offset :][: block.nstates or 0]

@@ -10,30 +10,17 @@ import numpy as np
 
 from ...accumulation import Crowd
 
-__all__ = ["Attempt", "Jump", "LaneEquations", "parameters_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Jump:
-    """A jump at which a run chatters.
+    """A jump at which a run chatters."""
 
-    Attributes
-    ----------
-    times : tuple of float
-        On both sides of the jump (s); the same, or neighbouring ones.
-    before, after : ndarray of shape (nstates,)
-        Neighbouring states on both sides.
-    inputs : ndarray
-        Inputs of the program there.
-    crowd : Crowd or None
-        How the switches accumulate, if they do.
-    """
-
-    times: tuple[float, float]
+    times: tuple[float, float]  # on both sides of the jump (s); the same, or neighbouring ones
+    # (nstates,): neighbouring states on both sides
     before: np.ndarray
     after: np.ndarray
-    inputs: np.ndarray
-    crowd: Crowd | None = None
+    inputs: np.ndarray  # inputs of the program there
+    crowd: Crowd | None = None  # how the switches accumulate, if they do
 
     @property
     def time(self) -> float:
@@ -84,13 +71,10 @@ class LaneEquations:
         return self._at(t, x, u)[1][: self.run.task.rows.guarded]
 
     def _at(self, t: float, x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
-        width = self.run.machine.width
-        tt, xx, uu = (np.repeat(np.reshape(v, (-1, 1)), width, axis=1) for v in (t, x, u))
-        rows = self.run.machine.lowered.rows
-        dx, g, m = (np.empty((rows[name], width)) for name in ("dx", "g", "m"))
-        self.run.machine.rhs(tt[0].copy(), xx, uu, self.c, dx, g, m)
+        machine = self.run.machine
+        dx, g, m = machine.values(machine.rhs, "dx g m", (t, x, u), self.c)
         dx[self.run.task.rows.memory] = 0.0
-        return dx[:, 0], g[:, 0], m[:, 0]
+        return dx, g, m
 
     def points(self, attempt: Attempt) -> Iterator[tuple[float, np.ndarray]]:
         """Yield where a step has been: at its ends and, of an explicit pair, at its stages."""

@@ -13,7 +13,7 @@ import numpy as np
 from ...blocks import Block, event_count, guard_count, memory_states
 from ...errors import BlockError, CompileError
 from ...expressions.arrays import Tracer
-from ...expressions.continuity import may_jump
+from ...expressions.dependence import may_jump
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn
@@ -114,7 +114,11 @@ def clocks_at(schedule: Schedule, program: Program, p: np.ndarray) -> dict[Any, 
     """Return the clocks of sampled blocks that a parameter vector says, by their owners."""
     owners = (holder.system for holder in schedule.samplings)
     every = slots_of_clocks(schedule, program)
-    return {owner: _clock(slots, p) for owner, slots in zip(owners, every, strict=True)}
+    clocks = {}
+    for owner, of_clock in zip(owners, every, strict=True):
+        values = {name: p[slot.offset].item() for name, slot in of_clock.items()}
+        clocks[owner] = Clock(**values | {"seed": int(values["seed"])})
+    return clocks
 
 
 def slots_of_clocks(schedule: Schedule, program: Program) -> list[dict[str, Slot]]:
@@ -122,12 +126,6 @@ def slots_of_clocks(schedule: Schedule, program: Program) -> list[dict[str, Slot
     first = len(schedule.nodes)
     layouts = (program.layout[first + k] for k in range(len(schedule.samplings)))
     return [{name: layout[name] for name in _OF_CLOCK} for layout in layouts]
-
-
-def _clock(slots: Mapping[str, Slot], p: np.ndarray) -> Clock:
-    """Return the clock that a parameter vector says."""
-    values = {name: p[slots[name].offset].item() for name in _OF_CLOCK}
-    return Clock(**values | {"seed": int(values["seed"])})
 
 
 def count_switching_functions(node: Node) -> int:

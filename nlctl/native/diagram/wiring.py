@@ -16,12 +16,9 @@ Combination = Mapping["Signal", float]
 
 @dataclass(frozen=True)
 class Signal:
-    """An elementary signal: output `index` of block `block`, or external input `index`.
+    """An elementary signal: output `index` of block `block`, or external input `index`."""
 
-    ``block`` is None for an external input.
-    """
-
-    block: int | None
+    block: int | None  # None for an external input
     index: int
 
 
@@ -92,9 +89,8 @@ class Wiring:
         """Solve for an entry of a diagram's stacked outputs, followed by its stacked inputs."""
         system = diagram.system
         count = system.connect_map.shape[1]
-        kind, offsets = (
-            ("out", system.output_offset) if column < count else ("in", system.input_offset)
-        )
-        position = column if column < count else column - count
+        kind, offsets, position = "out", system.output_offset, column
+        if column >= count:
+            kind, offsets, position = "in", system.input_offset, column - count
         part = int(np.searchsorted(offsets, position, side="right")) - 1
         return self._solve(kind, self._parts[diagram][part], int(position - offsets[part]))

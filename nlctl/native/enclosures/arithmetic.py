@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..codegen.ir.text import Body, Value, constant, llvm_type
+from ..codegen.ir.functions import applied
+from ..codegen.ir.text import Body, Value, constant
 from .rounding import downwards, larger, product_downwards, product_upwards, smaller, upwards
 
 NAN = float("nan")
@@ -38,35 +39,18 @@ def routine(b: Body, name: str, make: Callable[..., Ends], *args: Ends) -> Ends:
     known = "".join("c" if x.point is not None else "n" if x.not_negative else "p" for x in args)
     if "c" in known:
         return make(b, *args)
-    width = args[0].low.width
-    full, kind = f"@enclosures.{name}.{known}", llvm_type(width)
-    pair = f"{{{kind}, {kind}}}"
-    if full not in b.module.functions:
-        b.module.functions[full] = ""  # before those that it calls
-        inner = Body(b.module)
-        given = [
-            Ends(
-                low=Value(f"%l{i}", width), high=Value(f"%h{i}", width), not_negative=x.not_negative
-            )
-            for i, x in enumerate(args)
-        ]
+    full = f"{name}.{known}"
+
+    def written(inner: Body, *ends: Value) -> tuple[Value, Value]:
+        pairs = zip(ends[::2], ends[1::2], args, strict=True)
+        given = [Ends(low=v, high=w, not_negative=x.not_negative) for v, w, x in pairs]
         result = make(inner, *given)
-        half = inner.new(f"insertvalue {pair} poison, {result.low}, 0").text
-        inner.write(f"ret {pair} {inner.new(f'insertvalue {pair} {half}, {result.high}, 1').text}")
-        taken = ", ".join(str(v) for x in given for v in x.values)
-        signed = "; not negative\n" if result.not_negative else ""
-        b.module.functions[full] = (
-            f"{signed}define internal {pair} {full}({taken}) {_how(b)} nounwind {{\n"
-            f"entry:\n{inner.text()}}}\n"
-        )
-    call = b.new(f"call {pair} {full}({', '.join(str(v) for x in args for v in x.values)})")
-    low, high = (b.new(f"extractvalue {pair} {call.text}, {i}", width) for i in (0, 1))
-    signed = b.module.functions[full].startswith("; not negative")
-    return Ends(low=low, high=high, not_negative=signed)
+        if result.not_negative:
+            b.module.declared[f"; {full} is not negative"] = None
+        return result.values
 
-
-def _how(b: Body) -> str:
-    return "alwaysinline" if b.module.inlined else "noinline"
+    low, high = b.called(full, written, [v for x in args for v in x.values], 2)
+    return Ends(low=low, high=high, not_negative=f"; {full} is not negative" in b.module.declared)
 
 
 def finite(x: Ends) -> Ends:
@@ -209,31 +193,26 @@ def root_of(b: Body, x: Ends) -> Ends:
 
 
 def minimum(b: Body, x: Ends, y: Ends) -> Ends:
-    return _extreme_of(b, x, y, "olt", x.not_negative and y.not_negative, float("inf"))
+    return _extreme_of(b, x, y, "minimum", x.not_negative and y.not_negative, float("inf"))
 
 
 def maximum(b: Body, x: Ends, y: Ends) -> Ends:
-    return _extreme_of(b, x, y, "ogt", x.not_negative or y.not_negative, -float("inf"))
+    return _extreme_of(b, x, y, "maximum", x.not_negative or y.not_negative, -float("inf"))
 
 
-def _extreme_of(b: Body, x: Ends, y: Ends, how: str, signed: bool, neutral: float) -> Ends:
+def _extreme_of(b: Body, x: Ends, y: Ends, name: str, signed: bool, neutral: float) -> Ends:
+    """Return one of two values at either end; what is not a number wins."""
     for one, other in ((x, y), (y, x)):
         if one.point == neutral:
             return other
     x, y = finite(x), finite(y)
-    low, high = (_extreme(b, how, v, w) for v, w in zip(x.values, y.values, strict=True))
+    low, high = (applied(b, name, v, w) for v, w in zip(x.values, y.values, strict=True))
     return Ends(low=low, high=high, not_negative=signed)
-
-
-def _extreme(b: Body, how: str, x: Value, y: Value) -> Value:
-    """Return one of two values; what is not a number wins."""
-    first = b.logic("or", b.compare(how, x, y), b.compare("uno", x, x))
-    return b.select(first, x, y)
 
 
 def hull_of(b: Body, x: Ends, y: Ends) -> Ends:
     """Return what holds both; not a number if one is none."""
-    low, high = _extreme(b, "olt", x.low, y.low), _extreme(b, "ogt", x.high, y.high)
+    low, high = applied(b, "minimum", x.low, y.low), applied(b, "maximum", x.high, y.high)
     return Ends(low=low, high=high, not_negative=x.not_negative and y.not_negative)
 
 

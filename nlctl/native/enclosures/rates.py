@@ -17,7 +17,8 @@ def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> l
     # Its external inputs are 0.
     _check(compiled)
     p = compiled.parameter_vector(params)
-    numbers = [expr for _, array in compiled.equations.results["dx"] for expr in _numbers(array)]
+    arrays = [array for _, array in compiled.equations.results["dx"]]
+    numbers = [array[i].only for array in arrays for i in range(array.size)]
     _, rates = scalar_expressions(numbers)
 
     def instead(graph: Graph, leaf: Expr) -> Expr:
@@ -29,10 +30,6 @@ def state_rates(compiled: Reading, params: dict[str, object] | None = None) -> l
         return graph.const(0.0 if array == "u" else float(p[row]))
 
     return with_leaves(rates, instead)[1]
-
-
-def _numbers(array: object) -> list[Expr]:
-    return [array[i].only for i in range(array.size)]  # type: ignore[attr-defined,index]
 
 
 def _check(compiled: Reading) -> None:

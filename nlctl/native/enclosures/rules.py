@@ -206,33 +206,18 @@ def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
     return Ends(low=low, high=high), cut
 
 
-def _quotient_rounded(b: Body, name: str, x: Ends, y: Ends) -> tuple[Ends, Value]:
-    quotient = div(b, x, y)
-    low, high = (applied(b, name, v) for v in quotient.values)
-    return Ends(low=low, high=high), b.compare("une", low, high)
-
-
-def _within(b: Body, x: Ends, y: Ends) -> Ends:
-    """Return what two intervals that hold one number have in common."""
-    low, high = larger(b, y.low, x.low), smaller(b, y.high, x.high)
-    return Ends(low=low, high=high)
-
-
 def _rest(name: str) -> Callable[..., _Result]:
     """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
 
     def rule(b: Body, x: Ends, y: Ends) -> _Result:
-        q, jumps = _quotient_rounded(b, name, x, y)
+        least, most = (applied(b, name, v) for v in div(b, x, y).values)
+        q, jumps = Ends(low=least, high=most), b.compare("une", least, most)
         one = sub(b, x, mul(b, y, q))
         zero = point_of(0.0, x.low.width)
-        bound = (
-            hull_of(b, zero, y)
-            if name == "floor"
-            else hull_of(b, absolute_of(b, y), neg(b, absolute_of(b, y)))
-        )
-        single = _within(b, one, bound)
-        low = b.select(jumps, bound.low, single.low)
-        high = b.select(jumps, bound.high, single.high)
+        other = absolute_of(b, y)
+        bound = hull_of(b, zero, y) if name == "floor" else hull_of(b, other, neg(b, other))
+        low = b.select(jumps, bound.low, larger(b, bound.low, one.low))
+        high = b.select(jumps, bound.high, smaller(b, bound.high, one.high))
         is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))
         return defined(b, is_number, Ends(low=low, high=high)), jumps
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...expressions.continuity import is_an_extreme
+from ...expressions.dependence import is_an_extreme
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 from ..codegen.ir.numbers import one_line
 from ..codegen.ir.text import Body, Module, Value
@@ -125,7 +125,7 @@ class EnclosureWriter:
             known = truth if node.kind == "b" else point_of
             return known(node.data, self.lanes)
         if node.op == "leaf":
-            return self.side("x", node.data[1])
+            return self.ends("x", 2 * node.data[1])
         if node.op == "add":
             return add(b, *args)
         if node.op in _ARITHMETIC and args[0] is not args[1]:
@@ -159,11 +159,10 @@ class EnclosureWriter:
         self.jumps[node] = left_open(self.b, condition)
         return choice_of(self.b, condition, x, y)
 
-    def side(self, array: str, row: int) -> Ends:
-        """Read an interval."""
+    def ends(self, array: str, row: int) -> Ends:
+        """Read an interval from two rows."""
         low, high = (
-            self.b.load(self.b.address(array, (2 * row + k) * self.lanes), self.lanes)
-            for k in (0, 1)
+            self.b.load(self.b.address(array, (row + k) * self.lanes), self.lanes) for k in (0, 1)
         )
         return Ends(low=low, high=high)
 
@@ -208,24 +207,19 @@ def _judge(
     b, rows = Body(module), JudgedRows(sides=sides, results=len(results))
     w = EnclosureWriter(b, lanes)
     w.write([*results, *(g for gradient in gradients for g in gradient)])
-    box = [w.side("x", i) for i in range(sides)]
+    box = [w.ends("x", 2 * i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
     inner, written = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
     b.write(f"call void @values(ptr {inner}, ptr {written})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
-        value = _read(w, rows.values + 2 * k)
+        value = w.ends("o", rows.values + 2 * k)
         at_centre.append(value)
         bounds.append(_bound(w, expr, value, slopes[k], steps))
     _kept(w, rows, bounds, at_centre, [_weights(b, box, slope) for slope in slopes])
     b.write("ret void")
     return _function(b, "judge", "x", "o")
-
-
-def _read(w: EnclosureWriter, row: int) -> Ends:
-    low, high = (w.b.load(w.b.address("o", (row + k) * w.lanes), w.lanes) for k in (0, 1))
-    return Ends(low=low, high=high)
 
 
 _Step = tuple[Ends, Value]

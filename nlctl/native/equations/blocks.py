@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import control as ct
 import numpy as np
 
+from ...errors import CompileError
 from ...expressions.arrays import Tracer, as_array, leaf_vector, scalar
-from ...expressions.graph import Expr, Graph
+from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
+from ...expressions.trace import trace
 from ...responses.watched import watches_nan
 from ...sampling.system import Happening
 from ...upstream.systems import System
+from ...wording import counted
 from ..codegen.solver import Solver
 from ..diagram.parameters import length
 from ..diagram.program import count_guards, count_switching_functions, memory
 from ..diagram.schedule import Schedule, during
-from ..opaque.calls import Call
+from ..diagram.trace import time
+from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
 from .reader import Reader
 from .relays import with_sliding
-from .watched import watched_conditions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +87,9 @@ def equations(
             "m": list(events.committed.values()),
             "y": [(0, y)],
         }
-        if any(count_guards(node) for node in reader.blocks):
-            results["reset"] = _resets(reader)
+        if events.guards:
+            sizes_of_guarded = [n.size if count_guards(n) else 0 for n in reader.blocks]
+            results["reset"] = list(_in_rows(sizes_of_guarded, reader.resets).values())
         results = reader.all_known(results)
         for k, what in enumerate(meetings):
             at_instant = during(schedule, what)
@@ -139,47 +144,62 @@ def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     return functions
 
 
-def _guards(reader: Reader) -> dict[int, tuple[int, Tracer]]:
-    """Return the guards of blocks, by their places, with their rows but for those of conditions."""
-    row = sum(count_switching_functions(node) for node in reader.blocks)
-    guards = {}
-    for i, node in enumerate(reader.blocks):
-        if count_guards(node):
-            guards[i] = (row, reader.guards(i))
-            row += count_guards(node)
-    return guards
-
-
-def _resets(reader: Reader) -> list[tuple[int, Tracer]]:
-    """Return the states after jumps of all blocks with guards, with their rows."""
-    resets, row = [], 0
-    for i, node in enumerate(reader.blocks):
-        if count_guards(node):
-            resets.append((row, reader.resets(i)))
-            row += node.size
-    return resets
+def _in_rows(
+    counts: Iterable[int], read: Callable[[int], Tracer | None], row: int = 0
+) -> dict[int, tuple[int, Tracer]]:
+    """Return what blocks with so many numbers have, by their places, with rows from one on."""
+    arrays = {}
+    for i, count in enumerate(counts):
+        if count and (array := read(i)) is not None:
+            arrays[i] = (row, array)
+        row += count
+    return arrays
 
 
 def _next(reader: Reader) -> list[tuple[int, Tracer]]:
     """Return the next states of sampled blocks to which something happens, with their rows."""
-    states, row = [], 0
-    for i, node in enumerate(reader.blocks):
-        if node.sampled:
-            if node.sampled.acts(reader.what):
-                states.append((row, reader.next_states(i)))
-            row += node.size
-    return states
+
+    def states(i: int) -> Tracer | None:
+        sampled = reader.blocks[i].sampled
+        return reader.next_states(i) if sampled and sampled.acts(reader.what) else None
+
+    return list(_in_rows([n.size if n.sampled else 0 for n in reader.blocks], states).values())
 
 
 def _events(reader: Reader, schedule: Schedule) -> _Events:
     """Return what blocks and the run declare."""
-    counts = [(count_switching_functions(node), len(memory(node))) for node in reader.blocks]
-    at, behind, declared, committed = 0, 0, [], {}
-    for i, (count, kept) in enumerate(counts):
-        if count or kept:
-            events = reader.events(i)
-            declared.append((at, events[:count]))
-            committed[i] = (behind, events[count:])
-            at, behind = at + count, behind + kept
-    watched = watched_conditions(reader, schedule)
-    return _Events(declared=declared, guards=_guards(reader), committed=committed, watched=watched)
+    counts = [count_switching_functions(node) for node in reader.blocks]
+    kept = [len(memory(node)) for node in reader.blocks]
+    events = {i: reader.events(i) for i in range(len(counts)) if counts[i] or kept[i]}
+    watched = _watched(reader, schedule)
+    return _Events(
+        declared=list(_in_rows(counts, lambda i: events[i][: counts[i]]).values()),
+        guards=_in_rows(map(count_guards, reader.blocks), reader.guards, sum(counts)),
+        committed=_in_rows(kept, lambda i: events[i][counts[i] :]),
+        watched=watched,
+    )
+
+
+def _watched(reader: Reader, schedule: Schedule) -> list[Located]:
+    """Return functions that a run watches, as conditions located like those of the equations."""
+    graph, system = reader.graph, schedule.system
+    sizes = (system.nstates or 0, system.ninputs or 0)
+    rows = []
+    for watch in schedule.watched:
+
+        def arguments() -> tuple:
+            x, u = (leaf_vector(graph, k, 0, (n,)) for k, n in zip("xu", sizes, strict=True))
+            return time(graph), x, u, dict(schedule.overrides)
+
+        try:
+            value = trace(graph, partial(watch.function), arguments)
+            if value.size != 1:
+                raise Untraceable(f"it returns {counted(value.size, 'number')}, not one")
+        except (Untraceable, Ambiguous) as error:
+            raise CompileError(
+                f"event function '{watch.name}' cannot be compiled: {error}; "
+                "engine='python-control' calls it unchanged"
+            ) from None
+        function = graph.number(value.reshape(-1)[0].only)
+        rows.append(Located(function=function, block="", what=watch.name, bends=False))
+    return rows

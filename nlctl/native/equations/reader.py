@@ -25,8 +25,7 @@ from ..diagram.nodes import Node
 from ..diagram.program import check_continuous, count_guards, count_switching_functions, memory
 from ..diagram.schedule import AlgebraicLoop, Combination, Schedule, Signal, signal_name
 from ..diagram.trace import feedthrough, time, traced_parameters
-from ..opaque.called import call_of
-from ..opaque.calls import Call
+from ..opaque.called import Call, call_of
 
 
 def _labels(blocks: Sequence[Node]) -> list[str]:

@@ -90,6 +90,7 @@ _FIELDS = [
     ("from_accepted", "i8"),  # steps accepted until then
     ("from_tried", "i8"),  # steps tried until this method's turn
     ("span", "i8"),  # steps of its turn
+    ("stay", "i8"),  # and of Taylor's method where it pays, before it is compared again
     ("wait", "i8"),  # explicit steps before Taylor's method is tried again, if it does not pay
     ("stiff", "i8"),  # 0 explicit, otherwise 1 + steps of the stiff method
     ("ends", "i8"),  # the step being tried ends at a break point of the inputs or at the end

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...errors import UsageError
 from ...upstream.numba_internals import NumbaWarning, address_of
-from ..opaque.calls import Call, Source
+from ..opaque.called import Call, Source
 from .fingerprint import Sourced, module_key, program_key
 from .machine_code import Wanted, machine_code_if_taken
 

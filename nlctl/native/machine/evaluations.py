@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ...sampling.system import Happening
 from ..equations.blocks import equations
 from ..lower import Lowered, lower
 from ..reading import Reading
-from .routine import called_back, entry, lowered_code, raise_failures
+from .routine import Routine, entry, lowered_code
 
 _LOG = logging.getLogger("nlctl")
 ENSEMBLE_WIDTH = 8  # members of a batch in ensembles: one AVX-512 register
@@ -32,8 +33,8 @@ class Machine:
     out: Any
     # ``sample(t, x, u, c, s)`` for each meeting: the next states of sampled blocks
     samples: tuple[Any, ...] = ()
-    # ``resets(t, x, u, c, s)``: the states of all blocks with guards, behind a jump
-    resets: Any = None
+    # ``reset(t, x, u, c, s)``, if there are guards: the states of their blocks behind a jump
+    resets: tuple[Any, ...] = ()
     meetings: tuple[Happening, ...] = ()  # what happens to them there
 
     @property
@@ -44,42 +45,32 @@ class Machine:
     @property
     def called_back(self) -> tuple[str, ...]:
         """Names of functions that call back into Python."""
-        return called_back(self._functions)
+        calls = [call for function in self._routines for call in function.opaque]
+        names = [call.call.name for call in calls if call.call.name in call.native.called_back]
+        return tuple(dict.fromkeys(names))
 
-    @property
-    def _functions(self) -> tuple[Any, ...]:
-        resets = () if self.resets is None else (self.resets,)
-        return (self.rhs, self.out, *self.samples, *resets)
+    @cached_property
+    def _routines(self) -> list[Routine]:
+        every = (self.rhs, self.out, *self.samples, *self.resets)
+        return [function for function in every if isinstance(function, Routine)]
 
     @property
     def entries(self) -> tuple[Any, Any]:
         """What integrators take of `rhs` and `out`."""
         return entry(self.rhs), entry(self.out)
 
-    @property
-    def sample_entries(self) -> np.ndarray:
-        """What integrators take of `samples`."""
-        return _entries(self.samples)
-
-    @property
-    def reset_entries(self) -> np.ndarray:
-        """What integrators take of `resets`: one function, or none."""
-        return _entries(() if self.resets is None else (self.resets,))
-
-    @property
-    def signal_entry(self) -> np.ndarray:
-        """What integrators take of `out` to look at delayed signals."""
-        return _entries((self.out,))
+    def values(self, function: Any, names: str, point: Any, c: np.ndarray) -> list[np.ndarray]:
+        """Return what a function makes of t, x and u, `c` in every lane: arrays of these names."""
+        t, x, u = (np.reshape(np.asarray(v, dtype=float), (-1, 1)) for v in point)
+        t, x, u = (np.repeat(v, self.width, axis=1) for v in (t, x, u))
+        results = [np.zeros((self.lowered.rows[name], self.width)) for name in names.split()]
+        function(t[0].copy(), x, u, c, *results)
+        return [array[:, -1] for array in results]
 
     def check(self, c: np.ndarray) -> None:
         """Raise what an opaque function has raised, with `c` as the parameters."""
-        raise_failures(self._functions, c)
-
-
-def _entries(functions: tuple[Any, ...]) -> np.ndarray:
-    entries = [entry(function) for function in functions]
-    plain = any(callable(address) for address in entries)
-    return np.array(entries, dtype=object if plain else np.int64)
+        for function in self._routines:
+            function.check(c)
 
 
 def machine(
@@ -104,7 +95,7 @@ def machine(
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
-    resets = samples.pop() if program.guards else None
+    resets = (samples.pop(),) if program.guards else ()
     known.append(
         Machine(
             width=width,
@@ -145,13 +136,12 @@ def evaluations(reading: Reading) -> tuple[Callable[..., None], Callable[..., No
 
     def rhs(t: float, x: Any, u: Any, p: np.ndarray, dx: Any, g: Any, m: Any) -> None:
         code, c = prepared_parameters(reading, p)
-        events = np.empty((code.lowered.rows["g"], 1))  # others where integers steer what switches
-        code.rhs(np.array([t]), _column(x), _column(u), c, dx[:, None], events, m[:, None])
-        g[:] = events[:, 0] if events.shape[0] == g.size else np.nan
+        dx[:], events, m[:] = code.values(code.rhs, "dx g m", (t, x, u), c)
+        g[:] = events if events.size == g.size else np.nan  # integers steer what switches
 
     def out(t: float, x: Any, u: Any, p: np.ndarray, y: np.ndarray) -> None:
         code, c = prepared_parameters(reading, p)
-        code.out(np.array([t]), _column(x), _column(u), c, y[:, None])
+        (y[:],) = code.values(code.out, "y", (t, x, u), c)
 
     return rhs, out
 
@@ -165,7 +155,3 @@ def prepared_parameters(
     c = np.zeros((code.rows, width))
     code.prepare(members, c)
     return code, c
-
-
-def _column(values: Any) -> np.ndarray:
-    return np.ascontiguousarray(values, dtype=float).reshape(-1, 1)

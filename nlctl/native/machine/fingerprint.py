@@ -26,6 +26,7 @@ import numpy as np
 
 from ...annotations import unreported
 from ...expressions.source import codes_in
+from ..purity.captured import in_cell
 from ..purity.held import LAID_OUT, OPAQUE, held_by, inherited
 from ..purity.outside import asked_outside, imports_in
 
@@ -54,14 +55,11 @@ STANDARD = [sysconfig.get_path(name) for name in ("stdlib", "platstdlib")]
 
 
 class _Seen(dict[int, Any]):
-    """Things that have been gone through, kept so that no other one takes their places.
-
-    `deep` says whether objects of libraries are read.
-    """
+    """Things that have been gone through, kept so that no other one takes their places."""
 
     def __init__(self, *, deep: bool) -> None:
         super().__init__()
-        self.deep = deep
+        self.deep = deep  # whether objects of libraries are read
         self.kept: list[Any] = []
 
     def add(self, thing: object) -> bool:
@@ -84,12 +82,13 @@ class Sourced(Protocol):
 def program_key(program: Sourced) -> str:
     """Return a key of a program's source and of everything that it refers to."""
     parts = program.namespace(native=True)
-    return _digest(program.source, *(x for name in sorted(parts) for x in (name, parts[name])))
+    return function_key(program.source, *(x for name in sorted(parts) for x in (name, parts[name])))
 
 
 def function_key(*things: Any) -> str:
     """Return a key of functions, and of other things that their machine code depends on."""
-    return _digest(*things)
+    seen = _Seen(deep=False)
+    return _digest_of(text for thing in things for text in _fingerprint(thing, seen))
 
 
 def content_key(*things: Any) -> str:
@@ -105,16 +104,11 @@ def unseen_in(*things: Any) -> list[str]:
 
 def content_of(*things: Any) -> tuple[str, list[str]]:
     """Return a key of what functions compute, and what it cannot see of them."""
-    texts = list(_content(things))
+    seen = _Seen(deep=True)  # into objects of libraries as well
+    texts = [text for thing in things for text in _fingerprint(thing, seen)]
     key = _digest_of(text for text in texts if not _is_place(text))
     unseen = (text.removeprefix(OPAQUE) for text in texts if text.startswith(OPAQUE))
     return key, list(dict.fromkeys(unseen))
-
-
-def _content(things: Iterable[Any]) -> Iterator[str]:
-    """Yield text for things and all that they reach, into objects of libraries as well."""
-    seen = _Seen(deep=True)
-    return (text for thing in things for text in _fingerprint(thing, seen))
 
 
 def _is_place(text: str) -> bool:
@@ -126,11 +120,6 @@ def _is_place(text: str) -> bool:
 def module_key(*modules: types.ModuleType) -> str:
     """Return a key of all that modules define: numba calls what they teach it, but not by name."""
     return _digest_of(text for module in modules for text in _defined(module))
-
-
-def _digest(*things: Any) -> str:
-    seen = _Seen(deep=False)
-    return _digest_of(text for thing in things for text in _fingerprint(thing, seen))
 
 
 def _digest_of(texts: Iterable[str]) -> str:
@@ -202,7 +191,7 @@ def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
     if _is_library(function.__module__) or (seen.deep and _is_controls(function)):
         yield f"{function.__module__}.{function.__qualname__}"
         if seen.deep and (function.__closure__ or function.__dict__) and seen.add(function):
-            cells = [_in_cell(cell) for cell in function.__closure__ or ()]
+            cells = [in_cell(cell) for cell in function.__closure__ or ()]
             yield from _fingerprint((cells, function.__defaults__, vars(function)), seen)
         return
     if not seen.add(function):
@@ -215,7 +204,7 @@ def _of_function(function: types.FunctionType, seen: _Seen) -> Iterator[str]:
     if seen.deep and "getattr" in names:
         names = sorted({*names, *_all_texts(function.__code__)})
     for cell in function.__closure__ or ():
-        yield from _fingerprint(_in_cell(cell), seen, names)
+        yield from _fingerprint(in_cell(cell), seen, names)
     for name in names:
         if name in function.__globals__:
             yield name
@@ -280,16 +269,17 @@ def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
         elif not name.startswith("__") and isinstance(part, _CONSTANTS):
             yield name
             yield from _fingerprint(part, seen)
-        elif seen.deep and not (_is_note(name) or isinstance(part, _MACHINERY)):
+        elif (
+            seen.deep
+            and not (name.startswith("__") or isinstance(part, _MACHINERY))
+            and (
+                name not in ("_abc_impl", "_is_protocol")  # Python's own
+            )
+        ):
             yield name
             yield from _fingerprint(getattr(part, "__func__", part), seen)
     for base in (*kind.__bases__, *((type(kind),) if seen.deep else ())):
         yield from _of_class(base, seen)
-
-
-def _is_note(name: str) -> bool:
-    """Whether an attribute of a class is Python's own."""
-    return name.startswith("__") or name in ("_abc_impl", "_is_protocol")
 
 
 def _is_controls(thing: object) -> bool:
@@ -354,13 +344,6 @@ def _of_held(thing: object, held: Any, seen: _Seen) -> Iterator[str]:
     elif seen.add(thing):
         yield f"object {type(thing).__qualname__}"
         yield from _fingerprint(held, seen)
-
-
-def _in_cell(cell: types.CellType) -> Any:
-    try:
-        return cell.cell_contents
-    except ValueError:  # not yet filled
-        return None
 
 
 def _of_module(module: types.ModuleType, seen: _Seen, names: Iterable[str]) -> Iterator[str]:
@@ -446,7 +429,5 @@ def _constant(value: object) -> str:
         return f"array {value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, set | frozenset):
         return f"{type(value).__name__} {sorted(map(repr, value))}"  # in an order of its own
-    text = repr(value)
-    return (
-        re.sub(r" at 0x[0-9a-f]+", "", text) if " at 0x" in text else text
-    )  # addresses differ between processes
+    text = repr(value)  # addresses differ between processes
+    return re.sub(r" at 0x[0-9a-f]+", "", text) if " at 0x" in text else text

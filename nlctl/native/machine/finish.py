@@ -81,7 +81,10 @@ def _object_code(source: str | bytes) -> bytes:
     machine = _machine()
     if isinstance(source, str):
         return program_code(source, machine)
-    builder = llvm.create_pass_builder(machine, _tuning())
+    options = llvm.create_pipeline_tuning_options(3)
+    for name, value in TUNING.items():
+        setattr(options, name, value)
+    builder = llvm.create_pass_builder(machine, options)
     passes = builder.getModulePassManager()
     passes.add_refprune_pass()
     return _emitted(llvm.parse_bitcode(lzma.decompress(source)), machine, passes, builder)
@@ -101,13 +104,6 @@ def _emitted(module: Any, machine: Any, passes: Any, builder: Any) -> bytes:
     module.verify()
     passes.run(module, builder)
     return machine.emit_object(module)
-
-
-def _tuning() -> Any:
-    options = llvm.create_pipeline_tuning_options(3)
-    for name, value in TUNING.items():
-        setattr(options, name, value)
-    return options
 
 
 def _key(source: str | bytes) -> str:

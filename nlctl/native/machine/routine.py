@@ -14,7 +14,7 @@ from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.interpret import interpreted_function
 from ..codegen.solver import plain_solver
 from ..lower import Lowered
-from ..opaque.calls import Call
+from ..opaque.called import Call
 from .calls import CALL_FAILED, Native, native_calls, plain_calls
 from .finish import Loaded, finished
 
@@ -111,15 +111,8 @@ def entry(function: Any) -> Any:
     return function.address if isinstance(function, Routine) else function
 
 
-def raise_failures(functions: Sequence[Any], c: np.ndarray) -> None:
-    """Raise what an opaque function has raised within these, whose parameters were `c`."""
-    for function in functions:
-        if isinstance(function, Routine):
-            function.check(c)
-
-
-def called_back(functions: Sequence[Any]) -> tuple[str, ...]:
-    """Return the names of opaque functions that these call back in Python."""
-    calls = [call for f in functions if isinstance(f, Routine) for call in f.opaque]
-    names = [call.call.name for call in calls if call.call.name in call.native.called_back]
-    return tuple(dict.fromkeys(names))
+def entries_of(functions: Sequence[Any]) -> np.ndarray:
+    """Return what integrators take of several functions."""
+    entries = [entry(function) for function in functions]
+    plain = any(callable(address) for address in entries)
+    return np.array(entries, dtype=object if plain else np.int64)

@@ -90,21 +90,17 @@ def _is_safe(status: os.stat_result, path: Path) -> bool:
     else:
         return True
     folder = cache_folder()
-    _warn(
-        folder,
-        f"machine code in '{folder}' is not used, since '{path}' {why}: "
-        f"{remedy}set NLCTL_CACHE_DIR to a folder of your own",
-    )
+    if not _warned(folder):  # once
+        _warned(folder).append(True)
+        warnings.warn(
+            f"machine code in '{folder}' is not used, since '{path}' {why}: "
+            f"{remedy}set NLCTL_CACHE_DIR to a folder of your own",
+            CacheWarning,
+            stacklevel=2,
+        )
     return False
 
 
 @functools.cache
 def _warned(folder: Path) -> list[bool]:
     return []
-
-
-def _warn(folder: Path, message: str) -> None:
-    """Warn once for a folder."""
-    if not _warned(folder):
-        _warned(folder).append(True)
-        warnings.warn(message, CacheWarning, stacklevel=2)

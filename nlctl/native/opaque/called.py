@@ -7,7 +7,7 @@ argument that the function takes apart.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -16,16 +16,19 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba import carray  # pyright: ignore[reportPrivateImportUsage]
 
 from ...blocks import Block
+from ...equations import equation
 from ...errors import BlockError, CompileError
 from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...upstream.systems import System
 from ...wording import counted
 from ..diagram.parameters import Slot, current_values
-from ..purity import dicts, vectors
+from ..purity import dicts
 from ..purity.dicts import (
+    as_vector,
     callable_constant,
     make_callable,
     params_record,
@@ -33,10 +36,57 @@ from ..purity.dicts import (
     unpacked_arguments,
 )
 from ..purity.objects import frozen
-from ..purity.vectors import as_vector
-from .calls import Call, Source
 
-TAUGHT = (dicts, vectors)  # modules that teach numba what functions of others use
+TAUGHT = (dicts,)  # modules that teach numba what functions of others use
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Source for numba, what it refers to by name, and the modules that teach numba."""
+
+    source: str
+    names: Mapping[str, Any]
+    taught: tuple[Any, ...]
+
+    def namespace(self, *, native: bool) -> dict[str, Any]:
+        """Return everything that the source refers to, by name."""
+        return {"np": np, "carray": carray, "equation": equation, **self.names}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Call:
+    """A function that is called for one member at a time."""
+
+    name: str
+    # whose function it is, and which one
+    block: str
+    kind: str
+    lengths: tuple[int, ...]  # sizes of t, x, u, p and y
+    reason: str  # why it could not be traced
+    # it in Python: takes t, x, u and p in one array, returns y
+    function: Callable[[np.ndarray], np.ndarray]
+    # makes the `Source` of ``name(given, y)`` for numba; None where numba would understand it in
+    # another way
+    source: Callable[[], Source] | None
+
+    @property
+    def given(self) -> int:
+        """Number of arguments."""
+        return sum(self.lengths[:-1])
+
+    @property
+    def failed(self) -> int:
+        """Row in which it says that it has failed, counted from its first."""
+        return sum(self.lengths)
+
+    @property
+    def rows(self) -> int:
+        """Rows that it takes: arguments, results, whether it has failed, and with what."""
+        return self.failed + 1 + self.given
+
+    def of_column(self, column: np.ndarray) -> None:
+        """Read its arguments from its rows for one member, and write its results there."""
+        column[self.given : self.failed] = self.function(column[: self.given].copy())
 
 
 def call_of(

@@ -7,18 +7,19 @@ looks whether they are still what they were.
 from __future__ import annotations
 
 import functools
+from abc import ABC, abstractmethod
 from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import compress
-from operator import is_, not_
+from itertools import chain, compress
+from operator import getitem, is_, not_
 from types import CellType, CodeType, FunctionType, MethodType
 from typing import Any
 
 import numpy as np
 
-from .values import PLAIN
+from .values import PLAIN, KnownValue, captured
 
 GONE = object()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
@@ -37,10 +38,7 @@ class Captured:
     def now(self) -> Any:
         """What it is."""
         if isinstance(self.holder, CellType):
-            try:
-                return self.holder.cell_contents
-            except ValueError:  # emptied
-                return GONE
+            return in_cell(self.holder, GONE)
         if type(self.holder) is dict:
             return self.holder.get(self.name, GONE)
         return getattr(self.holder, self.name, GONE)
@@ -53,6 +51,14 @@ class Captured:
             owner = owner.func
         name = getattr(owner, "__qualname__", "")
         return f"{name}.{self.name}" if name else self.name
+
+
+def in_cell(cell: CellType, empty: Any = None) -> Any:
+    """Return what is in the cell of a closure, something else if it is not filled."""
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return empty
 
 
 def noted(holder: object, name: str, value: object) -> Captured:
@@ -77,19 +83,22 @@ class CapturedValues:
 
     def __init__(self, notes: Iterable[Captured]) -> None:
         every = tuple({(id(n.holder), n.name, id(n.then)): n for n in notes}.values())
-        is_alike = [type(n.holder) is not dict and n.now is n.then for n in every]
-        alike = list(compress(every, is_alike))
+        is_alike = [n.now is n.then for n in every]
         self.notes, self.others = every, list(compress(every, map(not_, is_alike)))
+        in_dict = [n for n in compress(every, is_alike) if type(n.holder) is dict]
+        alike = [n for n in compress(every, is_alike) if type(n.holder) is not dict]
         in_cell = "cell_contents"
-        self.names = [in_cell if isinstance(n.holder, CellType) else n.name for n in alike]
-        self.holders = [n.holder for n in alike]
-        self.objects = [n.then for n in alike]
+        names = [in_cell if isinstance(n.holder, CellType) else n.name for n in alike]
+        self.attributes = [n.holder for n in alike], names
+        self.items = [n.holder for n in in_dict], [n.name for n in in_dict]
+        self.objects = [n.then for n in (*alike, *in_dict)]
 
     def changed(self) -> Captured | None:
         """Return the first value that is not what it was."""
         try:
-            alike = all(map(is_, map(getattr, self.holders, self.names), self.objects))
-        except (AttributeError, ValueError):  # gone, or a cell that was emptied
+            values = chain(map(getattr, *self.attributes), map(getitem, *self.items))
+            alike = all(map(is_, values, self.objects))
+        except (AttributeError, KeyError, ValueError):  # gone, or a cell that was emptied
             alike = False
         notes = self.others if alike else self.notes
         for note in notes:
@@ -136,8 +145,8 @@ def same(now: Any, then: Any) -> bool:
         return False
     if isinstance(now, np.ndarray):
         alike = now.dtype == then.dtype and now.shape == then.shape
-        masks = [np.ma.getmaskarray(v) for v in (now, then) if isinstance(v, np.ma.MaskedArray)]
-        alike = alike and (not masks or np.array_equal(masks[0], masks[1]))
+        if alike and isinstance(now, np.ma.MaskedArray):
+            alike = np.array_equal(np.ma.getmaskarray(now), np.ma.getmaskarray(then))
         # bit by bit: NaN is itself, 0 is not -0, an object is not its equal
         return alike and np.asarray(now).tobytes() == np.asarray(then).tobytes()
     if isinstance(now, MethodType):  # a new one each time it is read
@@ -160,3 +169,35 @@ def _same_held(now: Any, held: Any) -> bool:
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))
+
+
+class Walk(ABC):
+    """A walk through a function and all that it calls: what its parts share, and how to walk on."""
+
+    def __init__(self) -> None:
+        self.read: dict[tuple[int, str], Captured] = {}
+        self.unbound: list[str] = []
+        self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
+
+    def captured(self, holder: object, name: str, value: object) -> KnownValue:
+        """Return what is known of a value that is read from around a function, and note it."""
+        if (id(holder), name) not in self.read:
+            self.read[id(holder), name] = noted(holder, name, value)
+        return captured(value)
+
+    def note(self, notes: Iterable[Captured]) -> None:
+        """Keep notes of what a function or an object consists of."""
+        for note in notes:
+            self.read.setdefault((id(note.holder), note.name), note)
+
+    @abstractmethod
+    def call(
+        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
+        """Return what is known of the result of a call."""
+
+    @abstractmethod
+    def function(
+        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
+    ) -> KnownValue:
+        """Return what is known of the result of somebody's Python function."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...expressions.source import cells_of, source_file
 from . import known_calls, made
+from .captured import Walk
 from .known_calls import MEMORY
 from .values import (
     FRESH,
@@ -40,7 +41,6 @@ from .values import (
     least_upper_bound,
     library,
 )
-from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
 OPERATORS = {
@@ -281,7 +281,8 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, RowOf):
             return least_upper_bound(base.known.parts)
         if isinstance(base.known, OneOf):
-            return element(base) if _are_containers(base.known) else base
+            lists = all(isinstance(choice.known, list | tuple) for choice in base.known.choices)
+            return element(base) if lists else base
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
             return self.walk.function(getter, [base, *values[:1]], {})
@@ -419,10 +420,6 @@ def _part(value: KnownValue, i: int, count: int) -> KnownValue:
             isinstance(row[i], (*PLAIN, np.ndarray)) for row in rows
         ) else [captured(row[i]) for row in rows])  # fmt: skip
     return element(value)
-
-
-def _are_containers(known: OneOf) -> bool:
-    return all(isinstance(choice.known, list | tuple) for choice in known.choices)
 
 
 def _is_plain_attribute(thing: object, name: str) -> bool:

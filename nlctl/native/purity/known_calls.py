@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import made
+from .captured import Walk
 from .values import (
     FRESH,
     OUTSIDE,
@@ -40,7 +41,6 @@ from .values import (
     library,
     python_function,
 )
-from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"
@@ -169,11 +169,14 @@ def _called(
         if thing.__name__ not in _OF_TABLES:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
         return OUTSIDE
-    if isinstance(thing, MethodType) and _is_table(type(owner)):
+    cls = type(owner)  # of functions of numbers: splines, polynomials, rotations
+    is_table = cls is np.poly1d or cls.__module__.startswith(_TABLES)
+    if isinstance(thing, MethodType) and is_table:
         if thing.__name__.startswith(("set_", "add_")):
             raise Impure(f"changes with {thing.__name__}() what it did not make", MEMORY)
         return KnownValue(True, False, known=Pure())  # (other changes are named in CHANGING)
-    if function is None or not _walkable(function):
+    # somebody's, or one of python-control's, can be read
+    if function is None or (library(function) or "control").partition(".")[0] != "control":
         name = getattr(thing, "__qualname__", type(thing).__name__)
         module = getattr(thing, "__module__", None) or getattr(owner, "__name__", "")
         text = f"{module}.{name}" if module else name
@@ -183,11 +186,6 @@ def _called(
     if not isinstance(thing, MethodType):
         walk.captured(type(thing), "__call__", function)
     return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
-
-
-def _is_table(cls: type) -> bool:
-    """Whether objects of a class are functions of numbers: splines, polynomials, rotations."""
-    return cls is np.poly1d or cls.__module__.startswith(_TABLES)
 
 
 def method(
@@ -252,11 +250,6 @@ def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
 def _written(base: KnownValue, what: str) -> None:
     if not base.own:
         raise Impure(f"changes with {what} what it did not make", MEMORY)
-
-
-def _walkable(function: FunctionType) -> bool:
-    """Whether a Python function is somebody's, or one of python-control's."""
-    return (library(function) or "control").partition(".")[0] == "control"
 
 
 def check_object(value: KnownValue, what: str) -> None:

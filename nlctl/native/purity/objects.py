@@ -19,6 +19,7 @@ import numpy as np
 
 from ...expressions.source import Definition, Unreadable, cells_of, definition
 from ...upstream.numba_internals import CPUDispatcher
+from .captured import in_cell
 
 # what machine code takes as a constant, or can call
 UNDERSTOOD = (
@@ -48,7 +49,11 @@ def frozen(function: Any) -> Any:
     except Unreadable:
         return function
     old_cells = cells_of(function).items()
-    new_cells = [_cell(name, cell, node) for name, cell in old_cells]
+    records = [_record(in_cell(cell), name, node) for name, cell in old_cells]
+    new_cells = [
+        cell if record is None else CellType(record)  # what needs none stays as it is
+        for (_, cell), record in zip(old_cells, records, strict=True)
+    ]
     new_globals = {
         name: record
         for name in {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
@@ -68,16 +73,6 @@ def _with(function: FunctionType, names: dict[str, Any], cells: list[CellType]) 
     copied.__kwdefaults__ = function.__kwdefaults__
     copied.__module__, copied.__qualname__ = function.__module__, function.__qualname__
     return copied
-
-
-def _cell(name: str, cell: CellType, node: Definition) -> CellType:
-    """Return a cell with a record instead of an object; what needs none stays as it is."""
-    try:
-        value = cell.cell_contents
-    except ValueError:  # nothing in it yet
-        return cell
-    record = _record(value, name, node)
-    return cell if record is None else CellType(record)
 
 
 def _method(function: Any, owner: object) -> Any:
@@ -120,7 +115,7 @@ def _held(thing: object, chains: list[tuple[str, ...]]) -> Any:
     values: dict[str, Any] = {}
     for attribute in dict.fromkeys(chain[0] for chain in chains):
         value = getattr(thing, attribute, None)
-        if not _is_constant(value):
+        if not isinstance(value, bool | int | float | str | np.number | np.ndarray):
             value = _held(value, [chain[1:] for chain in chains if chain[0] == attribute])
         if value is None:
             return None
@@ -142,10 +137,6 @@ def _uses(name: str, node: Definition) -> Iterator[tuple[str, ...]]:
                 chain.append(around.attr)
                 around = owner.get(id(around))
             yield tuple(chain) if around is None and isinstance(here.ctx, ast.Load) else ()
-
-
-def _is_constant(value: object) -> bool:
-    return isinstance(value, bool | int | float | str | np.number | np.ndarray)
 
 
 # -- imports: numba knows none ---------------------------------------------------------------------

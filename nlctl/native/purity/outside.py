@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from ...expressions.source import cells_of, codes_in
+from .captured import in_cell
 
 _EVERYTHING = frozenset[str]()
 _MODULES: dict[str, tuple[str, frozenset[str]]] = {  # by module; all of it if nothing is named
@@ -36,10 +37,10 @@ _FRAMES = {"_getframe", "currentframe", "__globals__", "__annotations__", "__bui
 
 def asked_outside(function: types.FunctionType) -> Iterator[str]:
     """Yield what a function asks, with the words that ask, ``time.time``."""
-    cells, names = _cells(function), function.__globals__
+    cells, names = cells_of(function), function.__globals__
     for code in codes_in(function.__code__):
         for word, follower in _pairs(code):
-            thing = cells[word] if word in cells else names.get(word)
+            thing = in_cell(cells[word]) if word in cells else names.get(word)
             if not isinstance(thing, types.ModuleType):
                 continue
             if answer := outside_of(thing.__name__, follower):
@@ -81,14 +82,3 @@ def _pairs(code: types.CodeType) -> tuple[tuple[str, str], ...]:
     words = (word for _, word in _words(code))
     near = ((a, b) for a, b in itertools.pairwise(words) if isinstance(a, str))
     return tuple(dict.fromkeys((a, b) for a, b in near if isinstance(b, str)))
-
-
-def _cells(function: types.FunctionType) -> dict[str, Any]:
-    """Return what a function closes over, by name."""
-    contents = {}
-    for name, cell in cells_of(function).items():
-        try:
-            contents[name] = cell.cell_contents
-        except ValueError:  # not yet filled
-            continue
-    return contents

@@ -124,10 +124,9 @@ def _moved(search: Any, values: Iterable[np.ndarray]) -> Any:
 
 
 class _Reader:
-    """Goes through expressions; a value is rounded again by each that uses it.
+    """Goes through expressions; a value is rounded again by each that uses it."""
 
-    Of two that use it one may have been computed in another way, as powers are by products.
-    """
+    # Of two that use it one may have been computed in another way, as powers are by products.
 
     def __init__(self, arrays: Mapping[str, np.ndarray], searches: Functions, calls: Functions):
         self.arrays = arrays

@@ -19,8 +19,6 @@ from ...expressions.derivatives import tangents
 from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 
-__all__ = ["affine", "bend_places", "replaced_parts", "unreadable", "zero_between"]
-
 _LINEAR = ("add", "sub", "neg", "sum", "item", "slice", "concat")
 _BENDS = ("maximum", "minimum", "absolute", "select")
 _ORDERS = ("lt", "le", "gt", "ge")
@@ -34,11 +32,7 @@ LeafDerivative = Callable[[Expr], Expr | None]
 
 def affine(expr: Expr, leaf: Expr) -> bool:
     """Whether an expression is a + b v for all values, as it is written."""
-    depends: set[Expr] = {leaf}
-    for node in needed([expr]):
-        by = [arg in depends for arg in node.args]
-        if not any(by):
-            continue
+    for node, by in _dependent(expr, leaf):
         linear = (
             node.op in _LINEAR
             or (node.op == "mul" and sum(by) == 1)
@@ -48,8 +42,17 @@ def affine(expr: Expr, leaf: Expr) -> bool:
         )
         if not linear:
             return False
-        depends.add(node)
     return True
+
+
+def _dependent(expr: Expr, leaf: Expr) -> Iterator[tuple[Expr, list[bool]]]:
+    """Yield what depends on a leaf, inner parts first, and by which arguments it does."""
+    depends = {leaf}
+    for node in needed([expr]):
+        by = [arg in depends for arg in node.args]
+        if any(by):
+            depends.add(node)
+            yield node, by
 
 
 def unreadable(graph: Graph, rate: Expr, leaf: Expr, tangent: LeafDerivative) -> str:
@@ -79,11 +82,9 @@ def bend_places(graph: Graph, rate: Expr, leaf: Expr, tangent: LeafDerivative) -
 def zero_between(
     graph: Graph, rate: Expr, leaf: Expr, height: Expr, breaks: Sequence[Expr]
 ) -> tuple[list[Expr], list[Expr]]:
-    """Return a and b of the straight line through both ends, and of the piece with the zero.
-
-    The first has the values of the rate R at v = height and -height.  The second is 0 where R is,
-    or at the end that is nearer to it where no v of [-height, height] makes R vanish.
-    """
+    """Return a and b of the straight line through both ends, and of the piece with the zero."""
+    # The first has the values of the rate R at v = height and -height.  The second is 0 where R is,
+    # or at the end that is nearer to it where no v of [-height, height] makes R vanish.
     op, const = graph.op, graph.const
     least = op("neg", height)
     inner = [op("maximum", op("minimum", z, height), least) for z in breaks]
@@ -114,15 +115,11 @@ def _chosen(graph: Graph, condition: Expr, one: Any, other: Any) -> tuple[Expr, 
 
 def _bends(expr: Expr, leaf: Expr) -> list[Expr]:
     """Return the parts at which an expression may bend as the leaf changes, inner ones first."""
-    depends, found = {leaf}, []
-    for node in needed([expr]):
-        by = [arg in depends for arg in node.args]
-        if not any(by):
-            continue
-        depends.add(node)
-        if node.op in _BENDS and (node.op != "select" or by[0]):
-            found.append(node)
-    return found
+    return [
+        node
+        for node, by in _dependent(expr, leaf)
+        if node.op in _BENDS and (node.op != "select" or by[0])
+    ]
 
 
 def _ways(graph: Graph, bend: Expr) -> tuple[Expr, Expr]:
@@ -186,10 +183,7 @@ def _jumps(graph: Graph, choice: Expr, leaf: Expr, tangent: LeafDerivative) -> b
 
 
 def _at_random(exprs: Sequence[Expr]) -> list[np.ndarray] | None:
-    """Return values of expressions for random values of all that they read, if they have any.
-
-    Parameters are positive: the bounds of a symmetric dead zone stand in order then.
-    """
+    """Return values of expressions for random values of all that they read, if they have any."""
     rng, rows = np.random.default_rng(1), dict.fromkeys("txup", 0)
     for node in needed(exprs):
         if node.op == "leaf":
@@ -197,7 +191,7 @@ def _at_random(exprs: Sequence[Expr]) -> list[np.ndarray] | None:
             end = start + step * ((node.size or 1) - 1) + 1
             rows[array] = max(rows.get(array, 0), end)
     arrays = {name: rng.normal(size=(n, _POINTS)) for name, n in rows.items()}
-    arrays["p"] = 0.5 + np.abs(arrays["p"])
+    arrays["p"] = 0.5 + np.abs(arrays["p"])  # bounds of a symmetric dead zone stand in order
     try:
         found = evaluate_expressions(exprs, arrays)
     except (Untraceable, KeyError):

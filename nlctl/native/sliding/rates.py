@@ -11,18 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ...errors import CompileError
+from ...expressions.bends import replaced_parts
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
-from .pieces import (
-    LeafDerivative,
-    affine,
-    bend_places,
-    replaced_parts,
-    slope_of,
-    unreadable,
-    zero_between,
-)
-from .second import Limits, SecondOrder, second_order
+from .pieces import LeafDerivative, affine, bend_places, slope_of, unreadable, zero_between
+from .second import Limits, second_order
 
 OUTPUTS = "relays"  # the array of leaves that stand for the relays' outputs
 _SMOOTH = "smooth the jump over a small width, or give it hysteresis (nlctl.Relay)"
@@ -51,11 +44,9 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingRate:
-    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v.
+    """Drift a and gain b of the rate u' = a + b v of a relay's input, and the relay's output v."""
 
-    Of a rate in several pieces: a and b of the straight line through both ends, v = +-height.
-    """
-
+    # of a rate in several pieces those of the straight line through both ends, v = +-height
     drift: Expr
     gain: Expr
     output: Expr
@@ -141,13 +132,12 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
         )
     slope = slope_of(graph, relay.leaf, motion.solutions)
     gain = slope(rate) or graph.const(0.0)  # what is called as it stands has none: refused
-    beyond = None if _acts(gain) else _second(graph, relay, rate, motion, slope)
+    acts = gain.op != "const" or gain.data != 0.0
+    beyond = None if acts else _second(graph, relay, rate, motion, slope)
     if beyond is not None:
-        return _Rate(
-            whole=graph.joined([(e, 1) for e in (*beyond.line, *beyond.piece)]),
-            line=beyond.line,
-            piece=beyond.piece,
-        )
+        line, piece = beyond
+        whole = graph.joined([(e, 1) for e in (*line, *piece)])
+        return _Rate(whole=whole, line=line, piece=piece)
     if affine(rate, relay.leaf):
         (drift,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
         return _Rate(whole=rate, line=(drift, gain), piece=(drift, gain))
@@ -163,14 +153,9 @@ def _read(graph: Graph, who: str, relay: SlidingInput, rate: Expr, motion: Motio
     return _Rate(whole=rate, line=line, piece=piece)
 
 
-def _acts(gain: Expr) -> bool:
-    """Whether a relay's output has a gain in the rate of its input that is not 0 as written."""
-    return not (gain.op == "const" and gain.data == 0.0)
-
-
 def _second(
     graph: Graph, relay: SlidingInput, rate: Expr, motion: Motion, slope: LeafDerivative
-) -> SecondOrder | None:
+) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]] | None:
     """Return the second-order sliding of one relay alone, without what nobody knows the rate of."""
     (rate,) = replaced_parts(graph, [rate], {relay.leaf: graph.const(0.0)})
     found = second_order(
@@ -178,7 +163,7 @@ def _second(
     )
     if found is None:
         return None
-    parts = needed([*found.line, *found.piece])
+    parts = needed([part for pair in found for part in pair])
     known = not any(
         (e.op == "leaf" and e.data[0] == OUTPUTS)
         or e.op in ("call", "solve")

@@ -21,8 +21,6 @@ from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, Untraceable, needed
 from .pieces import LeafDerivative, affine, bend_places, unreadable, zero_between
 
-__all__ = ["Limits", "SecondOrder", "second_order"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
@@ -34,19 +32,6 @@ class Limits:
     rest_rate: Expr
 
 
-@dataclass(frozen=True, kw_only=True)
-class SecondOrder:
-    """What a relay is given in place of a and b of its input's rate, and what it outputs by.
-
-    `line` leads to u = 0 from both sides where it slides, and is u' elsewhere.  `piece` is such
-    that the output is, within the height, the one with u'' = -2 r u' - r^2 u: r is
-    rest_rate / (2 rest), so that from u = 0 it comes no further than `rest`.
-    """
-
-    line: tuple[Expr, Expr]
-    piece: tuple[Expr, Expr]
-
-
 def second_order(
     graph: Graph,
     given: Expr,
@@ -55,8 +40,12 @@ def second_order(
     limits: Limits,
     along: Callable[[Expr], Expr | None],
     slope: LeafDerivative,
-) -> SecondOrder | None:
-    """Return the second-order sliding of a relay, None where there is none to be read off."""
+) -> tuple[tuple[Expr, Expr], tuple[Expr, Expr]] | None:
+    """Return what a relay is given instead of a and b of its input's rate, and outputs by."""
+    # The first leads to u = 0 from both sides where it slides, and is u' elsewhere.  The second is
+    # such that the output is, within the height, the one with u'' = -2 r u' - r^2 u: r is
+    # rest_rate / (2 rest), so that from u = 0 it comes no further than `rest`.
+    # None where there is no second-order sliding to be read off.
     try:
         (force,) = tangents(graph, [rate], along)
         (jerk,) = tangents(graph, [force], along) if force is not None else (None,)
@@ -73,7 +62,7 @@ def second_order(
         graph.op("select", ready, line[0], rate),
         graph.op("select", ready, line[1], graph.const(0.0)),
     )
-    return SecondOrder(line=held, piece=_output(graph, given, rate, piece, limits))
+    return held, _output(graph, given, rate, piece, limits)
 
 
 def _ready(graph: Graph, rate: Expr, forces: tuple[Expr, Expr], leaf: Expr, limits: Limits) -> Expr:

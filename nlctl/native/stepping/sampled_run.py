@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,14 +13,6 @@ from ..compiled import Compiled
 from ..integrate.state import Status
 from ..machine.evaluations import prepared_parameters
 from ..results import Statistics, Trajectory
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class KeptSample:
-    """What a run in discrete time was before a step."""
-
-    k: int
-    states: np.ndarray
 
 
 class SampledRun:
@@ -72,13 +63,13 @@ class SampledRun:
         t, x, given = self._given
         t[0], x[:, 0], given[:, 0] = self.time, self.states, u
 
-    def keep(self) -> KeptSample:
+    def keep(self) -> tuple[int, np.ndarray]:
         """Return all that the run knows."""
-        return KeptSample(k=self.k, states=self.states)
+        return self.k, self.states
 
-    def go_back(self, kept: KeptSample) -> None:
+    def go_back(self, kept: tuple[int, np.ndarray]) -> None:
         """Stand where the run once stood."""
-        self.k, self.states = kept.k, kept.states
+        self.k, self.states = kept
 
     def compared(self, x0: np.ndarray, params: Any, audit: Audit) -> None:
         """Compare the program with python-control at both ends of the step that was made."""

@@ -21,7 +21,7 @@ from ..compiled import Compiled, as_compiled
 from ..integrate.methods.tableau import Tableau
 from ..own_errors import own_error
 from ..response import failure
-from ..settings import Settings
+from ..settings import Settings, settings_of
 from .held import HeldRun
 from .sampled_run import SampledRun
 
@@ -160,34 +160,7 @@ class Stepper:
         u = self._inputs(inputs)
         checked_params(params)
         x0 = state_array(self.compiled.system, initial_state)
-        return self.begin(x0, self.compiled.parameter_vector(params), params, time, u)
-
-    def begin(
-        self, x0: np.ndarray, p: np.ndarray, params: Any, time: float, u: np.ndarray
-    ) -> np.ndarray:
-        """Begin again with a state and a vector of parameters, see `reset`.
-
-        Parameters
-        ----------
-        x0 : ndarray of shape (nstates,)
-            The state.
-        p : ndarray
-            All parameters, in their order.
-        params : mapping or None
-            Those that were given, as python-control takes them.
-        time : float
-            At which the run begins (s).
-        u : ndarray of shape (ninputs,)
-            The inputs of the outputs that are returned.
-
-        Returns
-        -------
-        ndarray of shape (noutputs,)
-            The outputs at the beginning.
-        """
-        self.run.begin(x0, p, number("reset", "time", time))
-        self._params, self._failed, self._compared = params, None, False
-        return self.run.shown(u)
+        return begun(self, (x0, self.compiled.parameter_vector(params)), params, time, u)
 
     @as_annotated
     def step(self, inputs: ArrayLike = 0.0) -> np.ndarray:
@@ -225,7 +198,7 @@ class Stepper:
         if start and not self._compared and outputs is not None:
             self._compared = True
             self.run.compared(before, self._params, self._audit)
-        return self.fail() if outputs is None else outputs
+        return failed(self) if outputs is None else outputs
 
     @as_annotated
     def rollout(self, inputs: ArrayLike) -> np.ndarray:
@@ -323,33 +296,31 @@ class Stepper:
             )
         return given.astype(float)
 
-    def fail(self) -> np.ndarray:
-        """Note why the run has ended; raise it, or return NaN.
-
-        Returns
-        -------
-        ndarray of shape (noutputs,)
-            NaN, where errors are ignored.
-
-        Raises
-        ------
-        DivergedError
-            Why it has ended, where they are not.
-        """
-        result, p = self.run.ended(), self.run.p
-        name, t = self.compiled.system.name, self.run.time
-        self._failed = failure(self.compiled, result, p, self._params) or DivergedError(
-            f"'{name}' diverged: no finite outputs at t = {t:.6g} s", t
-        )
-        if self._ignores:
-            return self._ended()
-        raise own_error(self.compiled, result, self._params) or self._failed
-
     def _ended(self) -> np.ndarray:
         """Return the outputs of a run that has ended."""
         if not self._ignores:
             raise UsageError(f"{self.message}: call reset() or restore(state) to continue")
         return np.full(self.compiled.system.noutputs or 0, np.nan)
+
+
+def begun(
+    one: Stepper, start: tuple[np.ndarray, np.ndarray], params: Any, time: float, u: np.ndarray
+) -> np.ndarray:
+    """Begin again with a state and a vector of parameters; return the outputs with inputs `u`."""
+    one.run.begin(*start, number("reset", "time", time))
+    one._params, one._failed, one._compared = params, None, False
+    return one.run.shown(u)
+
+
+def failed(one: Stepper) -> np.ndarray:
+    """Note why a run has ended; raise it, or return NaN where errors are ignored."""
+    result, t = one.run.ended(), one.run.time
+    one._failed = failure(one.compiled, result, one.run.p, one._params) or DivergedError(
+        f"'{one.compiled.system.name}' diverged: no finite outputs at t = {t:.6g} s", t
+    )
+    if one._ignores:
+        return one._ended()
+    raise own_error(one.compiled, result, one._params) or one._failed
 
 
 @as_annotated
@@ -420,11 +391,9 @@ def stepper(
     [0.393469, 0.238651]
     """
     dt = number("stepper", "dt", dt, above=0)
-    given = {"max_steps": max_steps, "max_step": max_step, "step": step}
-    settings = Settings(
-        rtol=rtol, atol=atol, method="auto" if method is None else method,
-        **{name: value for name, value in given.items() if value is not None},
-    )  # fmt: skip
+    settings = settings_of(
+        method, rtol=rtol, atol=atol, max_steps=max_steps, max_step=max_step, step=step
+    )
     compiled = as_compiled(system)
     period = compiled.system.dt
     if not ct.isctime(compiled.system) and period is not True and not np.isclose(period, dt):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...annotations import as_annotated
 from ...arguments import ATOL, RTOL
+from ...attributes import with_parameters_of
 from ...errors import ParameterError
 from ...params import as_numbers, integer
 from ...responses.arguments import checked_params
@@ -20,7 +21,7 @@ from ..integrate.methods.tableau import Tableau
 from ..members import members
 from .held import HeldRun
 from .pool import Pool
-from .stepper import stepper
+from .stepper import begun, failed, stepper
 from .window import HELD_STEPS
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class VectorStepper:
         chosen, u = self._chosen(members), self._inputs("reset", inputs)
         x0, p, given = self._begins(initial_state, params)
         for i in chosen:
-            self._y[i] = self._members[i].begin(x0[:, i], p[:, i], given(i), time, u[i])
+            self._y[i] = begun(self._members[i], (x0[:, i], p[:, i]), given(i), time, u[i])
         return self._y.copy()
 
     @as_annotated
@@ -160,7 +161,7 @@ class VectorStepper:
         if together.size and self._pool is not None:
             self._y[together] = self._pool.advance(together, u[together])
             for i in together[~np.isfinite(self._y[together]).all(axis=1)]:
-                self._y[i] = self._members[i].fail()
+                self._y[i] = failed(self._members[i])
         alone = np.ones(self.size, dtype=bool)
         alone[together] = False
         for i in np.flatnonzero(alone):
@@ -232,6 +233,7 @@ class VectorStepper:
 
 
 @as_annotated
+@with_parameters_of(stepper)
 def vector_stepper(
     system: System | Compiled,
     dt: float,
@@ -249,22 +251,10 @@ def vector_stepper(
 
     Parameters
     ----------
-    system : control.InputOutputSystem or Compiled
-        A diagram, or what `compile` made of it.
     dt : float
         Length of a step (s), as in `stepper`.
     size : int
         Number of members.
-    method : str or Tableau, optional
-        As in `input_output_response`.
-    rtol, atol : float, optional
-        Tolerances of the integrator.
-    max_steps : int, optional
-        Attempted steps of the integrator after which a run is given up.
-    max_step : float, optional
-        Longest step of the integrator (s).
-    step : float, optional
-        A fixed step of the integrator (s); 0 for error control.
     audit : bool or "every run", optional
         As in `stepper`, for each member.
 

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ...delays.variation import Variation
 from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
-from ..driver import prepared
-from ..histories import variations
+from ..driver import Course, prepared
 from ..integrate.memory import data_address, type_of, with_fields
 from ..integrate.workspace import Task
 from ..run import Run
@@ -65,8 +63,8 @@ def _laid(
 ) -> Run:
     """Lay out a run over a window, with no inputs yet."""
     inputs = np.zeros((compiled.system.ninputs or 0, times.size))
-    varied: list[Variation | None] = variations(compiled, times)
-    return prepared(compiled, times, inputs, x0[:, None], p[:, None], settings, varied)
+    course = Course(compiled=compiled, times=times, inputs=inputs, settings=settings)
+    return prepared(course, x0[:, None], p[:, None])
 
 
 def packed_window(run: Run, first: int, times: np.ndarray) -> Window:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..codegen.ir.loops import Turns
 from ..codegen.ir.text import Body, Module, Value, constant
 from .recurrences import IS_FIRST_ROW, ORDER_ROW, RECIPROCAL_ROW, ROOM, Fold
 
@@ -40,31 +41,6 @@ class _Sum:
     steps: tuple[int, int]
     array: str
     target: int
-
-
-class Turns:
-    """A loop in IR, with what it carries from turn to turn, given as what that is at first."""
-
-    def __init__(self, b: Body, first: Sequence[Value], only_if: str = "") -> None:
-        self.b, self.first = b, first
-        self.loop, self.after, self.before = b.label("turns"), b.label("after"), b.block
-        otherwise = f"i1 {only_if}, label %{self.loop}, label %{self.after}"
-        b.write(f"br {otherwise if only_if else f'label %{self.loop}'}")
-        b.begin(self.loop)
-        self._head = len(b.lines)
-        b.lines += [""] * len(first)  # where the values come from is known at the end
-        self.carried = [
-            Value(f"%carried{i}.{self.loop}", v.width, v.kind) for i, v in enumerate(first)
-        ]
-
-    def end(self, more: Value, following: Sequence[Value]) -> None:
-        """End a turn: whether there are more, and what is carried on."""
-        rows = zip(self.carried, self.first, following, strict=True)
-        for i, (value, first, new) in enumerate(rows, self._head):
-            ways = f"[{first.text}, %{self.before}], [{new.text}, %{self.b.block}]"
-            self.b.lines[i] = f"{value.text} = phi {value.type} {ways}"
-        self.b.write(f"br i1 {more.text}, label %{self.loop}, label %{self.after}")
-        self.b.begin(self.after)
 
 
 def taylor_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:

@@ -34,12 +34,8 @@ from ...expressions.stage import Stage
 from ...wording import counted
 from ..codegen.plan import Store
 
-ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = (
-    0,
-    1,
-    2,
-)  # rows of "w": k, 1 / k, and 1 for k = 1, otherwise 0
-_WEIGHT_ROWS = 3
+_WEIGHT_ROWS = 3  # of "w": k, 1 / k, and 1 for k = 1, otherwise 0
+ORDER_ROW, RECIPROCAL_ROW, IS_FIRST_ROW = range(_WEIGHT_ROWS)
 _LARGE, _FLAT = 1e150, 1e-250  # an argument, and a derivative at it that says nothing more
 ROOM = 8  # rows that sums of vectors take are a multiple of this
 

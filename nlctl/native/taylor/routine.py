@@ -13,6 +13,7 @@ from ...upstream.numba_internals import is_jit_disabled
 from ..codegen.rewrite import rewritten
 from ..diagram.parameters import length
 from ..equations.blocks import equations
+from ..equations.relays import relay_places
 from ..integrate.memory import zeros
 from ..lower import Lowered, planned, stores_of
 from ..machine.finish import finished
@@ -62,7 +63,25 @@ def series(reading: Reading, p: np.ndarray, width: int) -> Series:
         )
 
 
+def _check(reading: Reading) -> None:
+    """Refuse what has no coefficients, whatever its equations are."""
+    name, schedule = reading.system.name, reading.schedule
+    if not reading.system.nstates:
+        raise ParameterError(
+            f"'{name}' has no states, which method='taylor' needs: use method='tsit5'"
+        )
+    memories = [reading.system.state_labels[i] for i in reading.program.memory]
+    relays = [schedule.nodes[i].path for i in relay_places(schedule.nodes)]
+    for what, places in (("memory", memories), ("an ideal relay", relays)):
+        if places:
+            raise ParameterError(
+                f"'{name}' has {what} ('{places[0]}'), which method='taylor' does not integrate: "
+                "use method='tsit5'"
+            )
+
+
 def _made(reading: Reading, p: np.ndarray, width: int) -> Series:
+    _check(reading)
     read = reading.equations
     if not all(p[i, 0] == value for i, value in read.graph.assumptions.items()):
         read = equations(reading.schedule, reading.program.layout, p[:, 0])

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..codegen.ir.loops import Turns
 from ..codegen.ir.text import Body, Module, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
-from .folds import WIDE, SeriesLayout, Turns
+from .folds import WIDE, SeriesLayout
 
 _ZERO = Value("0", 0, "i")
 GROWN = 4  # coefficients by whose growth a step is chosen
@@ -142,15 +143,7 @@ class _Function:
         """Return the largest of a single member's rows; those of several are apart already."""
         if self.lanes > 1 or not value.width:
             return value
-        width = value.width
-        while width > 1:
-            width //= 2
-            low, high = (
-                self.b.shuffled(value, Value("poison", value.width), range(k, k + width))
-                for k in (0, width)
-            )
-            value = self.larger(low, high)
-        return self.b.element(value, 0)
+        return self.b.halved(value, self.larger)
 
     def write_largest(self, values: Sequence[Value]) -> None:
         """Write the largest of each member."""

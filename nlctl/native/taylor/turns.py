@@ -30,9 +30,10 @@ from ..settings import Settings
 from .method import order_for, with_taylor
 from .routine import series
 
-_ORDER = 10  # from which on steps are worth more than what they cost, in most loops
+_ORDER = 8  # from which on steps are worth more than what they cost, in most loops
 _STEPS = 250  # of the explicit pair, before Taylor's method is tried
-_SPAN, _MOST = 200, 2000  # steps of Taylor's method before that, twice as many each time
+_SPAN, _MOST = 800, 2000  # steps of Taylor's method before that, twice as many each time
+_COMPARED = with_fields(OTHER_METHOD, compared=1)
 
 
 def may_turn(reading: Reading) -> bool:
@@ -45,12 +46,11 @@ def may_turn(reading: Reading) -> bool:
 
 def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
     """Return a run that tries Taylor's method after so many steps."""
-    if settings.method != "auto" or settings.step or order_for(settings.rtol) < _ORDER:
+    tight = order_for(settings.rtol) >= _ORDER
+    if settings.method != "auto" or settings.step or not (tight and may_turn(reading)):
         return run
-    if not may_turn(reading):
-        return run
-    run.lanes["span"] = run.lanes["wait"] = _STEPS
-    return replace(run, task=with_fields(run.task, taylor=with_fields(OTHER_METHOD, span=_SPAN)))
+    run.lanes["span"], run.lanes["wait"], run.lanes["stay"] = _STEPS, _STEPS, _SPAN
+    return replace(run, task=with_fields(run.task, taylor=_COMPARED))
 
 
 def series_ahead(reading: Reading, p: np.ndarray) -> None:
@@ -62,9 +62,11 @@ def series_ahead(reading: Reading, p: np.ndarray) -> None:
 
 def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run:
     """Return a run that continues by the other method, if it asks for that."""
-    lane, fails = run.lanes[0], _fails(run)
-    if lane["status"] != METHOD and not fails:
+    status = run.lanes["status"][0]
+    fails = status in (STEP_TOO_SMALL, DIVERGED) and _fails(run)
+    if status != METHOD and not fails:
         return run
+    lane = run.lanes[0]
     if fails:  # the explicit pair has the last word
         lane["span"] = FIRST_TURN
     lane["status"] = RUNNING
@@ -72,45 +74,40 @@ def turned(reading: Reading, run: Run, p: np.ndarray, settings: Settings) -> Run
     lane["from_tried"] = lane["accepted"] + lane["rejected"]
     if run.task.taylor.highest:
         return _by_pair(run, settings)
-    alone = {"span": 0} if settings.method == "taylor" else {}  # nothing is compared
     lane["other_pace"] = lane["pace"]
     lane["span"] = FIRST_TURN
     if run.series is not None:  # it has had its turn before
-        taylor = with_fields(run.series.taylor, **{"span": run.task.taylor.span} | alone)
         run.work.taylor.expanded[:] = 0
-        task = with_fields(run.task, taylor=taylor, pair=run.series.pair)
+        task = with_fields(run.task, taylor=run.series.taylor, pair=run.series.pair)
         return replace(run, task=task, work=with_stages(run.work, SLOPES))
     try:
         task, terms = with_taylor(run.task, reading, p[:, None], settings)
     except ParameterError:  # there is what it cannot do
         return replace(run, task=with_fields(run.task, taylor=OTHER_METHOD))
-    task = with_fields(task, taylor=with_fields(task.taylor, **alone))
     arrays = new_terms(*terms, run.work.u.shape[0], 1)
     work = with_fields(with_stages(run.work, SLOPES), taylor=arrays)
     return replace(run, task=task, work=work, series=task)
 
 
 def _fails(run: Run) -> bool:
-    """Whether Taylor's method does not get on, from a place where all is finite."""
+    """Whether it is Taylor's method that does not get on: from a place where all is finite."""
     # Where a guard is NaN it is, at that place: no other method may continue.
-    if not (run.task.taylor.highest and run.task.taylor.span):
+    if not (run.task.taylor.highest and run.task.taylor.compared):
         return False
     here = np.append(run.work.x, run.work.events.g_start)
-    return run.lanes["status"][0] in (STEP_TOO_SMALL, DIVERGED) and bool(np.isfinite(here).all())
+    return bool(np.isfinite(here).all())
 
 
 def _by_pair(run: Run, settings: Settings) -> Run:
     """Return a run that continues by the explicit pair: to be measured, or for longer each time."""
-    lane, span = run.lanes[0], run.task.taylor.span
+    lane = run.lanes[0]
     if lane["span"] > FIRST_TURN:
-        lane["span"], span = MEASURED, min(2 * span, _MOST)
+        lane["span"], lane["stay"] = MEASURED, min(2 * lane["stay"], _MOST)
     else:
         lane["wait"] = max(2 * lane["wait"], MEASURED)
-        lane["span"], span = lane["wait"], _SPAN
+        lane["span"], lane["stay"] = lane["wait"], _SPAN
     lane["h"] = lane["other_pace"] or lane["h"]  # as it was when the pair was measured
     for name in ("tries", "seeks", "traces", "returns", "across", "cross"):
         lane[name] = 0  # what was being located is found again
-    task = with_fields(
-        run.task, taylor=with_fields(OTHER_METHOD, span=span), pair=pair_of(settings.pair)
-    )
+    task = with_fields(run.task, taylor=_COMPARED, pair=pair_of(settings.pair))
     return replace(run, task=task, work=with_stages(run.work, settings.pair.stages))

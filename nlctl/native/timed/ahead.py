@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,9 +12,10 @@ from ...expressions.evaluate import evaluate_expressions
 from ...expressions.graph import Expr, needed
 from ..equations.located import Conditions
 from .breaks import break_points
-from .reach import reach
 
 _KEPT = 256  # parameter vectors
+CELLS = 8192  # of a run, at whose ends functions are looked at
+_PART = 0.5  # of its range: what a function may go up and down by in one step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,3 +95,29 @@ def read_parameters(found: Conditions) -> np.ndarray:
             _, start, step = node.data
             places.update(start + step * i for i in range(node.size or 1))
     return np.array(sorted(places), dtype=np.int64)
+
+
+def reach(terms: Sequence[Expr], p: np.ndarray, span: tuple[float, float]) -> np.ndarray:
+    """Return until when a step may lead that begins in a cell of a run (s), shape (cells,)."""
+    # From rest error control sees nothing of a pulse that all stages of a step lie next to.  A step
+    # ends where a function has moved by half of its range since its beginning, up and down added: a
+    # pulse that is seen at the ends of two cells is seen by the step that comes to it.
+    t = np.linspace(*span, CELLS + 1)
+    found = evaluate_expressions(terms, {"t": t[None, :], "p": p[:, None]})
+    limit = np.full(CELLS, np.inf)
+    for values in found:
+        for row in np.atleast_2d(values):
+            if row.size == t.size:
+                limit = np.minimum(limit, _of_values(t, row))
+    return limit if np.isfinite(limit).any() else np.zeros(0)
+
+
+def _of_values(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the limits that one function's values give."""
+    values = np.where(np.isfinite(values), values, 0.0)
+    extent = np.ptp(values)
+    if extent <= 1e-12 * np.abs(values).max(initial=0.0):
+        return np.full(t.size - 1, np.inf)
+    moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)))])
+    k = np.searchsorted(moved, moved[:-1] + _PART * extent, side="left")
+    return np.where(k < t.size, t[np.minimum(k, t.size - 1)], np.inf)

@@ -21,10 +21,7 @@ Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 def break_points(
     conditions: Sequence[Expr], p: np.ndarray, span: tuple[float, float], fastest: float
 ) -> np.ndarray:
-    """Return when conditions of t alone switch within a run.
-
-    Shapes: `p` (parameters,).
-    """
+    """Return when conditions of t alone switch within a run with one parameter vector."""
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
         found = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
@@ -41,7 +38,8 @@ def break_points(
         places, indicators = _known(condition, lines), _indicators(condition)
         if places is None:
             places = levels_met(condition, lines, constant)
-            indicators = indicators if places is None else [_count_of(condition)]
+            if places is not None:  # how many elements hold
+                indicators = [lambda values, t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
             if places is None:
                 found.append(_sought(indicator, values, span, fastest))
@@ -61,11 +59,6 @@ def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
         return None
 
 
-def _count_of(condition: Expr) -> Callable[[Values, np.ndarray], np.ndarray]:
-    """Return how many elements of a condition hold."""
-    return lambda values, t: np.sum(values([condition], t)[0], axis=0, dtype=float)
-
-
 def _indicators(condition: Expr) -> list[Callable[[Values, np.ndarray], np.ndarray]]:
     """Return what is one integer between two switches and another one behind, by element."""
     return [
@@ -77,11 +70,8 @@ def _level(condition: Expr, values: Values, t: np.ndarray, k: int) -> np.ndarray
     op, args = condition.op, condition.args
 
     def element(array: np.ndarray) -> np.ndarray:
-        return (
-            np.broadcast_to(array[k if array.shape[0] > 1 else 0], t.shape)
-            if array.ndim == 2
-            else array
-        )
+        rows = array if array.ndim == 2 else array[None]
+        return np.broadcast_to(rows[k if len(rows) > 1 else 0], t.shape)
 
     with np.errstate(all="ignore"):
         if condition.kind == "b" or op in ("floor", "ceil", "trunc", "rint", "sign", "heaviside"):

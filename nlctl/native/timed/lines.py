@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,10 +56,8 @@ class Lines:
 
     def integers(self, shift: float) -> np.ndarray:
         """Return where it + shift is an integer inside of a piece."""
-        first, last = (
-            self.values + shift,
-            self.values + shift + self.slopes * (self.ends - self.starts),
-        )
+        first = self.values + shift
+        last = first + self.slopes * (self.ends - self.starts)
         low, high = np.ceil(np.minimum(first, last)), np.floor(np.maximum(first, last))
         counts = np.where(self.slopes == 0, 0, np.maximum(high - low + 1, 0))
         if not np.isfinite(counts).all() or counts.sum() > _MOST:
@@ -118,12 +116,8 @@ def levels_met(
     levels, own = np.unique(constants(table)), found[line]
     if levels.size * own.starts.size > _MOST:
         return None
-    return np.unique(np.concatenate([_shifted(own, level).roots() for level in levels]))
-
-
-def _shifted(line: Lines, level: float) -> Lines:
-    """Return a line above a level."""
-    return Lines(starts=line.starts, values=line.values - level, slopes=line.slopes, end=line.end)
+    above = (replace(own, values=own.values - level) for level in levels)
+    return np.unique(np.concatenate([line.roots() for line in above]))
 
 
 def _line(value: float, slope: float, span: tuple[float, float]) -> Lines:
@@ -142,14 +136,11 @@ def _same(*lines: Lines) -> list[Lines]:
 
 
 def _sum(a: Lines, b: Lines, factor: float) -> Lines:
-    return Lines(
-        starts=a.starts, values=a.values + factor * b.values, slopes=a.slopes + factor * b.slopes,
-        end=a.end,
-    )  # fmt: skip
+    return replace(a, values=a.values + factor * b.values, slopes=a.slopes + factor * b.slopes)
 
 
 def _scaled(a: Lines, by: np.ndarray) -> Lines:
-    return Lines(starts=a.starts, values=a.values * by, slopes=a.slopes * by, end=a.end)
+    return replace(a, values=a.values * by, slopes=a.slopes * by)
 
 
 def _divide(a: Lines, b: Lines) -> Lines:
@@ -196,9 +187,7 @@ def _constant(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) 
     """Return what is constant on each piece."""
     with np.errstate(all="ignore"):
         values = np.asarray(numpy_function(op)(*middle), dtype=float)
-    return Lines(
-        starts=parts[0].starts, values=values, slopes=np.zeros(values.size), end=parts[0].end
-    )
+    return replace(parts[0], values=values, slopes=np.zeros(values.size))
 
 
 def _chosen(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> Lines:
@@ -210,10 +199,8 @@ def _chosen(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) ->
     else:
         less = middle[0] < middle[1]
         first, (a, b) = (less if op == "minimum" else ~less), parts
-    return Lines(
-        starts=a.starts, values=np.where(first, a.values, b.values),
-        slopes=np.where(first, a.slopes, b.slopes), end=a.end,
-    )  # fmt: skip
+    values, slopes = np.where(first, a.values, b.values), np.where(first, a.slopes, b.slopes)
+    return replace(a, values=values, slopes=slopes)
 
 
 def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> Lines:
@@ -221,8 +208,7 @@ def _rest(op: str, parts: list[Lines], middle: list[np.ndarray], half: Any) -> L
     if np.any(parts[1].slopes):
         raise NotLines
     with np.errstate(all="ignore"):
-        values = numpy_function(op)(*middle) - parts[0].slopes * half
-    return Lines(starts=parts[0].starts, values=values, slopes=parts[0].slopes, end=parts[0].end)
+        return replace(parts[0], values=numpy_function(op)(*middle) - parts[0].slopes * half)
 
 
 _ON_PIECES: dict[str, Callable[..., Lines]] = {

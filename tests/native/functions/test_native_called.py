@@ -18,7 +18,7 @@ from scipy.special import erfcx
 import nlctl
 from nlctl.errors import CompileError, UsageError
 from nlctl.native.machine.calls import native_calls
-from nlctl.native.opaque.calls import Call
+from nlctl.native.opaque.called import Call
 
 WITH_JIT = not getattr(config, "DISABLE_JIT", False)
 needs_jit = pytest.mark.skipif(not WITH_JIT, reason="nothing is compiled without JIT")

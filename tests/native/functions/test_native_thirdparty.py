@@ -10,7 +10,7 @@ from plain_plan import compare
 from nlctl.errors import CompileError, ParameterError, UsageError
 from nlctl.native.compiled import compile as compile_diagram
 from nlctl.native.machine.fingerprint import program_key
-from nlctl.native.opaque.calls import Source
+from nlctl.native.opaque.called import Source
 from nlctl.native.purity.objects import frozen
 
 

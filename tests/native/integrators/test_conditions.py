@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import nlctl
-from nlctl.native.driver import begin, finish, go_on, prepared
+from nlctl.native.driver import Course, begin, finish, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
 from nlctl.native.results import made as result
 from nlctl.native.settings import Settings
@@ -269,7 +269,8 @@ def test_statistics_count_the_rows_of_the_table(case):
     assert f", {len(made.events)} events" in repr(made)
     x0, p = np.tile(np.array(start)[:, None], 8), compiled.parameter_vector()[:, None]
     settings, none = Settings(rtol=1e-6, atol=1e-8), np.zeros((0, times.size))
-    run = prepared(compiled, times, none, x0, np.tile(p, 8), settings, [])
+    course = Course(compiled=compiled, times=times, inputs=none, settings=settings)
+    run = prepared(course, x0, np.tile(p, 8))
     begin(run)
     while np.any(run.lanes["status"] == RUNNING):
         run = go_on(run)

@@ -5,7 +5,7 @@ import pytest
 from numba.core import config
 
 import nlctl
-from nlctl.native.driver import begin, differentiated, go_on, prepared
+from nlctl.native.driver import Course, begin, differentiated, go_on, prepared
 from nlctl.native.integrate.state import RUNNING
 from nlctl.native.settings import Settings
 
@@ -25,7 +25,8 @@ def work(compiled, x0, end, method):
     """Return the steps tried up to a time, those of the stiff method for `cost` explicit ones."""
     p, inputs = compiled.parameter_vector(None), np.zeros((compiled.system.ninputs or 0, 2))
     times = np.array([0.0, end])
-    run = prepared(compiled, times, inputs, x0[:, None], p[:, None], Settings(method=method), [])
+    course = Course(compiled=compiled, times=times, inputs=inputs, settings=Settings(method=method))
+    run = prepared(course, x0[:, None], p[:, None])
     begin(run)
     tried = {False: 0, True: 0}
     while run.lanes["status"][0] == RUNNING:

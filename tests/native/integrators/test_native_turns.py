@@ -47,16 +47,17 @@ def both(diagram, times, x0, **kwargs):
     ]
 
 
-def test_a_long_smooth_run_takes_fewer_steps_and_is_right():
+@pytest.mark.parametrize(("rtol", "share", "error"), [(1e-11, 0.3, 1e-8), (1e-6, 0.6, 2e-4)])
+def test_a_long_smooth_run_takes_fewer_steps_and_is_right(rtol, share, error):
     """x'' = -x: cos(t) after 200 s."""
     times = np.linspace(0, 200, 401)
-    auto, pair = both(block(oscillator, 2, inputs=0), times, [1, 0], rtol=1e-11, atol=1e-13)
-    assert tried(auto) < 0.3 * tried(pair)
-    np.testing.assert_allclose(auto.states[0], np.cos(times), atol=1e-8)
+    tolerances = {"rtol": rtol, "atol": 0.01 * rtol}
+    auto, pair = both(block(oscillator, 2, inputs=0), times, [1, 0], **tolerances)
+    assert tried(auto) < share * tried(pair)
+    np.testing.assert_allclose(auto.states[0], np.cos(times), atol=error)
     again = nlctl.input_output_response(
-        nlctl.compile(block(oscillator, 2, inputs=0)), times, initial_state=[1, 0], rtol=1e-11,
-        atol=1e-13,
-    )  # fmt: skip
+        nlctl.compile(block(oscillator, 2, inputs=0)), times, initial_state=[1, 0], **tolerances
+    )
     np.testing.assert_array_equal(auto.states, again.states)
 
 
@@ -114,11 +115,11 @@ def test_the_stiff_method_has_its_turn():
 
 
 @pytest.mark.parametrize(
-    "kwargs", [{"rtol": 1e-6, "atol": 1e-8}, {"step": 0.01}, {"rtol": 1e-10, "max_steps": 200}]
+    "kwargs", [{"rtol": 1e-5, "atol": 1e-7}, {"step": 0.1}, {"rtol": 1e-10, "max_steps": 200}]
 )
 def test_where_it_does_not_pay_nothing_changes(kwargs):
     """At loose tolerances, with given steps, and in short runs: the explicit pair, bit for bit."""
-    times = np.linspace(0, 30, 31)
+    times = np.linspace(0, 100, 101)
     auto, pair = both(block(oscillator, 2, inputs=0), times, [1, 0], ignore_errors=True, **kwargs)
     np.testing.assert_array_equal(auto.states, pair.states)
 

@@ -16,7 +16,7 @@ from scipy import stats
 from sweep_examples import experiment, loop, same
 
 import nlctl
-from nlctl.analysis.cli.sweep_progress import sweep_bar
+from nlctl.analysis.cli.progress import sweep_bar
 from nlctl.analysis.metrics import in_machine_code
 from nlctl.analysis.robustness import (
     Choice,

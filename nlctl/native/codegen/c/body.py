@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
-from ..ir.text import Operand, Value
+from ..ir.text import Body, Module, Operand, Value
 
 _TYPES = {"f": "double", "b": "int", "i": "uint64_t"}
 _SIGNS = {"fadd": "+", "fsub": "-", "fmul": "*", "fdiv": "/"}
@@ -29,13 +30,11 @@ static double nlctl_real(uint64_t x) { double y; memcpy(&y, &x, sizeof y); retur
 """
 
 
-class CModule:
+@dataclass(kw_only=True)
+class CModule(Module):
     """Functions that are compiled together."""
 
-    def __init__(self) -> None:
-        # text of functions by name, and names of constants, in the order in which they were needed
-        self.functions: dict[str, str] = {}
-        self.tables: dict[tuple[float, ...], str] = {}
+    inlined: bool = False  # the C compiler says
 
     def table(self, values: tuple[float, ...]) -> str:
         """Return the name of an array of constants."""
@@ -48,12 +47,12 @@ class CModule:
             numbers = ", ".join(map(c_number, values))
             tables.append(f"static const double {name}[{len(values)}] = {{{numbers}}};")
         body = "\n".join([*tables, *self.functions.values()])
-        used = [line for line in SUPPORT.splitlines() if f"{_called(line)}(" in body]
+        used = [
+            line
+            for line in SUPPORT.splitlines()
+            if f"{line.partition('(')[0].split()[-1]}(" in body
+        ]
         return "\n".join([*used, body])
-
-
-def _called(line: str) -> str:
-    return line.split("(")[0].split()[-1]
 
 
 def c_number(x: float) -> str:
@@ -65,15 +64,12 @@ def c_number(x: float) -> str:
     return repr(float(x))
 
 
-class CBody:
+class CBody(Body):
     """The statements of one function; see `ir.text.Body` for the methods."""
 
-    portable = True
-
-    def __init__(self, module: CModule, labels: Mapping[str, str] | None = None) -> None:
-        self.module, self.labels, self.indent = module, labels or {}, "  "
-        self.lines: list[str] = []
-        self._count = 0
+    def __init__(self, module: Module, labels: Mapping[str, str] | None = None) -> None:
+        super().__init__(module, portable=True)
+        self.labels, self.indent = labels or {}, "  "
         self._named: dict[str, str] = {}
         self._hint = ""
         self._last = ""
@@ -95,12 +91,12 @@ class CBody:
         name, _, rest = text.partition(" = ")
         self._hint, self._last = (name if rest else ""), ""
 
-    def new(self, text: str, kind: str = "f") -> Value:
+    def new(self, text: str, width: int = 0, kind: str = "f") -> Value:
         """Add a variable."""
         self._count += 1
         self._last = f"v{self._count}"
         self.write(f"const {_TYPES[kind]} {self._last} = {text};")
-        return Value(self._last, 0, kind)
+        return Value(self._last, width, kind)
 
     def literal(self, x: float | bool | int, width: int = 0, kind: str = "f") -> Value:
         """Return a constant."""
@@ -111,31 +107,14 @@ class CBody:
     def wide(self, v: Operand, width: int) -> Value:
         return v if isinstance(v, Value) else self.literal(v)
 
-    def same(self, *values: Operand) -> list[Value]:
-        return [self.wide(v, 0) for v in values]
-
     # -- arithmetic
 
     def op(self, name: str, a: Operand, b: Operand, *, exact: bool = False) -> Value:
         x, y = self.same(a, b)
         return self.new(f"{x.text} {_SIGNS[name]} {_after(y.text)}")
 
-    def add(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
-        return self.op("fadd", a, b)
-
-    def sub(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
-        return self.op("fsub", a, b)
-
-    def mul(self, a: Operand, b: Operand, *, exact: bool = False) -> Value:
-        return self.op("fmul", a, b)
-
     def neg(self, a: Value) -> Value:
         return self.new(f"-{_after(a.text)}")
-
-    def fma(self, a: Operand, b: Operand, c: Operand) -> Value:
-        return self.intrinsic("fma", a, b, c)
-
-    muladd = fma
 
     def intrinsic(self, name: str, *values: Operand) -> Value:
         """Call a function of the C library that rounds alike everywhere."""
@@ -147,28 +126,28 @@ class CBody:
     # -- truth values and bits
 
     def compare(self, how: str, a: Operand, b: Operand) -> Value:
-        return self.new(_COMPARED[how].format(*(v.text for v in self.same(a, b))), "b")
+        return self.new(_COMPARED[how].format(*(v.text for v in self.same(a, b))), kind="b")
 
     def select(self, condition: Value, a: Operand, b: Operand) -> Value:
         x, y = self.same(a, b)
-        return self.new(f"{condition.text} ? {x.text} : {y.text}", x.kind)
+        return self.new(f"{condition.text} ? {x.text} : {y.text}", kind=x.kind)
 
     def logic(self, name: str, a: Value, b: Value) -> Value:
         sign = (_LOGIC if a.kind == "b" else _BITS)[name]
-        return self.new(f"{a.text} {sign} {b.text}", a.kind)
+        return self.new(f"{a.text} {sign} {b.text}", kind=a.kind)
 
     def integer(self, name: str, a: Value, b: int) -> Value:
         right = str(b) if name == "shl" else self.literal(b, 0, "i").text
-        return self.new(f"{a.text} {_BITS[name]} {right}", "i")
+        return self.new(f"{a.text} {_BITS[name]} {right}", kind="i")
 
     def mask(self, c: Value) -> Value:
-        return self.new(f"{c.text} ? UINT64_MAX : UINT64_C(0)", "i")
+        return self.new(f"{c.text} ? UINT64_MAX : UINT64_C(0)", kind="i")
 
     def is_negative(self, a: Value) -> Value:
-        return self.new(f"({a.text} >> 63) != 0", "b")
+        return self.new(f"({a.text} >> 63) != 0", kind="b")
 
     def bits(self, a: Value) -> Value:
-        return self.new(f"nlctl_bits({a.text})", "i")
+        return self.new(f"nlctl_bits({a.text})", kind="i")
 
     def real(self, a: Value) -> Value:
         return self.new(f"nlctl_real({a.text})")
@@ -228,13 +207,13 @@ class CBody:
         self.write("}")
 
     def index(self, name: str, a: Value, b: Value) -> Value:
-        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", "i")
+        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", kind="i")
 
     def as_number(self, index: Value) -> Value:
         return self.new(f"(double){index.text}")
 
     def as_index(self, number: Value) -> Value:
-        return self.new(f"(uint64_t){number.text}", "i")
+        return self.new(f"(uint64_t){number.text}", kind="i")
 
     def unless_larger(self, x: Value, limit: float, near: Mapping[str, Value]) -> tuple[Value, ...]:
         far = self.compare("ogt", self.intrinsic("fabs", x), limit)

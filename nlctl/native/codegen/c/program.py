@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, cast
 
 from ....expressions.graph import Expr
 from ..ir.loops import elements_per_turn
 from ..ir.numbers import Writer, one_line
 from ..plan import Function, LoopOfLevel
 from .body import CBody, CModule
-
-if TYPE_CHECKING:
-    from ..ir.text import Body
 
 
 def function_text(module: CModule, name: str, function: Function, labels: Mapping[str, str]) -> str:
@@ -22,7 +18,7 @@ def function_text(module: CModule, name: str, function: Function, labels: Mappin
     if function.copied:
         source, target = function.arguments[:2]
         b.write(f"memcpy({target}, {source}, {function.copied} * sizeof(double));")
-    writer = Writer(cast("Body", b), function.plan, 1, frozenset())  # it has the same methods
+    writer = Writer(b, function.plan, 1, frozenset())
     for level in function.plan.levels:
         writer.numbers(level.numbers)
         for loop in level.loops:

@@ -7,14 +7,41 @@ element of each, three to a round.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
 from .numbers import Writer, one_line
-from .text import Value, constant, float_text
+from .text import Body, Value, constant, float_text
 
 _WIDE = 4  # elements of one member together
 PER_ROUND = 3  # elements of several members in a round
 _STRAIGHT = 16  # turns of one member up to which they are written one after the other
+
+
+class Turns:
+    """A loop in IR, with what it carries from turn to turn, given as what that is at first."""
+
+    def __init__(self, b: Body, first: Sequence[Value], only_if: str = "") -> None:
+        self.b, self.first = b, first
+        self.loop, self.after, self.before = b.label("turns"), b.label("after"), b.block
+        otherwise = f"i1 {only_if}, label %{self.loop}, label %{self.after}"
+        b.write(f"br {otherwise if only_if else f'label %{self.loop}'}")
+        b.begin(self.loop)
+        self._head = len(b.lines)
+        b.lines += [""] * len(first)  # where the values come from is known at the end
+        self.carried = [
+            Value(f"%carried{i}.{self.loop}", v.width, v.kind) for i, v in enumerate(first)
+        ]
+
+    def end(self, more: Value, following: Sequence[Value]) -> None:
+        """End a turn: whether there are more, and what is carried on."""
+        rows = zip(self.carried, self.first, following, strict=True)
+        for i, (value, first, new) in enumerate(rows, self._head):
+            ways = f"[{first.text}, %{self.before}], [{new.text}, %{self.b.block}]"
+            self.b.lines[i] = f"{value.text} = phi {value.type} {ways}"
+        self.b.write(f"br i1 {more.text}, label %{self.loop}, label %{self.after}")
+        self.b.begin(self.after)
 
 
 def elements_per_turn(size: int) -> int:
@@ -49,45 +76,23 @@ class _Loop:
             self._turn(None, size - self.step, skipped=self.step - size % self.step)
         for node in self.sums:
             if self.lanes == 1:
-                names[node] = self._total(names[node])
+                names[node] = self.b.halved(names[node], self.b.add)
             self.w.stored(node)
 
     def _rounds(self, turns: int) -> int:
         """Write as many turns as fit into rounds as a loop; return how many these are."""
         b, names = self.b, self.w.names
         per = PER_ROUND if self.lanes > 1 and turns >= PER_ROUND else 1
-        head, after, before = b.label("loop"), b.label("after"), b.block
-        b.write(f"br label %{head}")
-        b.begin(head)
-        index, first = f"%i.{head}", len(b.lines)
-        b.lines += [""] * (1 + len(self.sums))  # where the values come from is known at the end
-        entries = [Value(f"%sum{i}.{head}", self.chunk) for i in range(len(self.sums))]
+        loop = Turns(b, [Value("0", 0, "i"), *[constant(0.0, self.chunk)] * len(self.sums)])
+        index, *entries = loop.carried
         names.update(zip(self.sums, entries, strict=True))
         for k in range(per):
-            self._turn(index, k * self.step)
-        following = b.new(f"add i64 {index}, {per * self.step}").text
+            self._turn(index.text, k * self.step)
+        following = b.new(f"add i64 {index.text}, {per * self.step}")
         done = turns // per * per
-        more = b.new(f"icmp slt i64 {following}, {done * self.step}").text
-        b.lines[first] = f"{index} = phi i64 [0, %{before}], [{following}, %{b.block}]"
-        zero = constant(0.0, self.chunk).text
-        for i, (node, entry) in enumerate(zip(self.sums, entries, strict=True)):
-            ways = f"[{zero}, %{before}], [{names[node].text}, %{b.block}]"
-            b.lines[first + 1 + i] = f"{entry.text} = phi {entry.type} {ways}"
-        b.write(f"br i1 {more}, label %{head}, label %{after}")
-        b.begin(after)
+        more = b.new(f"icmp slt i64 {following.text}, {done * self.step}")
+        loop.end(more, [following, *(names[node] for node in self.sums)])
         return done
-
-    def _total(self, v: Value) -> Value:
-        """Return the sum of a vector: halves onto each other."""
-        width = v.width
-        while width > 1:
-            width //= 2
-            low, high = (
-                self.b.shuffled(v, Value("poison", v.width), range(k, k + width))
-                for k in (0, width)
-            )
-            v = self.b.add(low, high)
-        return self.b.element(v, 0)
 
     def _turn(self, index: str | None, at: int, skipped: int = 0) -> None:
         """Write what is computed for the elements from index + at on."""

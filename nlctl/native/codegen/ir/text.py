@@ -81,20 +81,13 @@ Operand = Value | float
 
 
 class Body:
-    """The instructions of one function, and what writes the next one.
+    """The instructions of one function, and what writes the next one."""
 
-    Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
-    Where ``exact`` is given it is not.  A float next to a vector is meant in every element.
-
-    Parameters
-    ----------
-    module : Module
-    portable : bool
-        Whether every operation rounds in the same way on every processor, and whatever else a
-        function computes: nothing is contracted, what may be rounded once is, and each sine has a
-        polynomial of its own.
-    """
-
+    # Arithmetic may be contracted: a product and a sum become one instruction that rounds once.
+    # Where ``exact`` is given it is not.  A float next to a vector is meant in every element.
+    # What is `portable` rounds in the same way on every processor, and whatever else a function
+    # computes: nothing is contracted, what may be rounded once is, and each sine has a polynomial
+    # of its own.
     def __init__(self, module: Module, portable: bool = False) -> None:
         self.module, self.portable = module, portable
         self.lines: list[str] = []
@@ -138,7 +131,7 @@ class Body:
 
     def same(self, *values: Operand) -> list[Value]:
         """Return values as vectors of one width."""
-        width = max(v.width for v in values if isinstance(v, Value))
+        width = max((v.width for v in values if isinstance(v, Value)), default=0)
         return [self.wide(v, width) for v in values]
 
     def element(self, v: Value, i: int) -> Value:
@@ -159,6 +152,17 @@ class Body:
         mask = ", ".join(f"i32 {i}" for i in order)
         width = len(order)
         return self.new(f"shufflevector {a}, {b}, <{width} x i32> <{mask}>", width, a.kind)
+
+    def halved(self, v: Value, join: Callable[[Value, Value], Value]) -> Value:
+        """Return what is left of a vector whose halves are joined again and again."""
+        width = v.width
+        while width > 1:
+            width //= 2
+            low, high = (
+                self.shuffled(v, Value("poison", v.width), range(k, k + width)) for k in (0, width)
+            )
+            v = join(low, high)
+        return self.element(v, 0)
 
     # -- arithmetic
 

@@ -47,7 +47,7 @@ class TaylorMethod(NamedTuple):
     functions: Places1
     sides: Places2  # rows of comparisons, see `taylor.recurrences.Recurrences`
     c: Reals2  # what the functions read besides their arguments
-    span: int  # steps of its turn where it pays, 0 if it is not compared with the explicit method
+    compared: int  # whether a run may change to another method
     cost: float  # of a step, in explicit ones
     table: Places2
 
@@ -64,7 +64,7 @@ class TaylorArrays(NamedTuple):
 
 OTHER_METHOD = with_table(
     TaylorMethod, highest=0, functions=np.zeros(0, dtype=np.int64),
-    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), span=0, cost=0.0,
+    sides=np.zeros((0, 2), dtype=np.int64), c=np.zeros((1, 1)), compared=0, cost=0.0,
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ def is_to_change(task, lane):
 
     Both are measured in turn, see `nlctl.native.taylor.turns`.
     """
-    if task.taylor.span == 0:
+    if task.taylor.compared == 0:
         return False
     if lane.stiff:
         lane.from_t, lane.from_tried = lane.t, lane.accepted + lane.rejected
@@ -41,5 +41,5 @@ def is_to_change(task, lane):
         return False
     if lane.span > FIRST_TURN or lane.pace < lane.other_pace:
         return True
-    lane.span = task.taylor.span
+    lane.span = lane.stay
     return False
