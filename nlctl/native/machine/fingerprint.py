@@ -39,6 +39,7 @@ HEAP_TYPE = 1 << 9  # Py_TPFLAGS_HEAPTYPE: made by a class statement
 _CONSTANTS = (int, float, complex, str, bytes, tuple, list, dict, np.ndarray, np.generic)
 _NUMBERS = frozenset({int, float, complex, bool, type(None)})
 _HOLDERS = (str, tuple, list, dict)
+_PYTHONS = ("__", "_abc_impl", "_is_protocol")  # beginnings of attributes that Python makes
 _MACHINERY = (
     types.MemberDescriptorType,
     types.GetSetDescriptorType,
@@ -269,13 +270,7 @@ def _of_class(kind: type, seen: _Seen) -> Iterator[str]:
         elif not name.startswith("__") and isinstance(part, _CONSTANTS):
             yield name
             yield from _fingerprint(part, seen)
-        elif (
-            seen.deep
-            and not (name.startswith("__") or isinstance(part, _MACHINERY))
-            and (
-                name not in ("_abc_impl", "_is_protocol")  # Python's own
-            )
-        ):
+        elif seen.deep and not (name.startswith(_PYTHONS) or isinstance(part, _MACHINERY)):
             yield name
             yield from _fingerprint(getattr(part, "__func__", part), seen)
     for base in (*kind.__bases__, *((type(kind),) if seen.deep else ())):

@@ -14,7 +14,7 @@ from stiff_problems import PROBLEMS
 
 import nlctl
 from nlctl.expressions.dependence import structure
-from nlctl.native.along import AlongCode, derivatives
+from nlctl.native.along import Along, derivatives
 from nlctl.native.integrate.methods.lu import (
     WHOLE,
     Elimination,
@@ -225,7 +225,7 @@ def test_steps_are_those_of_elimination_as_a_whole():
         x0 = np.asarray(nlctl.initial_state(system), dtype=float) if x0 is None else x0
         runs = []
         for order in (made.elimination, WHOLE):
-            kept = compiled.cache.of(AlongCode)
+            kept = compiled.cache.of(Along)
             kept[:] = [replace(kept[0], elimination=order)]
             runs.append(
                 nlctl.input_output_response(
