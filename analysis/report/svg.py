@@ -41,8 +41,8 @@ _SETTINGS: dict[Any, Any] = {
     "font.size": LEAST_LETTERS,
 }
 _WIDE, BROAD = 400.0, 560.0  # points; as wide as the text, and as wide as the page
-DECIMALS = re.compile(r"-?\d+\.\d{2,}")
-PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
+_DECIMALS = re.compile(r"-?\d+\.\d{2,}")
+_PLACE = re.compile(r"translate\([^)]*\)|^[-\d.]+$")
 TAG = re.compile(r"<(\w+)")
 URL = re.compile(r"url\(#([^)]*)\)")
 
@@ -126,7 +126,7 @@ def _plain(element: ElementTree.Element) -> None:
     if target.startswith(("#", "data:image/png;")):
         attributes["href"] = "".join(target.split())
     for name in {"x", "y", "transform"} & attributes.keys():
-        attributes[name] = PLACE.sub(lambda m: DECIMALS.sub(_hundredths, m[0]), attributes[name])
+        attributes[name] = _PLACE.sub(lambda m: _rounded(m[0]), attributes[name])
     if attributes.get("fill") == "#ffffff" and "stroke" in attributes:
         attributes["fill"] = "var(--page)"  # frames of legends, faces of markers; not white text
     element.attrib = {
@@ -170,8 +170,9 @@ def _rename(
         attributes[name] = URL.sub(rf"url(#{key}-\1)", value)
 
 
-def _hundredths(number: re.Match[str]) -> str:
-    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
+def _rounded(text: str) -> str:
+    """Return a text with its numbers in hundredths, without zeros."""
+    return _DECIMALS.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), text)
 
 
 def _local(name: str) -> str:
@@ -179,10 +180,9 @@ def _local(name: str) -> str:
     return name.rpartition("}")[2]
 
 
-DECIMALS = re.compile(r"-?\d+\.\d{2,}")
 _NUMBER = re.compile(r"-?\d+(?:\.\d*)?")
 CURVED = re.compile("[CQ]")
-PLACE = re.compile(r"translate\((-?[\d.]+)[ ,](-?[\d.]+)\)")
+_SHIFT = re.compile(r"translate\((-?[\d.]+)[ ,](-?[\d.]+)\)")
 _STRAIGHT = re.compile(r"M[^MLCQz]*L?[^MLCQz]*")
 INITIAL = {"stroke-linejoin": "miter", "stroke-dashoffset": "0"}  # what SVG has without them
 FRAME = {"x", "y", "transform", "href", "clip-path"}  # of a mark: where it is; the rest is how
@@ -218,7 +218,7 @@ def shared_shape(text: str, shapes: dict[str, str]) -> str:
 
 def _place(use: Element) -> None:
     """Write a shift as x and y, without zeros."""
-    shift = PLACE.fullmatch(use.get("transform", ""))
+    shift = _SHIFT.fullmatch(use.get("transform", ""))
     if shift:
         del use.attrib["transform"]
         for name, value in zip("xy", shift.groups(), strict=True):
@@ -294,7 +294,7 @@ def short_path(path: str) -> str:
     # Lines are written as steps from point to point; rounding does not add up.
     path = " ".join(path.split())
     if CURVED.search(path):
-        return DECIMALS.sub(lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), path)
+        return _rounded(path)
     here = (0, 0)
     short = ""
     for part in re.findall(r"[MLz][^MLz]*", path):
