@@ -140,7 +140,7 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     if condition.op not in ORDERS:
         return _factors(function)
     edges = [*domain_edges(graph, condition.args), *poles(graph, condition.args)]
-    return tuple(part for each in (function, *edges) for part in _factors(each))
+    return tuple(part for product in (function, *edges) for part in _factors(product))
 
 
 def _factors(function: Expr) -> tuple[Expr, ...]:
@@ -168,9 +168,9 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
             return signed if quotient is a else graph.op("neg", signed)
     for rising, level, step in ((a, b, 1), (b, a, -1)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
-        own = _inverse(rising.op, level)
-        if own is not None:
-            pair = [graph.number(rising.args[0]), graph.const(own)]
+        inverse = _inverse(rising.op, level)
+        if inverse is not None:
+            pair = [graph.number(rising.args[0]), graph.const(inverse)]
             return graph.op("sub", *pair[::step])
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:

@@ -1,4 +1,4 @@
-"""Where what is compared is no number any more, or infinite: edges of domains, and poles."""
+"""Where what is compared becomes NaN, or infinite: edges of domains, and poles."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _ABOVE = ("exp", "exp2", "cosh")  # above 0
 
 
 def domain_edges(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
-    """Return what is below 0 where something that expressions are made of is no number."""
-    found = dict.fromkeys(_domain(graph, node) for node in needed(exprs) if _ends(node))
-    return [edge for edge in found if edge.varies]
+    """Return what is below 0 where something that expressions are made of is NaN."""
+    edges = dict.fromkeys(_domain(graph, node) for node in needed(exprs) if _ends(node))
+    return [edge for edge in edges if edge.varies]
 
 
 def have_edges(exprs: Iterable[Expr]) -> bool:
@@ -26,13 +26,13 @@ def have_edges(exprs: Iterable[Expr]) -> bool:
 
 def poles(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
     """Return what is 0 where something that expressions are made of is infinite."""
-    found: dict[Expr, None] = {}
+    divisors: dict[Expr, None] = {}
     for node in needed(exprs):
         if node.op == "div" and node.args[1].varies and not is_positive(node.args[1]):
-            found[graph.number(node.args[1])] = None
+            divisors[graph.number(node.args[1])] = None
         if node.op == "tan" and node.varies:
-            found[graph.op("cos", node.args[0])] = None
-    return list(found)
+            divisors[graph.op("cos", node.args[0])] = None
+    return list(divisors)
 
 
 def _ends(node: Expr) -> bool:

@@ -72,7 +72,7 @@ class Conditions:
         Where the function of even integers is 0, it rises with what is counted if the other one is
         below 0; where that one is 0, if the first is above.
         """
-        return [each.integers * each.rows for each in self.located for _ in range(each.rows)]
+        return [one.integers * one.rows for one in self.located for _ in range(one.rows)]
 
     @property
     def bending(self) -> int:
