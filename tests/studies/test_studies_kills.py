@@ -69,7 +69,7 @@ EDITS = {
     "equation": ("p.gain * x[0] ** 3", "p.gain * x[0] ** 2"),
     "option": ('"wild": Lag(gain=0.4)', '"wild": Lag(gain=0.5)'),
 }
-EACH_SORT = (10, 16, 19, 22, 25)  # of every study and edit, without and with a worker
+EACH_RUN = (10, 25)  # without and with a worker
 
 REFUSED = 2
 
@@ -147,8 +147,8 @@ def assert_same(one, other):
 
 
 def kill(number):
-    """One of each sort in each `.ci/run`; the others once a week."""
-    mark = pytest.mark.ci if number in EACH_SORT else pytest.mark.weekly
+    """Two in each `.ci/run`; the others once a week."""
+    mark = pytest.mark.ci if number in EACH_RUN else pytest.mark.weekly
     return pytest.param(number, marks=mark)
 
 

@@ -5,6 +5,7 @@ import sys
 import pandas as pd
 import pytest
 from command_line import nlctl
+from examples import parted
 from studies_example import HEAD, LOOP, write
 
 from nlctl.analysis.studies import StudyError, read_study, replay, run
@@ -78,7 +79,7 @@ def write_alone(folder):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("executor", ["threads", "processes"])
+@pytest.mark.parametrize("executor", parted(["processes", "threads"]))
 def test_in_processes_of_its_own(tmp_path, executor):
     """On the command line, and in worker processes, which cannot import a neighbour."""
     written(tmp_path, FILES)

@@ -361,7 +361,7 @@ KINDS_ASKED = [line[8:-1] for line in EVERY_KIND.splitlines() if line.startswith
 @pytest.mark.ci
 @settings(max_examples=4)
 @given(data=st.data())
-@pytest.mark.parametrize("kind", KINDS_ASKED)
+@pytest.mark.parametrize("kind", parted(KINDS_ASKED))
 def test_resealed_tables_end_in_a_sentence(run_of, tmp_path_factory, kind, data):
     """Any table of any kind of analysis, every key right: no trace, no exit 3."""
     any_change_ends_in_a_sentence(run_of(kind), tmp_path_factory.mktemp("any") / "out", data)

@@ -27,10 +27,10 @@ def sized(entries):
 
 
 def when(number, n):
-    """Another quarter of the entries of each other size in each `.ci/run`."""
+    """Another eighth of the entries of each other size in each `.ci/run`."""
     if n == 9:
         return ()
-    return pytest.mark.weekly if number % 4 else pytest.mark.ci
+    return pytest.mark.weekly if number % 8 else pytest.mark.ci
 
 
 def hold(entry, n, dt=0):
@@ -93,8 +93,8 @@ def size(n):
 @machine_code
 @pytest.mark.parametrize("n", [size(n) for n in user_functions.SIZES])
 def test_traced_functions_in_one_diagram_in_machine_code(n):
-    """Alone, side by side, and in a short run: a tenth of them, and once a week all."""
-    found = report("joint", n, some(accepted(n, opaque=False), part=10))
+    """Alone, side by side, and in a short run: a part of them, and once a week all."""
+    found = report("joint", n, some(accepted(n, opaque=False), part=25))
     assert {kind for kind, _ in found.values()} == {"equal"}
 
 

@@ -202,7 +202,7 @@ def by_eigenvalues(t, x, u, params):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("function", [while_loop, by_eigenvalues])
-@pytest.mark.parametrize("lanes", [1, 2])
+@pytest.mark.parametrize("lanes", [2, pytest.param(1, marks=pytest.mark.weekly)])
 def test_what_cannot_be_traced_is_called_for_each_member(function, lanes):
     """The result is the same, and the reason is known."""
     block = static(function, k=1.5)

@@ -176,7 +176,7 @@ def test_numbers_with_breaks_are_the_same_in_machine_code():
     for function in some([
         metrics.highest, metrics.lowest, metrics.peak, metrics.spread, metrics.total_variation,
         partial(metrics.settling_time, band=0.6), partial(metrics.reversals, above=0.1),
-    ], part=4):  # fmt: skip
+    ], part=7):  # fmt: skip
         plain, fast = function(t, y, breaks=breaks), in_machine_code(function)(t, y, breaks=breaks)
         assert fast == pytest.approx(plain, rel=1e-12)
 
