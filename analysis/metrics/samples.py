@@ -25,16 +25,17 @@ _BREAKS = (
 
 def of_samples(function: _F) -> _F:
     """Mark a function of samples as an equation that says which argument is not as annotated."""
-    function.__doc__ = _described(function)
+    if function.__doc__:  # Python has none with -OO
+        function.__doc__ = _described(function, function.__doc__)
     plain = equation(function)
     called = reporting(plain, function.__name__, _lengths)
     overload(called, strict=False)(lambda *_, **__: plain)
     return called
 
 
-def _described(function: Any) -> str:
+def _described(function: Any, text: str) -> str:
     """Return a docstring with what all of them take: times and samples first, breaks last."""
-    names, doc = inspect.signature(function).parameters, inspect.cleandoc(function.__doc__)
+    names, doc = inspect.signature(function).parameters, inspect.cleandoc(text)
     shared = "".join(entry for name, entry in _SAMPLES.items() if name in names)
     if not shared:
         return doc
