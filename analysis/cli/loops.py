@@ -156,8 +156,8 @@ class Simulated:
 
     loop: Any
     response: Any
-    params: Mapping[str, Any]  # Parameters and initial states that were set.
-    start: Mapping[str, float]  # Parameters and initial states that were set.
+    params: Mapping[str, Any]  # Parameters that were set.
+    start: Mapping[str, float]  # Initial states that were set.
 
 
 def simulated(
