@@ -141,7 +141,7 @@ def interrupted(arguments, is_time, cwd):
     return process.returncode, out, told
 
 
-@pytest.mark.ci
+@pytest.mark.weekly
 @pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_is_exit_code_130_and_prints_how_to_go_on(folder):
     """The chunk in hand is kept; the printed command ends with the uninterrupted table."""
