@@ -458,7 +458,7 @@ def _no_report(path: Path) -> UsageError:
 
 def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
     """Write the index page over the reports below a folder, and print where it is."""
-    from ..pages.compared import trend_figure
+    from ..pages.trend import trend_figure
     from ..report.browser import open_page
     from ..report.gallery import write_gallery
     from ..studies.intact.contents import check_page

@@ -23,11 +23,11 @@ from nlctl.plotting.axes import (
     TIME,
     WIDTH,
     legend_above,
-    plain,
     set_style,
     stacked_axes,
 )
 from nlctl.plotting.bands import Limit, bands
+from nlctl.plotting.labels import plain
 
 from ..robustness.stl.spec import violates
 from .labels import arms, draws, within_reach

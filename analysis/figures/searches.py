@@ -231,6 +231,11 @@ def centred(margin: np.ndarray) -> Normalize:
 REACH = 1.0  # margins beyond are drawn there
 
 
+def _clipped(margin: pd.Series | pd.DataFrame) -> np.ndarray:
+    """Return margins as they are drawn; one that is not a number is as bad as any."""
+    return np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
+
+
 @draws
 def fault_margins(margin: pd.Series) -> Figure:
     """Least margin that each fault leaves, with its name at the left.
@@ -241,7 +246,7 @@ def fault_margins(margin: pd.Series) -> Figure:
         Least margin by the name of the fault.
     """
     figure, ax = number_axes(margin.index)
-    value = np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
+    value = _clipped(margin)
     at, bad = np.arange(len(value)), violates(margin)
     ax.barh(at[~bad], value[~bad], 0.6, color=BLUE, edgecolor="white")
     ax.barh(at[bad], value[bad], 0.6, color=ORANGE, hatch="///", edgecolor="white")
@@ -262,7 +267,7 @@ def fault_pairs(margin: pd.DataFrame) -> Figure:
     count = len(margin)
     figure = Figure(figsize=(WIDTH, 2.2 + 0.22 * count), layout="constrained")
     ax = figure.subplots()
-    value = np.clip(np.nan_to_num(margin.to_numpy(dtype=float), nan=-REACH), -REACH, REACH)
+    value = _clipped(margin)
     image = ax.imshow(value, cmap=COLOURS, norm=centred(value), aspect="auto")
     rows, columns = np.nonzero(violates(margin.to_numpy()))
     ax.plot(columns, rows, "x", color=MAP_INK, markersize=4)

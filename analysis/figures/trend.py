@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, plain, set_style
+from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, set_style
+from nlctl.plotting.labels import plain
 
 from .labels import draws
 

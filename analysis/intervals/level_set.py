@@ -13,7 +13,7 @@ from flint import arb
 from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, of_type
 from nlctl.errors import ParameterError
-from nlctl.expressions.dependence import may_jump
+from nlctl.expressions.continuity import may_jump
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import numbers_at

@@ -19,7 +19,7 @@ from flint import arb
 
 from nlctl.errors import CompileError
 from nlctl.expressions.arrays import Tracer
-from nlctl.expressions.dependence import is_an_extreme
+from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
 from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
 from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum

@@ -1,4 +1,4 @@
-"""Two reports as a page, and the figure of one study over its revisions, for the gallery."""
+"""Two reports as a page: which claims, figures and numbers changed, and signals of both."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from ..report.changes import ClaimChange, Curves, claim_changes, curves_of, figu
 from ..report.compare import ABSENT, Difference, differing_numbers
 from ..report.document import (
     Claim,
-    Figure,
     Headline,
     Item,
     Paragraph,
@@ -27,11 +26,10 @@ from ..report.document import (
     captioned,
     versions,
 )
-from ..report.outline import claim_status, sort_key, summary
-from ..report.trends import Trend
+from ..report.outline import sort_key, summary
 
 _LISTED = 100  # numbers of a table
-_DRAWN = 4  # signals or numbers of a figure
+_DRAWN = 4  # signals of a figure
 _CLAIM_COLUMNS = (
     "before", "after", "claim", "found before", "found after", "limit before", "limit after",
 )  # fmt: skip
@@ -341,29 +339,3 @@ def _compared_section(first: Compared, second: Compared) -> Section:
         rows=[row for row in rows if any(row[1:])],
     )
     return Section(key="compared", title="The two reports", items=[table])
-
-
-_ENDS = {
-    **dict.fromkeys(("pass", "proved", "checked"), "holds"),
-    **dict.fromkeys(("refuted", "fail"), "fails"),
-}
-
-
-def trend_figure(trend: Trend) -> Figure:
-    """Return the figure: how each claim ended, and the first of the main numbers."""
-    claims = {name: [_end(claim) for claim in row] for name, row in trend.claims.items()}
-    numbers = dict(list(trend.numbers.items())[:_DRAWN])
-    ended = "; ".join(
-        f"{name}: {', '.join(end or 'not made' for end in ends)}" for name, ends in claims.items()
-    )
-    return Figure(
-        key="trend",
-        caption=f"{trend.title}: its claims and main numbers over {', '.join(trend.labels)}.",
-        description=f"Claims over {', '.join(trend.labels)}. {ended}",
-        figure=figures.trend(trend.labels, claims, numbers),
-    )
-
-
-def _end(claim: Claim | None) -> str:
-    """Return how a claim ended, in one of the words of the figure."""
-    return "" if claim is None else _ENDS.get(claim_status(claim)[1], "open")

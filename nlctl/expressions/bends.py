@@ -9,7 +9,7 @@ import numpy as np
 from .evaluate import evaluate_expressions
 from .graph import COMPARISONS, ORDERS, Expr, Graph, Untraceable, needed
 
-_OF_SIGNS = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}
+_SIDES = {"sign": (1.0, -1.0), "heaviside": (1.0, 0.0)}  # values above 0 and below
 _POINTS = 256
 _TRUTHS = "truths"  # the array of values that say whether other conditions hold
 _NEAR = 0.1  # of a parameter
@@ -18,12 +18,11 @@ _SAME = 1e-12
 
 def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarray) -> bool:
     """Return whether nothing that expressions are made of jumps at a condition, with such p."""
-    if condition.op not in (*ORDERS, *_OF_SIGNS, "copysign") or condition.size is not None:
+    if condition.op not in (*ORDERS, *_SIDES, "copysign") or condition.size is not None:
         return False
     numbers = [graph.number(arg) for arg in condition.args]
-    one, other = numbers if condition.op in ORDERS else (numbers[0], graph.const(0.0))
-    if condition.op == "copysign":
-        one = numbers[1]
+    one = numbers[1 if condition.op == "copysign" else 0]
+    other = numbers[1] if condition.op in ORDERS else graph.const(0.0)
     on_it = {one: other} if one.varies else {other: one}
     there = {**on_it, **_free(graph, roots, condition, on_it)}
     sides = [
@@ -47,8 +46,7 @@ def _values(graph: Graph, condition: Expr, there: Mapping[Expr, Expr]) -> list[E
         (given,) = replaced_parts(graph, condition.args[:1], there)
         size = graph.op("absolute", graph.number(given))
         return [size, graph.op("neg", size)]
-    sides = _OF_SIGNS.get(condition.op, (True, False))
-    return [graph.const(side) for side in sides]
+    return [graph.const(side) for side in _SIDES.get(condition.op, (True, False))]
 
 
 def _free(

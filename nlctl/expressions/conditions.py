@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Iterable
 from functools import reduce
 
-from .edges import domain_edges, have_edges, is_positive, poles
+from .edges import domain_edges, have_edges, is_positive, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -52,7 +52,8 @@ def _switches(node: Expr) -> bool:
 def _asks_for_number(node: Expr) -> bool:
     """Return whether a comparison says whether something is a number, as x != x does."""
     with_itself = node.op in ("eq", "ne") and node.args[0] is node.args[1]
-    return (with_itself or (node.op in ORDERS and _is_of_infinity(node))) and have_edges(node.args)
+    asks = with_itself or (node.op in ORDERS and _is_of_infinity(node))
+    return asks and have_edges(needed(node.args))
 
 
 def _is_always(node: Expr) -> bool:
@@ -68,11 +69,7 @@ def at_integers(node: Expr) -> bool:
 def _rooted(node: Expr) -> Expr | None:
     """Return what a root is the size of, as sqrt(z z) is that of z; None of any other number."""
     square = node.args[0] if node.op in ("sqrt", "power") else node
-    return square.args[0] if square is not node and _is_square(square) else None
-
-
-def _is_square(node: Expr) -> bool:
-    return node.op == "mul" and node.args[0] is node.args[1]
+    return square.args[0] if square is not node and is_square(square) else None
 
 
 def _is_quotient(node: Expr) -> bool:
@@ -105,7 +102,7 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
     """Return what changes its sign where a condition switches."""
     op, args = condition.op, [graph.number(arg) for arg in condition.args]
     if _asks_for_number(condition):
-        edges = domain_edges(graph, args)
+        edges = domain_edges(graph, needed(args))
         return reduce(lambda a, b: graph.op("minimum", a, b), edges, graph.const(1.0))
     if op in _OF_DIFFERENCES:
         return _difference(graph, *args)
@@ -135,11 +132,12 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     if at_integers(condition):
         return _at_even_and_odd(graph, _counted(graph, condition))
     if _asks_for_number(condition):
-        return tuple(domain_edges(graph, condition.args))
+        return tuple(domain_edges(graph, needed(condition.args)))
     function = switching_function(graph, condition)
     if condition.op not in ORDERS:
         return _factors(function)
-    edges = [*domain_edges(graph, condition.args), *poles(graph, condition.args)]
+    nodes = needed(condition.args)
+    edges = [*domain_edges(graph, nodes), *poles(graph, nodes)]
     return tuple(part for product in (function, *edges) for part in _factors(product))
 
 
@@ -147,7 +145,7 @@ def _factors(function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
     if function.op == "neg":
         return _factors(function.args[0])
-    if function.op != "mul" or function.args[0] is function.args[1]:
+    if function.op != "mul" or is_square(function):
         return (function,)
     parts = [part for arg in function.args if arg.varies for part in _factors(arg)]
     return tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)

@@ -1,21 +1,15 @@
-"""Which entries of an array results depend on, and whether they may jump with them."""
+"""Which results depend on which entries of an array: the structure of a Jacobian matrix."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from .conditions import JUMPING
-from .graph import LINEAR, OF_FACTORS, ORDERS, Expr, needed
+from .graph import LINEAR, OF_FACTORS, Expr, needed
 
-_WHOLE = (
-    "sum",
-    "call",
-    "solve",
-    *LINEAR,
-    *OF_FACTORS,
-)  # each element of the result depends on all that goes in
+# each element of the result depends on all that goes in
+_WHOLE = ("sum", "call", "solve", *LINEAR, *OF_FACTORS)
 
 
 def structure(results: Sequence[tuple[Expr, int]], array: str, count: int) -> np.ndarray:
@@ -47,23 +41,3 @@ def _of_node(node: Expr, parts: list[np.ndarray], array: str, count: int) -> np.
     for part in parts:
         nothing = nothing | part
     return nothing
-
-
-_UNKNOWN = ("call", "solve")  # what they do is not written in the expression
-
-
-def may_jump(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> bool:
-    """Whether expressions have jumps of their own, as far as can be read off."""
-    inside = [node for node in needed(exprs, known) if node not in known]
-    return any(
-        node.op in JUMPING
-        or node.op in _UNKNOWN
-        or (node.op == "select" and not is_an_extreme(node))
-        for node in inside
-    )
-
-
-def is_an_extreme(choice: Expr) -> bool:
-    """Whether a choice between two values is by which of them is larger."""
-    condition, *values = choice.args
-    return condition.op in ORDERS and set(condition.args) == set(values)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from .graph import Expr, Graph, needed
+from .graph import Expr, Graph
 
 _ROOTS = ("sqrt", "log", "log2", "log10")
 _ARCS = ("arcsin", "arccos", "arctanh")
@@ -13,21 +13,21 @@ _SQUARES = ("absolute", "sqrt", "hypot")  # at least 0
 _ABOVE = ("exp", "exp2", "cosh")  # above 0
 
 
-def domain_edges(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
-    """Return what is below 0 where something that expressions are made of is NaN."""
-    edges = dict.fromkeys(_domain(graph, node) for node in needed(exprs) if _ends(node))
+def domain_edges(graph: Graph, nodes: Iterable[Expr]) -> list[Expr]:
+    """Return what is below 0 where one of all parts of some expressions is NaN."""
+    edges = dict.fromkeys(_domain(graph, node) for node in nodes if _ends(node))
     return [edge for edge in edges if edge.varies]
 
 
-def have_edges(exprs: Iterable[Expr]) -> bool:
+def have_edges(nodes: Iterable[Expr]) -> bool:
     """Return whether there are any."""
-    return any(map(_ends, needed(exprs)))
+    return any(map(_ends, nodes))
 
 
-def poles(graph: Graph, exprs: Iterable[Expr]) -> list[Expr]:
-    """Return what is 0 where something that expressions are made of is infinite."""
+def poles(graph: Graph, nodes: Iterable[Expr]) -> list[Expr]:
+    """Return what is 0 where one of all parts of some expressions is infinite."""
     divisors: dict[Expr, None] = {}
-    for node in needed(exprs):
+    for node in nodes:
         if node.op == "div" and node.args[1].varies and not is_positive(node.args[1]):
             divisors[graph.number(node.args[1])] = None
         if node.op == "tan" and node.varies:
@@ -56,6 +56,11 @@ def _is_whole(exponent: Expr) -> bool:
     return exponent.kind == "i" or (exponent.op == "const" and float(exponent.data).is_integer())
 
 
+def is_square(expr: Expr) -> bool:
+    """Return whether an expression is a product of a number with itself, as it is written."""
+    return expr.op == "mul" and expr.args[0] is expr.args[1]
+
+
 def is_positive(expr: Expr) -> bool:
     """Return whether an expression is seen to be above 0 wherever it is a number."""
     if expr.op == "const":
@@ -73,7 +78,7 @@ def _is_never_negative(expr: Expr) -> bool:
     """Return whether an expression is seen to be at least 0."""
     if expr.op == "const":
         return bool(expr.data >= 0)
-    if expr.op == "mul" and expr.args[0] is expr.args[1]:
+    if is_square(expr):
         return True
     if expr.op in ("add", "mul", "div"):
         return all(map(_is_never_negative, expr.args))

@@ -66,10 +66,9 @@ def _joined_constants(graph: Graph, pieces: _Pieces) -> list[tuple[Expr, int]]:
 def changed_solution(graph: Graph, node: Expr, matrix: Expr | None, right: _Pieces) -> Expr:
     """Return A^-1 (B' - A' X) of a solution X, for changes A' and B'."""
     lu, (n, m) = node.args[0], node.data[0]
-    change = graph.joined(list(right))
     if matrix is None:
         return solution(graph, lu, n, right)
-    rows = []
+    change, rows = graph.joined(list(right)), []
     for i in range(n):
         for j in range(m):
             moved = entry_of_product(graph, matrix, node, (i, j))

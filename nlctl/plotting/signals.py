@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .axes import STYLES, TIME, legend_above, plain, stacked_axes
+from .axes import STYLES, TIME, legend_above, stacked_axes
+from .labels import plain
 
 
 def rows_figure(

@@ -20,7 +20,7 @@ from ..errors import CompileError
 from ..expressions.arrays import Tracer
 from ..expressions.bends import only_bends, replaced_parts
 from ..expressions.conditions import conditions, switching_function
-from ..expressions.dependence import may_jump
+from ..expressions.continuity import may_jump
 from ..expressions.graph import Expr, Graph, Untraceable, needed
 from ..expressions.trace import trace
 from ..native import Compiled

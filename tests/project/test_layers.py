@@ -83,6 +83,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["arrays", "operators", "masked", "indexing", "edges"],
         [
             "conditions",
+            "continuity",
             "dependence",
             "evaluate",
             "latex",

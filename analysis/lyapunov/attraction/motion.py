@@ -13,7 +13,7 @@ import numpy as np
 from nlctl import native
 from nlctl.diagrams import state_names
 from nlctl.errors import ParameterError
-from nlctl.expressions.dependence import may_jump
+from nlctl.expressions.continuity import may_jump
 from nlctl.expressions.derivatives import tangents
 from nlctl.expressions.evaluate import evaluate_expressions
 from nlctl.expressions.graph import Expr, Graph, Untraceable

@@ -13,7 +13,7 @@ import numpy as np
 from ...blocks import Block, event_count, guard_count, memory_states
 from ...errors import BlockError, CompileError
 from ...expressions.arrays import Tracer
-from ...expressions.dependence import may_jump
+from ...expressions.continuity import may_jump
 from ...sampling.clock import Clock, Instants, instants, meetings
 from ...sampling.system import Happening, clocks_of
 from ...upstream.control_internals import StandIn

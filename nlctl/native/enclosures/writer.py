@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...expressions.dependence import is_an_extreme
+from ...expressions.continuity import is_an_extreme
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 from ..codegen.ir.numbers import one_line
 from ..codegen.ir.text import Body, Module, Value

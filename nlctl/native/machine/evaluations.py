@@ -61,10 +61,11 @@ class Machine:
 
     def values(self, function: Any, names: str, point: Any, c: np.ndarray) -> list[np.ndarray]:
         """Return what a function makes of t, x and u, `c` in every lane: arrays of these names."""
-        t, x, u = (np.reshape(np.asarray(v, dtype=float), (-1, 1)) for v in point)
-        t, x, u = (np.repeat(v, self.width, axis=1) for v in (t, x, u))
+        t, x, u = (np.ascontiguousarray(v, dtype=float).reshape(-1, 1) for v in point)
+        if self.width > 1:
+            t, x, u = (np.repeat(v, self.width, axis=1) for v in (t, x, u))
         results = [np.zeros((self.lowered.rows[name], self.width)) for name in names.split()]
-        function(t[0].copy(), x, u, c, *results)
+        function(t[0], x, u, c, *results)
         return [array[:, -1] for array in results]
 
     def check(self, c: np.ndarray) -> None:

@@ -7,7 +7,6 @@ looks whether they are still what they were.
 from __future__ import annotations
 
 import functools
-from abc import ABC, abstractmethod
 from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -19,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .values import PLAIN, KnownValue, captured
+from .values import PLAIN
 
 GONE = object()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
@@ -169,35 +168,3 @@ def _same_held(now: Any, held: Any) -> bool:
     if isinstance(now, set | frozenset):
         return frozenset(now) == held
     return len(now) == len(held) and all(map(same, now, held))
-
-
-class Walk(ABC):
-    """A walk through a function and all that it calls: what its parts share, and how to walk on."""
-
-    def __init__(self) -> None:
-        self.read: dict[tuple[int, str], Captured] = {}
-        self.unbound: list[str] = []
-        self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
-
-    def captured(self, holder: object, name: str, value: object) -> KnownValue:
-        """Return what is known of a value that is read from around a function, and note it."""
-        if (id(holder), name) not in self.read:
-            self.read[id(holder), name] = noted(holder, name, value)
-        return captured(value)
-
-    def note(self, notes: Iterable[Captured]) -> None:
-        """Keep notes of what a function or an object consists of."""
-        for note in notes:
-            self.read.setdefault((id(note.holder), note.name), note)
-
-    @abstractmethod
-    def call(
-        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
-        """Return what is known of the result of a call."""
-
-    @abstractmethod
-    def function(
-        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
-        """Return what is known of the result of somebody's Python function."""

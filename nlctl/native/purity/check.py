@@ -10,24 +10,20 @@ from __future__ import annotations
 
 import ast
 import functools
-import importlib
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
-import numpy as np
-
 from ...expressions.source import Definition, Unreadable, definition, source_file
 from . import known_calls, made
-from .captured import Captured, Walk, noted_function, noted_partial
-from .expressions import CHANGES, OPERATORS, Expressions, Frame
-from .known_calls import MEMORY
+from .captured import Captured, noted_function, noted_partial
+from .expressions import Frame
+from .statements import CallWalker
 from .values import (
     FRESH,
     OUTSIDE,
-    UNKNOWN_VALUE,
     Bound,
     Impure,
     Instance,
@@ -39,13 +35,12 @@ from .values import (
     Unknown,
     captured,
     element,
-    forgotten,
     holder,
     least_upper_bound,
     python_function,
 )
+from .walk import Walk
 
-_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.MatMult: "@"}
 _BUDGET = 400  # bodies that are walked for one function, before it is too much to follow
 
 
@@ -171,226 +166,3 @@ def _bound(
     if arguments.kwarg:
         bound[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
     return bound
-
-
-# -- statements in their order: what each leaves in the names of a call ---------------------------
-
-
-class CallWalker(Expressions):
-    """Walks the body of one call."""
-
-    def __init__(self, walk: Walk, frame: Frame) -> None:
-        super().__init__(walk, frame)
-        self.returned: list[KnownValue] = []
-        self.yielded: list[KnownValue] = []
-
-    def result(self, node: Definition) -> KnownValue:
-        if isinstance(node, ast.Lambda):
-            return self.visit(node.body)
-        self.statements(node.body)
-        if self.yielded:
-            return holder(self.yielded)
-        return least_upper_bound(self.returned)
-
-    def visit_Yield(self, node: ast.Yield) -> KnownValue:
-        self.yielded.append(FRESH if node.value is None else self.visit(node.value))
-        return FRESH
-
-    def visit_YieldFrom(self, node: ast.YieldFrom) -> KnownValue:
-        over = self.visit(node.value)
-        self.iterated(over)
-        self.yielded.append(element(over))
-        return FRESH
-
-    def statements(self, body: Sequence[ast.stmt]) -> None:
-        for statement in body:
-            self.visit(statement)
-
-    def visit_Expr(self, node: ast.Expr) -> None:
-        self.visit(node.value)
-
-    def visit_Pass(self, node: ast.AST) -> None:
-        pass
-
-    visit_Break = visit_Continue = visit_Pass
-
-    def visit_Return(self, node: ast.Return) -> None:
-        self.returned.append(FRESH if node.value is None else self.visit(node.value))
-
-    def visit_Assign(self, node: ast.Assign) -> None:
-        value, parts = self.visit(node.value), node.value
-        for target in node.targets:
-            pairs = _pairs(target, parts)
-            values = [self.visit(part) for _, part in pairs]  # a, b = c, d
-            for (part, _), part_value in zip(pairs, values, strict=True):
-                self.bind(part, part_value)
-            if not pairs:
-                self.bind(target, value)
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
-        if node.value is not None:
-            self.bind(node.target, self.visit(node.value))
-
-    def visit_AugAssign(self, node: ast.AugAssign) -> None:
-        added = self.visit(node.value)
-        if isinstance(node.target, ast.Name):
-            value = self.lookup(node.target.id)
-            if isinstance(value.known, Instance):
-                self.assign(node.target.id, self.changed_object(node, value, added))
-                return
-            if not value.own:
-                name, mark = node.target.id, _SIGNS.get(type(node.op), "+")
-                raise Impure(
-                    f"changes '{name}' in place with {mark}=, which it did not make",
-                    f"write {name} = {name} {mark} ...",
-                )
-            self.assign(node.target.id, forgotten(value))
-            self.kept(value, [added])
-            return
-        base = self.visit(node.target.value)
-        if base.holds and not base.inside:
-            text = ast.unparse(node.target.value)
-            raise Impure(f"changes an element of '{text}'", f"{MEMORY}, or {CHANGES}")
-        self.write(node.target, added)
-
-    def changed_object(
-        self, node: ast.AugAssign, value: KnownValue, added: KnownValue
-    ) -> KnownValue:
-        """Return what an object becomes by ``+=`` and its kind."""
-        name = OPERATORS.get(type(node.op), "")
-        operator = made.operator_of(self.walk, value, f"__i{name}__")
-        if operator is not None:
-            return self.walk.function(operator, [value, added], {})
-        return self.operated(type(node.op), value, added)
-
-    def visit_Delete(self, node: ast.Delete) -> None:
-        for target in node.targets:
-            if isinstance(target, ast.Name):
-                self.assign(target.id, OUTSIDE)
-            else:
-                self.bind(target, FRESH)
-
-    def visit_Global(self, node: ast.Global) -> None:
-        self.frame.shared |= dict.fromkeys(node.names, "global")
-
-    def visit_Nonlocal(self, node: ast.Nonlocal) -> None:
-        self.frame.shared |= dict.fromkeys(node.names, "nonlocal")
-
-    def visit_If(self, node: ast.If) -> None:
-        self.condition(node.test)
-        self.either([node.body, node.orelse])
-
-    def either(self, bodies: Sequence[Sequence[ast.stmt]]) -> None:
-        """Walk several ways of which one is taken."""
-        before, ends = self.frame.names, []
-        for body in bodies:
-            self.frame.names = dict(before)
-            self.statements(body)
-            if not (body and isinstance(body[-1], ast.Return | ast.Raise)):
-                ends.append(self.frame.names)
-        self.frame.names = merged(ends or [before])
-        everywhere = [name for name in self.frame.names if all(name in end for end in ends)]
-        self.frame.unbound |= self.frame.names.keys() - set(everywhere)
-
-    def visit_For(self, node: ast.For) -> None:
-        over = self.visit(node.iter)
-        self.iterated(over)
-        self.repeated(node, lambda: self.bind(node.target, element(over)))
-
-    def visit_While(self, node: ast.While) -> None:
-        self.repeated(node, lambda: self.condition(node.test))
-
-    def repeated(self, node: ast.For | ast.While, begin: Any) -> None:
-        """Walk a loop until nothing new is learnt."""
-        while True:
-            before = dict(self.frame.names)
-            begin()
-            self.statements(node.body)
-            self.frame.names = merged([before, self.frame.names])
-            if self.frame.names == before:
-                break
-        self.statements(node.orelse)
-
-    def visit_Match(self, node: ast.Match) -> None:
-        subject = self.visit(node.subject)
-        for case in node.cases:
-            for part in ast.walk(case.pattern):
-                name = getattr(part, "name", None) or getattr(part, "rest", None)
-                if name:
-                    self.assign(name, KnownValue(subject.own and subject.inside, subject.inside))
-                if isinstance(part, ast.MatchClass):
-                    self.generic_visit(part)
-            if case.guard is not None:
-                self.visit(case.guard)
-        self.either([case.body for case in node.cases] + [[]])
-
-    def visit_Assert(self, node: ast.Assert) -> None:
-        self.visit(node.test)
-
-    def visit_Raise(self, node: ast.Raise) -> None:
-        if node.exc is not None:
-            self.visit(node.exc)
-
-    def visit_Try(self, node: ast.Try) -> None:
-        """Walk the ways through it; of errors in machine code nothing is caught."""
-        caught = [handler.type for handler in node.handlers]
-        if not all(isinstance(c, ast.Name) and c.id == "KeyError" for c in caught):
-            self.walk.unbound += ["try"]  # numba knows other errors than Python
-        before = dict(self.frame.names)
-        self.statements(node.body)
-        self.frame.names = merged([before, self.frame.names])
-        for handler in node.handlers:
-            if handler.name:
-                self.assign(handler.name, FRESH)
-        self.either([node.orelse, *(handler.body for handler in node.handlers)])
-        self.statements(node.finalbody)
-
-    def visit_TryStar(self, node: ast.AST) -> None:
-        raise Impure("has try ... except*", "write an if for the case that fails")
-
-    def visit_With(self, node: ast.With) -> None:
-        for item in node.items:
-            call = item.context_expr
-            entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            if entered is not np.errstate or item.optional_vars is not None:
-                raise Impure("has a with statement", "do without it")
-        self.statements(node.body)
-
-    def visit_Import(self, node: ast.Import) -> None:
-        for alias in node.names:
-            module = _imported(alias.name)
-            top = _imported(alias.name.partition(".")[0])
-            self.assign(alias.asname or top.__name__, captured(module if alias.asname else top))
-
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
-        package = self.frame.function.__globals__.get("__package__")
-        module = _imported("." * node.level + (node.module or ""), package)
-        for alias in node.names:
-            self.assign(alias.asname or alias.name, captured(getattr(module, alias.name)))
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        value = KnownValue(True, True, known=Local(node, self.frame))
-        for decorator in reversed(node.decorator_list):
-            value = self.walk.call(self.visit(decorator), [value], {})
-        self.assign(node.name, value)
-
-
-def _imported(name: str, package: str | None = None) -> Any:
-    try:
-        return importlib.import_module(name, package)
-    except ImportError:
-        raise Impure(f"imports {name}, which is not installed", "import what there is") from None
-
-
-def _pairs(target: ast.expr, value: ast.expr) -> list[tuple[ast.expr, ast.expr]]:
-    """Return what is assigned to what where both sides are written out, otherwise nothing."""
-    if not (isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)):
-        return []
-    fits = len(target.elts) == len(value.elts)
-    return list(zip(target.elts, value.elts, strict=True)) if fits else []
-
-
-def merged(ends: Sequence[dict[str, KnownValue]]) -> dict[str, KnownValue]:
-    """Return what is known after one of several ways."""
-    names = {name for end in ends for name in end}
-    return {name: least_upper_bound([end[name] for end in ends if name in end]) for name in names}

@@ -15,7 +15,6 @@ import numpy as np
 
 from ...expressions.source import cells_of, source_file
 from . import known_calls, made
-from .captured import Walk
 from .known_calls import MEMORY
 from .values import (
     FRESH,
@@ -41,6 +40,7 @@ from .values import (
     least_upper_bound,
     library,
 )
+from .walk import Walk
 
 CHANGES = "work on a copy, as in x.copy()"
 OPERATORS = {

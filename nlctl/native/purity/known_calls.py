@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from . import made
-from .captured import Walk
 from .values import (
     FRESH,
     OUTSIDE,
@@ -41,6 +40,7 @@ from .values import (
     library,
     python_function,
 )
+from .walk import Walk
 
 MEMORY = "keep what it remembers in a state of the block"
 OUTPUT = "leave output out of equations"

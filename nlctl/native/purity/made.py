@@ -12,7 +12,6 @@ import inspect
 from types import FunctionType
 from typing import Any, Generic, Protocol
 
-from .captured import Walk
 from .values import (
     OUTSIDE,
     Bound,
@@ -25,6 +24,7 @@ from .values import (
     captured,
     library,
 )
+from .walk import Walk
 
 _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__del__")
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
