@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..codegen.ir.loops import Turns
-from ..codegen.ir.text import Body, Module, Value, constant
+from ..codegen.ir.text import Body, Module, Turns, Value, constant
 from .recurrences import IS_FIRST_ROW, ORDER_ROW, RECIPROCAL_ROW, ROOM, Fold
 
 WIDE = ROOM  # consecutive rows of a single member that are read together

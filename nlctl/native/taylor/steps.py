@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..codegen.ir.loops import Turns
-from ..codegen.ir.text import Body, Module, Value, constant
+from ..codegen.ir.text import Body, Module, Turns, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
 from .folds import WIDE, SeriesLayout
 

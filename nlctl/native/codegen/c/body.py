@@ -21,8 +21,7 @@ _COMPARED = {
     "une": "{} != {}", "one": "islessgreater({}, {})", "uno": "isunordered({}, {})",
 }  # fmt: skip
 _LOGIC = {"and": "&&", "or": "||", "xor": "!="}
-_BITS = {"and": "&", "or": "|", "xor": "^", "add": "+", "shl": "<<"}
-_COUNTED = {"add": "+", "sub": "-", "mul": "*"}
+_BITS = {"and": "&", "or": "|", "xor": "^", "add": "+", "sub": "-", "mul": "*", "shl": "<<"}
 _NAME = re.compile(r"\b[ve]\d+\b")
 SUPPORT = """\
 static uint64_t nlctl_bits(double x) { uint64_t y; memcpy(&y, &x, sizeof y); return y; }
@@ -205,9 +204,6 @@ class CBody(Body):
         part()
         self.indent = self.indent[:-2]
         self.write("}")
-
-    def index(self, name: str, a: Value, b: Value) -> Value:
-        return self.new(f"{a.text} {_COUNTED[name]} {b.text}", kind="i")
 
     def as_number(self, index: Value) -> Value:
         return self.new(f"(double){index.text}")

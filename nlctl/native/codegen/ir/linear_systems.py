@@ -25,8 +25,8 @@ class _Memory:
         """Return the address of the entry at a sum of integers and of products of two."""
         total: Value | None = None
         for term in terms:
-            value = self.b.index("mul", *term) if isinstance(term, tuple) else term
-            total = self.b.index("add", total, value) if total else value
+            value = self.b.logic("mul", *term) if isinstance(term, tuple) else term
+            total = self.b.logic("add", total, value) if total else value
         assert total is not None
         return self.b.address("a", 0, total.text, self.step)
 
@@ -41,16 +41,16 @@ class _Memory:
 def factorised(b: Any, step: int, n: Value) -> None:
     """Write the factors of an n x n matrix: each column's first largest entry comes up."""
     m = _Memory(b, step)
-    begin = b.index("mul", n, n)
-    order = b.index("add", begin, begin)
-    det, flag = b.index("add", order, n), b.index("add", b.index("add", order, n), m.one)
+    begin = b.logic("mul", n, n)
+    order = b.logic("add", begin, begin)
+    det, flag = b.logic("add", order, n), b.logic("add", b.logic("add", order, n), m.one)
     b.counted(m.zero, begin, lambda k: b.store(m.load(k), m.at(begin, k)))
     b.counted(m.zero, n, lambda k: b.store(b.as_number(k), m.at(order, k)))
     for place in (det, flag):
         b.store(b.literal(1.0), m.at(place))
 
     def column(i: Value) -> None:
-        following = b.index("add", i, m.one)
+        following = b.logic("add", i, m.one)
         b.store(b.as_number(i), m.at(m.zero))  # (what was given is not needed any more)
 
         def compare(k: Value) -> None:
@@ -93,9 +93,9 @@ def factorised(b: Any, step: int, n: Value) -> None:
 def back_substituted(b: Any, step: int, n: Value, columns: Value) -> None:
     """Write the solution for some right-hand sides, from the factors in front of them."""
     m = _Memory(b, step)
-    order = b.index("mul", n, n)
-    right = b.index("add", b.index("add", order, n), m.whole(2))
-    begin = b.index("add", right, b.index("mul", n, columns))
+    order = b.logic("mul", n, n)
+    right = b.logic("add", b.logic("add", order, n), m.whole(2))
+    begin = b.logic("add", right, b.logic("mul", n, columns))
 
     def taken(k: Value) -> None:
         source = b.as_index(m.load(order, k))
@@ -108,8 +108,8 @@ def back_substituted(b: Any, step: int, n: Value, columns: Value) -> None:
                                                     m.load(begin, (i, columns), j)))  # fmt: skip
 
     def back(turn: Value) -> None:
-        k = b.index("sub", b.index("sub", n, m.one), turn)
-        b.counted(b.index("add", k, m.one), n, lambda i: less(k, i))
+        k = b.logic("sub", b.logic("sub", n, m.one), turn)
+        b.counted(b.logic("add", k, m.one), n, lambda i: less(k, i))
         pivot = m.load((k, n), k)
 
         def divided(j: Value) -> None:

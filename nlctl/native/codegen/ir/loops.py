@@ -7,41 +7,14 @@ element of each, three to a round.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ....expressions.graph import Expr
 from ..plan import LoopOfLevel
 from .numbers import Writer, one_line
-from .text import Body, Value, constant, float_text
+from .text import Turns, Value, constant, float_text
 
 _WIDE = 4  # elements of one member together
 PER_ROUND = 3  # elements of several members in a round
 _STRAIGHT = 16  # turns of one member up to which they are written one after the other
-
-
-class Turns:
-    """A loop in IR, with what it carries from turn to turn, given as what that is at first."""
-
-    def __init__(self, b: Body, first: Sequence[Value], only_if: str = "") -> None:
-        self.b, self.first = b, first
-        self.loop, self.after, self.before = b.label("turns"), b.label("after"), b.block
-        otherwise = f"i1 {only_if}, label %{self.loop}, label %{self.after}"
-        b.write(f"br {otherwise if only_if else f'label %{self.loop}'}")
-        b.begin(self.loop)
-        self._head = len(b.lines)
-        b.lines += [""] * len(first)  # where the values come from is known at the end
-        self.carried = [
-            Value(f"%carried{i}.{self.loop}", v.width, v.kind) for i, v in enumerate(first)
-        ]
-
-    def end(self, more: Value, following: Sequence[Value]) -> None:
-        """End a turn: whether there are more, and what is carried on."""
-        rows = zip(self.carried, self.first, following, strict=True)
-        for i, (value, first, new) in enumerate(rows, self._head):
-            ways = f"[{first.text}, %{self.before}], [{new.text}, %{self.b.block}]"
-            self.b.lines[i] = f"{value.text} = phi {value.type} {ways}"
-        self.b.write(f"br i1 {more.text}, label %{self.loop}, label %{self.after}")
-        self.b.begin(self.after)
 
 
 def elements_per_turn(size: int) -> int:

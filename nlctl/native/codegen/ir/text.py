@@ -226,7 +226,7 @@ class Body:
         return self.new(f"select {c}, {x}, {y}", width, x.kind)
 
     def logic(self, name: str, a: Value, b: Value) -> Value:
-        """Return ``and``, ``or`` or ``xor``, bit by bit."""
+        """Return ``and``, ``or``, ``xor`` bit by bit; ``add``, ``sub``, ``mul`` of integers."""
         x, y = self.same(a, b)
         return self.new(f"{name} {x}, {y.text}", x.width, x.kind)
 
@@ -374,20 +374,13 @@ class Body:
 
     def counted(self, start: Value, end: Value, turn: Callable[[Value], None]) -> None:
         """Repeat what is written for each integer from `start` to before `end`."""
-        before, head, inside, after = self.block, *map(self.label, ("count", "turn", "counted"))
-        self.write(f"br label %{head}")
-        self.begin(head)
-        index, first = Value(f"%i.{head}", 0, "i"), len(self.lines)
-        self.lines.append("")
-        more = self.new(f"icmp slt {index}, {end.text}", 0, "b")
-        self.write(f"br {more}, label %{inside}, label %{after}")
-        self.begin(inside)
+        is_any = self.new(f"icmp slt {start}, {end.text}", 0, "b")
+        loop = Turns(self, [start], only_if=is_any.text)
+        (index,) = loop.carried
         turn(index)
         following = self.new(f"add {index}, 1", 0, "i")
-        ways = f"[{start.text}, %{before}], [{following.text}, %{self.block}]"
-        self.lines[first] = f"{index.text} = phi i64 {ways}"
-        self.write(f"br label %{head}")
-        self.begin(after)
+        more = self.new(f"icmp slt {following}, {end.text}", 0, "b")
+        loop.end(more, [following])
 
     def when(self, condition: Value, then: Callable[[], None]) -> None:
         """Do what is written only where a condition holds."""
@@ -398,12 +391,33 @@ class Body:
         self.write(f"br label %{after}")
         self.begin(after)
 
-    def index(self, name: str, a: Value, b: Value) -> Value:
-        """Return ``add``, ``sub`` or ``mul`` of two integers."""
-        return self.new(f"{name} {a}, {b.text}", 0, "i")
-
     def as_number(self, index: Value) -> Value:
         return self.new(f"uitofp {index} to double")
 
     def as_index(self, number: Value) -> Value:
         return self.new(f"fptoui {number} to i64", 0, "i")
+
+
+class Turns:
+    """A loop in IR, with what it carries from turn to turn, given as what that is at first."""
+
+    def __init__(self, b: Body, first: Sequence[Value], only_if: str = "") -> None:
+        self.b, self.first = b, first
+        self.loop, self.after, self.before = b.label("turns"), b.label("after"), b.block
+        otherwise = f"i1 {only_if}, label %{self.loop}, label %{self.after}"
+        b.write(f"br {otherwise if only_if else f'label %{self.loop}'}")
+        b.begin(self.loop)
+        self._head = len(b.lines)
+        b.lines += [""] * len(first)  # where the values come from is known at the end
+        self.carried = [
+            Value(f"%carried{i}.{self.loop}", v.width, v.kind) for i, v in enumerate(first)
+        ]
+
+    def end(self, more: Value, following: Sequence[Value]) -> None:
+        """End a turn: whether there are more, and what is carried on."""
+        rows = zip(self.carried, self.first, following, strict=True)
+        for i, (value, first, new) in enumerate(rows, self._head):
+            ways = f"[{first.text}, %{self.before}], [{new.text}, %{self.b.block}]"
+            self.b.lines[i] = f"{value.text} = phi {value.type} {ways}"
+        self.b.write(f"br i1 {more.text}, label %{self.loop}, label %{self.after}")
+        self.b.begin(self.after)
