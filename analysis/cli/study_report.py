@@ -68,7 +68,7 @@ def report_study(
     runs = rows_again(result, prepared, threads)
     report = study_report(result, runs, command + live_words(live), loop, published)
     if live and prepared is not None:
-        from ..pages.study.loop import with_study_live
+        from ..pages.study.live import with_study_live
 
         report = with_study_live(report, result, prepared, runs, [] if live is True else live)
     report = stamped(report, stamp)

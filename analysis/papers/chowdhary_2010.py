@@ -11,7 +11,8 @@ from scipy.linalg import solve_continuous_lyapunov
 from nlctl.papers import chowdhary_2010 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun, rows_over_time, simulate_cases
+from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import tabuada_2007 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun, rows_over_time, simulate_cases
+from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 

@@ -1,4 +1,4 @@
-"""Cases of a paper: a diagram, a start, an input, how they ended, and figures of them."""
+"""Cases of a paper: a diagram, a start, an input, and how they ended."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from nlctl.attributes import described_record
 from nlctl.diagrams import state_names
-from nlctl.plotting.axes import STYLES, TIME, legend_above, stacked_axes
 from nlctl.response import input_output_response
 
 
@@ -69,29 +67,3 @@ def simulate_cases(
         runs[case.key] = simulate_case(case)
         done(1)
     return runs
-
-
-def paths_figure(paths: Mapping[str, tuple[Any, Any]], across: str, up: str) -> Figure:
-    """Draw up to four paths in a plane; those of a label that ends in "read" as points."""
-    figure, (ax,) = stacked_axes(height=3.0)
-    for (label, (x, y)), (colour, style) in zip(paths.items(), STYLES, strict=False):
-        line = "o" if label.endswith("read") else style
-        ax.plot(x, y, line, color=colour, linewidth=1.4, markersize=5, label=label)
-    if len(paths) > 1:
-        legend_above(ax)
-    ax.set(xlabel=across, ylabel=up)
-    return figure
-
-
-def rows_over_time(rows: Mapping[str, Mapping[str, tuple[Any, Any]]]) -> Figure:
-    """Draw rows of signals over time: ``{axis label: {signal: (times, values)}}``."""
-    figure, axes = stacked_axes(rows=len(rows), height=2.4 if len(rows) == 1 else 1.9)
-    for ax, (label, signals) in zip(axes, rows.items(), strict=True):
-        for (name, (times, values)), look in zip(signals.items(), STYLES, strict=False):
-            colour, style = look
-            ax.plot(times, values, style, color=colour, linewidth=1.4, label=name)
-        if len(signals) > 1:
-            legend_above(ax)
-        ax.set(ylabel=label)
-    axes[-1].set(xlabel=TIME)
-    return figure

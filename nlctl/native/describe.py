@@ -53,9 +53,7 @@ def described(reading: Reading) -> str:
         ]
         own = [each for each in reading.equations.conditions.located if each.block == nodes[i].path]
         if own:
-            lines.append(
-                f"    {'conditions':<12} {sum(each.rows for each in own if each.integers >= 0)}"
-            )
+            lines.append(f"    {'conditions':<12} {sum(each.counted for each in own)}")
     return "\n".join(lines)
 
 

@@ -27,7 +27,7 @@ from ...metrics import Metric, in_machine_code
 from ..stl.piecewise import with_vertices
 from ..stl.spec import Requirement, Spec, unfinished_margin
 from ..uncertainty.binding import diagrams, resolved
-from ..uncertainty.space import Space, arguments, checked_rows
+from ..uncertainty.space import Space, arguments, arguments_of_row, checked_rows
 
 
 @as_annotated
@@ -228,6 +228,15 @@ def by_diagram(prepared: Prepared, table: pd.DataFrame) -> Iterator[tuple[Compil
         rows = table.loc[np.logical_and.reduce(same)] if same else table
         if len(rows):
             yield loop, rows
+
+
+def loop_of_row(
+    prepared: Prepared, row: Mapping[str, Any]
+) -> tuple[Compiled, dict[str, dict[str, Any]]]:
+    """Return the diagram that a row asks for, and the arguments of its run."""
+    space = prepared.experiment.space
+    ((loop, _),) = by_diagram(prepared, pd.DataFrame([row], columns=space.names))
+    return loop, arguments_of_row(space, row)
 
 
 def simulate_rows(

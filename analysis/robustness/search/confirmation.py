@@ -18,9 +18,9 @@ from nlctl.native import Status
 from nlctl.response import input_output_response
 
 from ...metrics import breaks_of
-from ..runs.experiment import Experiment, Prepared, by_diagram, evaluate
+from ..runs.experiment import Experiment, Prepared, evaluate, loop_of_row
 from ..stl.spec import margins, unfinished_margin
-from ..uncertainty.space import arguments_of_row, checked_row
+from ..uncertainty.space import checked_row
 from .evaluation import as_table
 
 TIGHTER = 100.0  # tolerances are divided by this
@@ -140,8 +140,7 @@ def _replay(
 def _in_python_control(
     prepared: Prepared, experiment: Experiment, row: Mapping[str, Any]
 ) -> dict[str, Any]:
-    ((loop, _),) = by_diagram(prepared, as_table(experiment.space, [row]))
-    given = arguments_of_row(experiment.space, row)
+    loop, given = loop_of_row(prepared, row)
     end = float(experiment.timepts[-1])
     replay = partial(_replay, "python-control", experiment, method=_REFERENCE)
     try:

@@ -23,11 +23,10 @@ from nlctl.attributes import described_record
 from nlctl.errors import AuditError, DivergedError, UsageError
 from nlctl.sensitivities import sensitivity_response
 
-from ..runs.experiment import Prepared, by_diagram
+from ..runs.experiment import Prepared, loop_of_row
 from ..stl.formula import Always, And, Band, Eventually, Formula, Not, within_bounds
 from ..stl.spec import Requirement
-from ..uncertainty.space import arguments_of_row, checked_row, ends
-from .evaluation import as_table
+from ..uncertainty.space import checked_row, ends
 
 _REPEATS = 4  # linear programs at most
 _GAIN = 1e-9  # a further one must lower the margin by so much
@@ -278,8 +277,7 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
     """
     study = of_type("first_order", "prepared", prepared, Prepared, "prepare(experiment)").experiment
     row = checked_row(study.space, row)
-    ((loop, _),) = by_diagram(prepared, as_table(study.space, [row]))
-    given = arguments_of_row(study.space, row)
+    loop, given = loop_of_row(prepared, row)
     names = [quantity.name for quantity in study.space.quantities]
     try:
         run = sensitivity_response(

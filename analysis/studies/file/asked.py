@@ -1,4 +1,4 @@
-"""Types of the fields of a study file, and keys that every kind of analysis has."""
+"""What the tables of a study file consist of: types of fields, and keys of every analysis."""
 
 from __future__ import annotations
 

@@ -42,6 +42,11 @@ class Located:
         """Numbers that the switching function is."""
         return self.function.size or 1
 
+    @property
+    def counted(self) -> int:
+        """As how many conditions it counts: of integers there are two functions."""
+        return self.rows if self.integers >= 0 else 0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
@@ -62,8 +67,8 @@ class Conditions:
 
     @property
     def count(self) -> int:
-        """How many conditions that is: of integers there are two functions."""
-        return sum(condition.rows for condition in self.located if condition.integers >= 0)
+        """How many conditions that is."""
+        return sum(condition.counted for condition in self.located)
 
     @property
     def partners(self) -> list[int]:

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from nlctl.analysis.robustness import Choice, Space, Uncertain, differences, independent, regional
-from nlctl.analysis.robustness.statistics import sensitivity
+from nlctl.analysis.robustness.statistics import independence
+from nlctl.analysis.robustness.statistics.independence import independence_test
 from nlctl.analysis.robustness.statistics.paired import mean_is_trusted, median_interval
-from nlctl.analysis.robustness.statistics.sensitivity import independence_test
 
 LAWS = {  # of a difference: draws, mean, median
     "normal": (lambda r, n: r.normal(size=n), 0.0, 0.0),
@@ -131,16 +131,16 @@ def test_many_tables_are_drawn_or_follow_chi_square(monkeypatch):
     rows = np.array([30, 30, 30])
     counts = counts_of(np.array([6, 12, 15]), rows)
     exact = independence_test(counts, entropy=1)[1]
-    monkeypatch.setattr(sensitivity, "MOST_TABLES", 0)
-    monkeypatch.setattr(sensitivity, "LARGE", 1e9)
+    monkeypatch.setattr(independence, "MOST_TABLES", 0)
+    monkeypatch.setattr(independence, "LARGE", 1e9)
     drawn = independence_test(counts, entropy=1)[1]
-    monkeypatch.setattr(sensitivity, "LARGE", 0.0)
+    monkeypatch.setattr(independence, "LARGE", 0.0)
     law = independence_test(counts, entropy=1)[1]
-    assert drawn == pytest.approx(exact, abs=4 * math.sqrt(exact / sensitivity.PERMUTATIONS))
+    assert drawn == pytest.approx(exact, abs=4 * math.sqrt(exact / independence.PERMUTATIONS))
     assert law == pytest.approx(exact, rel=0.3)
-    monkeypatch.setattr(sensitivity, "LARGE", 1e9)
+    monkeypatch.setattr(independence, "LARGE", 1e9)
     far = counts_of(np.array([0, 15, 30]), rows)
-    assert independence_test(far, entropy=1)[1] == 1 / (1 + sensitivity.PERMUTATIONS)
+    assert independence_test(far, entropy=1)[1] == 1 / (1 + independence.PERMUTATIONS)
     several = counts_of(rng.multivariate_hypergeometric([40] * 8, 100), [40] * 8)
     assert independence_test(several, entropy=5) == independence_test(several, entropy=5)
 
