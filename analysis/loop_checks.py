@@ -137,8 +137,9 @@ def _engine(loop: Any, response: Any, params: Mapping[str, Any]) -> Iterator[Loo
     if opaque:
         yield LoopCheck(what=what, found=f"not known of: {'; '.join(opaque)}", status="caution")
     else:
-        number = counted(run.conditions, "condition")
-        finding = f"{number} of the equations located" if run.conditions else "nothing switches"
+        numbers = {"of the equations": run.conditions, "of blocks": reading.program.switching}
+        located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
+        finding = f"{' and '.join(located)} located" if located else "nothing switches"
         yield LoopCheck(what=what, found=finding, status="pass")
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Picture
 from rows import each_row
 
 import nlctl
+from nlctl.analysis.loop_checks import checks_of
 from nlctl.analysis.loop_report import loop_report
 from nlctl.analysis.lyapunov import certify
 from nlctl.analysis.report import (
@@ -223,3 +224,19 @@ def test_a_study_of_the_loop_is_a_part_of_its_page(tmp_path):
     assert links
     assert all(f'id="{link}"' in page for link in links)
     assert [claim.text for claim in made.claims] == [f.claim for f in result.claims]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "found"),
+    [
+        ({"lag": nlctl.Lag()}, "nothing switches"),
+        ({"zone": nlctl.DeadZone(), "lag": nlctl.Lag()}, "2 conditions of blocks located"),
+    ],
+    ids=["smooth", "dead zone"],
+)
+def test_what_switches_is_said_whoever_declares_it(blocks, found):
+    """A dead zone has a kink at either end; a lag has none."""
+    loop = nlctl.actuators.cascade(blocks)
+    checks = checks_of(loop, nlctl.input_output_response(loop, TIMES, 1.0), {})
+    (check,) = [check for check in checks if check.what == "Steps end where equations switch"]
+    assert (check.found, check.status) == (found, "pass")
