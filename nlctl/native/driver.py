@@ -26,7 +26,7 @@ from .integrate.methods.stiff import DIFFERENCES, EXACT, stiff_method
 from .integrate.methods.tableau import Tableau, pair_of
 from .integrate.methods.taylor import OTHER_METHOD, SLOPES
 from .integrate.samples import Timed
-from .integrate.state import DERIVATIVES, EXPLICIT, RUNNING, Status
+from .integrate.state import DERIVATIVES, EXPLICIT, METHOD, RUNNING, Status
 from .integrate.workspace import Task
 from .integrators import integrators
 from .laid import laid_out, ticks_of
@@ -137,16 +137,23 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     lanes = asked(run.lanes, paces).nonzero()[0] if run.task.fixed == 0.0 else ()
     if not len(lanes):
         return go_on(run, probe) if RUNNING in run.lanes["status"] else run
-    attempts = []
+    return _examined(run, [int(j) for j in lanes], probe)
+
+
+def _examined(run: Run, lanes: list[int], probe: int) -> Run:
+    """Try steps one by one, by one method; lanes that chatter there get that status."""
+    task, status, attempts = run.task, run.lanes["status"], []
+    turns = status == METHOD
+    status[turns] = RUNNING
+    run = replace(run, task=with_fields(task, taylor=with_fields(task.taylor, compared=0)))
     for _ in range(probe):
         run, attempt = snapshot(run.work, partial(go_on, run, 1))
         attempts.append(attempt)
-    found = {
-        j: jump_of(run, attempts, j) for j in map(int, lanes) if run.lanes["status"][j] == RUNNING
-    }
+    found = {j: jump_of(run, attempts, j) for j in lanes if status[j] == RUNNING}
     jumps = {j: jump for j, jump in found.items() if jump is not None}
-    run.lanes["status"][list(jumps)] = Status.CHATTERING
-    return replace(run, jumps={**run.jumps, **jumps})
+    status[turns & (status == RUNNING)] = METHOD
+    status[list(jumps)] = Status.CHATTERING
+    return replace(run, task=task, jumps={**run.jumps, **jumps})
 
 
 def differentiated(compiled: Compiled, run: Run, p: np.ndarray) -> Run:

@@ -76,6 +76,12 @@ class Lowered:
         return {name: call.reason for name, call in self.calls.items()}
 
     @cached_property
+    def operations(self) -> int:
+        """How many numbers a right-hand side computes."""
+        plan = self.functions["rhs"].plan
+        return sum(node.size or 1 for node in plan.nodes if node.op not in ("leaf", "const"))
+
+    @cached_property
     def text(self) -> str:
         """The LLVM IR of its functions."""
         return program_text(

@@ -7,6 +7,8 @@ from own_relay import Side
 
 import nlctl
 from nlctl.native import Status
+from nlctl.native.chattering.detection import asked, new_paces
+from nlctl.native.integrate.state import METHOD, RUNNING, new_lanes
 
 TIMES = np.linspace(0, 10, 101)
 FULLER = np.sqrt((np.sqrt(33) - 1) / 24)  # of its optimal switching curve x = -C x' |x'|
@@ -156,6 +158,22 @@ def test_nor_is_a_long_rest(end):
         nlctl.block(nlctl.Lag(T=0.5), "lag"), times, np.ones_like(times)
     )
     assert made.states[0, -1] == pytest.approx(1, abs=1e-12)
+
+
+def test_windows_that_a_turn_cuts_short_count_together():
+    """Paces compare windows of as many steps: a run that changes its method has not become slow."""
+    lanes = new_lanes(TIMES, 1)
+    paces = new_paces(lanes)
+    due = []
+    for k in range(18 * 20):  # each of 100 steps
+        lanes["t"] += 1.0
+        lanes["accepted"] += 100
+        lanes["status"] = METHOD if k % 2 else RUNNING
+        due += [k + 1] if asked(lanes, paces)[0] else []
+    assert due == [18 * 8, 18 * 16]  # the 8th and 16th window
+    lanes["t"] += 0.09 * 18
+    lanes["accepted"] += 1800
+    assert asked(lanes, paces)[0]  # slow
 
 
 @pytest.mark.parametrize("e", [0.0, 1.0])

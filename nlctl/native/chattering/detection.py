@@ -28,11 +28,12 @@ from typing import Any
 
 import numpy as np
 
-from ..integrate.state import RUNNING
+from ..integrate.state import METHOD, RUNNING
 from .accumulation import accumulated, accumulating
 from .steps import Attempt, Jump, LaneEquations, parameters_of
 
-PROBE = 200  # steps tried that are looked at, at the end of a window
+WINDOW = 1800  # steps tried, at least
+PROBE = 200  # of them that are looked at, at the end
 _PROBES = 5  # as many of Taylor's method: it has few steps, and tries a hundred for a switch
 _JUMPS = 10  # of them with a jump
 _WITHIN = 100.0  # tolerances that a state moves in a mean step
@@ -45,7 +46,9 @@ _HALVINGS = 200
 _FLAT = 0.25  # part of it by which what does not jump may change
 _BESIDE = 2.0 ** np.arange(4, 22)  # distances between neighbours, any four in a row of which do
 _WAYS = np.random.default_rng(1).choice([-1.0, 1.0], (4, 1000))  # signs, to move a state by
-_PACES = np.dtype([("t", "f8"), ("longest", "f8"), ("windows", "i8"), ("slow", "i8")])
+_PACES = np.dtype(
+    [("t", "f8"), ("longest", "f8"), ("tried", "i8"), ("windows", "i8"), ("slow", "i8")]
+)
 
 
 def new_paces(lanes: np.ndarray) -> np.ndarray:
@@ -59,17 +62,21 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     """Return which lanes are to be looked at, at the end of a window.
 
     Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    `_LONG` windows on: what usual runs take must not cost them anything.
+    `_LONG` windows on: what usual runs take must not cost them anything.  A window that a turn to
+    another method cuts short is one together with the next.
     """
-    before, longest, windows, slow = (paces[name] for name in _PACES.names or ())
+    before, longest, tried, windows, slow = (paces[name] for name in _PACES.names or ())
+    status = lanes["status"]
+    whole = lanes["accepted"] + lanes["rejected"] - tried >= WINDOW
+    whole &= (status == RUNNING) | (status == METHOD)
     gone = lanes["t"] - before
-    before[:] = lanes["t"]
-    np.maximum(longest, gone, out=longest)
-    windows += 1
-    slow[:] = (slow + 1) * (gone < _SLOW * longest)
+    before[whole] = lanes["t"][whole]
+    tried[whole] = (lanes["accepted"] + lanes["rejected"])[whole]
+    np.maximum(longest, gone, out=longest, where=whole)
+    windows += whole
+    slow[whole] = (slow[whole] + 1) * (gone < _SLOW * longest)[whole]
     due = [(n & (n - 1)) == 0 for n in (windows, slow)]
-    asked_now = (due[0] & (windows >= _LONG)) | ((slow > 0) & due[1])
-    return (lanes["status"] == RUNNING) & asked_now
+    return whole & ((due[0] & (windows >= _LONG)) | ((slow > 0) & due[1]))
 
 
 def probe_of(task: Any) -> int:

@@ -1,7 +1,7 @@
 """The method "auto" of a single run: by the explicit pair and by Taylor's method in turn.
 
-A run begins with the explicit pair: a short one is over before Taylor coefficients are reading.
-After that Taylor's method is tried.  It stays while it gets further than the explicit pair with
+A run begins with the explicit pair, until that has cost what a turn costs: if it ends sooner,
+turning would not have paid, and if it is long, little is lost.  Then Taylor's method is tried.  It stays while it gets further than the explicit pair with
 the same work, both as measured in this run, one right after the other; the explicit pair is
 measured again from time to time, and that is also when it sees that the equations have become
 stiff.  Nothing rests on clocks: a run has the same numbers on every machine.
@@ -31,7 +31,8 @@ from .method import order_for, with_taylor
 from .routine import series
 
 _ORDER = 8  # from which on steps are worth more than what they cost, in most loops
-_STEPS = 250  # of the explicit pair, before Taylor's method is tried
+_TURN, _STEP = 50_000, 80  # what a turn costs, and a step but for its rates, in operations of these
+_FEWEST, _LATEST = 2 * MEASURED, 600  # steps of the explicit pair, before Taylor's method is tried
 _SPAN, _MOST = 800, 2000  # steps of Taylor's method before that, twice as many each time
 _COMPARED = with_fields(OTHER_METHOD, compared=1)
 
@@ -49,7 +50,8 @@ def with_turns(reading: Reading, run: Run, settings: Settings) -> Run:
     tight = order_for(settings.rtol) >= _ORDER
     if settings.method != "auto" or settings.step or not (tight and may_turn(reading)):
         return run
-    run.lanes["span"], run.lanes["wait"], run.lanes["stay"] = _STEPS, _STEPS, _SPAN
+    steps = min(max(_TURN // (_STEP + run.machine.lowered.operations), _FEWEST), _LATEST)
+    run.lanes["span"], run.lanes["wait"], run.lanes["stay"] = steps, steps, _SPAN
     return replace(run, task=with_fields(run.task, taylor=_COMPARED))
 
 

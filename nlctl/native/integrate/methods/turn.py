@@ -28,7 +28,6 @@ def is_to_change(task, lane):
         stays = 2 * (lane.accepted - lane.from_accepted) < FIRST_TURN  # at a place
         lane.from_accepted = lane.accepted
         if stays:
-            lane.span = FIRST_TURN
             return True
     if lane.tries > 0 or lane.cross > 0.0 or tried < lane.span:
         return False
