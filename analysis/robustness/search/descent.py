@@ -15,6 +15,7 @@ from .candidates import GENERATION, Search, evolve, in_batches, some_corners, un
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 _DRAWS = 4  # corners, and uniform draws, of each round
+_CHANGES = (0, 1, 0, 2, 0, 1, 0, 2)  # of the simple signals of each round: they are constant apart
 _GENERATIONS = 2  # of CMA-ES in each round
 _STEPS = 10  # descents have at most so many steps
 _SMALLEST = 1 / 256  # shortest step of a descent, in units of the boxes
@@ -34,8 +35,13 @@ def search_with_derivatives(
     for k in range(len(tests)):  # few are needed, often
         in_batches(search, "test signals", tests.iloc[[k]])
     _descend(search, derivatives, reasons, 0)
+    pieces = _pieces(search.space)
     while search.left:
         first = search.margins.size
+        if pieces:
+            in_batches(search, "simple signals", _simple_signals(search.space, pieces, rng))
+            _descend(search, derivatives, reasons, first)
+            first = search.margins.size
         for searcher, draw in (("corners", some_corners), ("uniform", uniform)):
             in_batches(search, searcher, draw(search.space, min(_DRAWS, search.left), rng))
         _descend(search, derivatives, reasons, first)
@@ -46,18 +52,11 @@ def search_with_derivatives(
 
 def test_signals(space: Space) -> np.ndarray:
     """Return points of the unit cube: signals that an engineer tries first."""
-    # Quantities ``name[0]``, ``name[1]``, ... are the pieces of one signal; what has no pieces is
-    # in the middle. All signals alternate between their ends; all step up halfway; all are constant
-    # at an end, at first at different ones, and from one to the next only one of them changes; all
-    # are in the middle; all step down halfway.
-    quantities = [q.name for q in space.quantities]
-    signals: dict[str, list[int]] = {}
-    for place, name in enumerate(quantities):
-        if (piece := _PIECE.fullmatch(name)) is not None:
-            signals.setdefault(piece[1], []).append(place)
-    pieces = [group for group in signals.values() if len(group) > 1]
-    singles = [k for k in range(len(quantities)) if not any(k in group for group in pieces)]
-    groups = pieces or [[k] for k in singles]
+    # What has no pieces is in the middle. All signals alternate between their ends; all step up
+    # halfway; all are constant at an end, at first at different ones, and from one to the next only
+    # one of them changes; all are in the middle; all step down halfway.
+    pieces = _pieces(space)
+    groups = pieces or [[k] for k in range(len(space.quantities))]
     signals_found = []
 
     def add(values: Any) -> None:
@@ -77,6 +76,28 @@ def test_signals(space: Space) -> np.ndarray:
     if pieces:
         add([1.0 - half for half in halves])
     return np.array(signals_found)
+
+
+def _pieces(space: Space) -> list[list[int]]:
+    """Return the places of the pieces ``name[0]``, ``name[1]``, ... of each signal."""
+    signals: dict[str, list[int]] = {}
+    for place, quantity in enumerate(space.quantities):
+        if (piece := _PIECE.fullmatch(quantity.name)) is not None:
+            signals.setdefault(piece[1], []).append(place)
+    return [places for places in signals.values() if len(places) > 1]
+
+
+def _simple_signals(
+    space: Space, pieces: list[list[int]], rng: np.random.Generator
+) -> pd.DataFrame:
+    """Draw rows whose signals change seldom: means of uniform draws of all pieces are alike."""
+    unit = rng.random((len(_CHANGES), len(space.names)))
+    for row, changes in zip(unit, _CHANGES, strict=True):
+        for places in pieces:
+            at = rng.choice(np.arange(1, len(places)), min(changes, len(places) - 1), replace=False)
+            begun = (np.arange(len(places))[:, None] >= at).sum(axis=1)
+            row[places] = rng.random(changes + 1)[begun]
+    return from_unit_cube(space, unit)
 
 
 def _descend(

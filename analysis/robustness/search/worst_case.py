@@ -29,8 +29,8 @@ class WorstCase:
     design: Design
     results: pd.DataFrame  # What was evaluated, by row.
     # (design.size,): What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``; with
-    # derivatives also ``"test signals"`` and ``"gradient"``, and ``"derivatives"`` for a row that
-    # was run once more, for its derivatives.
+    # derivatives also ``"test signals"``, ``"simple signals"`` and ``"gradient"``, and
+    # ``"derivatives"`` for a row that was run once more, for its derivatives.
     searchers: np.ndarray
     is_finished: bool  # False if Ctrl-C ended the search.
     # Whether every corner of the box is among the rows; otherwise they are a random subset.
@@ -116,8 +116,9 @@ def worst_case(
 
     With `derivatives` the order is another one, for few runs: test signals (quantities ``name[0]``,
     ``name[1]``, ... are the pieces of a signal: all alternate between their ends, all are constant
-    at an end, all step halfway), a descent from the worst of them, and then in turn corners,
-    uniform draws, a descent from the worst of these, and CMA-ES.  A descent moves all signals of a
+    at an end, all step halfway), a descent from the worst of them, and then in turn signals drawn
+    with few changes, a descent from the worst of these, corners and uniform draws, a descent from
+    the worst of those, and CMA-ES.  A descent moves all signals of a
     row along their derivatives, and goes where their margin would be lowest, by linear programs in
     a box that shrinks (`first_order.lowest_nearby`).  A run with derivatives counts as one run.
 

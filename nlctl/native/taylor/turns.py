@@ -1,10 +1,11 @@
 """The method "auto" of a single run: by the explicit pair and by Taylor's method in turn.
 
 A run begins with the explicit pair, until that has cost what a turn costs: if it ends sooner,
-turning would not have paid, and if it is long, little is lost.  Then Taylor's method is tried.  It stays while it gets further than the explicit pair with
-the same work, both as measured in this run, one right after the other; the explicit pair is
-measured again from time to time, and that is also when it sees that the equations have become
-stiff.  Nothing rests on clocks: a run has the same numbers on every machine.
+turning would not have paid, and if it is long, little is lost.  Then Taylor's method is tried.  It
+stays while it gets further than the explicit pair with the same work, both as measured in this run,
+one right after the other; the explicit pair is measured again from time to time, and that is also
+when it sees that the equations have become stiff.  Nothing rests on clocks: a run has the same
+numbers on every machine.
 
 Where coefficients are not finite although the rates are, as those of the root of t at 0, the
 explicit pair has its turn whatever the method.

@@ -129,7 +129,7 @@ def dear(t, x, u, params):
 
 
 def test_what_costs_more_turns_sooner():
-    """The same motion, in fewer than 600 explicit steps: with 800 operations each they cost more."""
+    """The same motion in fewer than 600 steps, which cost a turn where rates are dear."""
     times = np.linspace(0, 24, 25)
     for rates, turns in ((oscillator, False), (dear, True)):
         auto, pair = both(block(rates, 2, inputs=0), times, [1, 0], rtol=1e-9, atol=1e-11)

@@ -178,3 +178,22 @@ def test_signals_to_try_are_square_waves_constants_and_steps():
     np.testing.assert_array_equal(constants[:, [0, 4]], [[1, 0], [0, 0], [0, 1], [1, 1]])
     np.testing.assert_array_equal(made[6], 0.5)
     np.testing.assert_array_equal(made[1] + made[7], 1.0)
+
+
+def test_simple_signals_change_seldom():
+    """Where only constants near 0.7 violate, draws of every piece never do."""
+    names = inputs.names("u", 20)
+    space = Space(quantities=tuple(Uncertain(name=name, bounds=(0.0, 1.0)) for name in names))
+
+    def distance(table):
+        return table.assign(spec=np.abs(table[names] - 0.7).max(axis=1) - 0.1)
+
+    def no_derivatives(row):
+        return FirstOrder(t=np.empty(0), signals={}, derivatives={}, requirements=(), reason="none")
+
+    simple = worst_case(distance, space, 300, entropy=1, target=0.0, derivatives=no_derivatives)
+    assert simple.found_by == "simple signals"
+    rows = simple.design.table[simple.searchers == "simple signals"].to_numpy()
+    changes = (np.diff(rows, axis=1) != 0).sum(axis=1)
+    assert set(changes) == {0, 1, 2}
+    assert worst_case(distance, space, 300, entropy=1, target=0.0).margin > 0
