@@ -124,14 +124,14 @@ def test_where_it_does_not_pay_nothing_changes(kwargs):
     np.testing.assert_array_equal(auto.states, pair.states)
 
 
-def dear(t, x, u, params):
+def costly(t, x, u, params):
     return [x[1], -x[0] + 0.0 * sum(np.sin(k * x[1]) for k in range(1, 201))]
 
 
 def test_what_costs_more_turns_sooner():
-    """The same motion in fewer than 600 steps, which cost a turn where rates are dear."""
+    """The same motion in fewer than 600 steps, which cost a turn where rates cost much."""
     times = np.linspace(0, 24, 25)
-    for rates, turns in ((oscillator, False), (dear, True)):
+    for rates, turns in ((oscillator, False), (costly, True)):
         auto, pair = both(block(rates, 2, inputs=0), times, [1, 0], rtol=1e-9, atol=1e-11)
         assert 250 < tried(pair) < 600
         assert (tried(auto) < 0.8 * tried(pair)) is turns
