@@ -49,8 +49,8 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     breaks = np.unique(np.asarray(events["time"], dtype=float))
     for begin, end in unsampled(getattr(response, "time", breaks[:0]), breaks)[:1]:
         raise ParameterError(
-            f"breaks_of needs samples between all events, got none from t = {begin:.6g} s to "
-            f"{end:.6g} s: simulate again with evaluation_times=nlctl.analysis.metrics."
+            f"breaks_of needs samples between all events, got none in the {end - begin:.3g} s from "
+            f"t = {begin:.6g} s on: simulate again with evaluation_times=nlctl.analysis.metrics."
             "sampled_between(times, response.events['time'])"
         )
     return breaks
