@@ -112,10 +112,11 @@ def _between(t: np.ndarray, breaks: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     if not breaks.size:  # samples alone
         return breaks, breaks, breaks
     ends = np.concatenate([t[:1], breaks, t[-1:]])
-    long = np.diff(ends) > _AT_ONCE * (t[-1] - t[0])
-    first = np.searchsorted(t, ends[:-1], "right")  # those at a break are of no piece
-    first[0], last = 0, np.searchsorted(t, ends[1:], "left")
-    last[-1] = t.size
+    near = _AT_ONCE * (t[-1] - t[0])
+    long = np.diff(ends) > near
+    first = np.searchsorted(t, ends[:-1] + near / t.size, "right")
+    last = np.searchsorted(t, ends[1:] - near / t.size, "left")  # at a break they are of no piece
+    first[0], last[-1] = 0, t.size
     return ends[:-1][long], ends[1:][long], (last - first)[long]
 
 

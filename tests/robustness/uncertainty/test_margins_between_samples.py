@@ -34,7 +34,7 @@ def pulsed(begin, width, height):
 def test_a_pulse_between_two_samples_has_its_height(begin, width, engine):
     loop, how = pulsed(begin, width, 5.0), {"engine": engine, "rtol": 1e-10, "atol": 1e-12}
     first = nlctl.input_output_response(loop, TIMES, 0, [1.0, 0.0], **how)
-    with pytest.raises(ParameterError, match="breaks_of needs samples.*sampled_between"):
+    with pytest.raises(ParameterError, match=r"breaks_of needs samples.*sampled_between"):
         breaks_of(first)
     finer = sampled_between(TIMES, first.events["time"])
     run = nlctl.input_output_response(loop, TIMES, 0, [1.0, 0.0], evaluation_times=finer, **how)
