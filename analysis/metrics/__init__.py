@@ -1,6 +1,6 @@
 """Numbers of a response: one function, one number, with unit and meaning."""
 
-from .breaks import breaks_of, with_breaks
+from .breaks import breaks_of, sampled_between, with_breaks
 from .extremes import final, highest, lowest, peak, spread, ultimate_bound, vertex
 from .functionals import in_machine_code
 from .integrals import (
@@ -28,6 +28,7 @@ __all__ = [
     "peak",
     "reversals",
     "rms",
+    "sampled_between",
     "settling_time",
     "spread",
     "square_integral",

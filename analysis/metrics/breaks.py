@@ -1,4 +1,4 @@
-"""When the signals of a run may jump or bend: the times of its events."""
+"""When the signals of a run may jump or bend: the times of its events, and samples in between."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ import inspect
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from nlctl.errors import ParameterError
 from nlctl.upstream.systems import SystemResponse
+
+_ENOUGH = 9  # samples between two breaks: a curve goes through so many
+_AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
 
 
 def breaks_of(response: SystemResponse) -> np.ndarray | None:
@@ -24,6 +29,12 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     ndarray of shape (m,), or None
         None where nothing is known of events: then samples alone say where a signal is smooth.
 
+    Raises
+    ------
+    ParameterError
+        If the response has no sample between two of its events: nothing is known of signals there.
+        `sampled_between` returns the times of one that has.
+
     Examples
     --------
     >>> from types import SimpleNamespace
@@ -35,7 +46,78 @@ def breaks_of(response: SystemResponse) -> np.ndarray | None:
     events = getattr(response, "events", None)
     if events is None or "time" not in getattr(events, "columns", ()):
         return None
-    return np.unique(np.asarray(events["time"], dtype=float))
+    breaks = np.unique(np.asarray(events["time"], dtype=float))
+    for begin, end in unsampled(getattr(response, "time", breaks[:0]), breaks)[:1]:
+        raise ParameterError(
+            f"breaks_of needs samples between all events, got none in the {end - begin:.3g} s from "
+            f"t = {begin:.6g} s on: simulate again with evaluation_times=nlctl.analysis.metrics."
+            "sampled_between(times, response.events['time'])"
+        )
+    return breaks
+
+
+def sampled_between(times: ArrayLike, breaks: ArrayLike) -> np.ndarray:
+    """Return times of samples with so many between all breaks that curves go through them.
+
+    What a signal is between two events of a run, such as a pulse, is then seen by numbers of its
+    response, however short that is: down to 1e-9 of the time covered.
+
+    Parameters
+    ----------
+    times : array_like of shape (n,)
+        Increasing times (s) of samples.
+    breaks : array_like of shape (m,)
+        Times (s) at which signals may jump or bend, in any order.
+
+    Returns
+    -------
+    ndarray of shape (k,)
+        `times`, and more of them between breaks that have fewer than nine in between.
+
+    Examples
+    --------
+    A pulse of 0.02 s between two samples:
+
+    >>> import control as ct
+    >>> import numpy as np
+    >>> from nlctl.analysis.metrics import breaks_of, highest, sampled_between
+    >>> kicked = ct.nlsys(
+    ...     lambda t, x, u, params: [9.0 * (1.23 <= t < 1.25) - x[0]], None,
+    ...     inputs=0, outputs=1, states=1, name="kicked",
+    ... )
+    >>> times = np.linspace(0, 2, 21)
+    >>> first = nlctl.input_output_response(kicked, times)
+    >>> finer = sampled_between(times, first.events["time"])
+    >>> run = nlctl.input_output_response(kicked, times, evaluation_times=finer)
+    >>> y = run.outputs.ravel()
+    >>> print(round(highest(run.time, y, breaks_of(run)), 6), round(9 - 9 * np.exp(-0.02), 6))
+    0.178212 0.178212
+    """
+    t = np.asarray(times, dtype=float)
+    begin, end, count = _between(t, np.unique(np.asarray(breaks, dtype=float)))
+    few = count < _ENOUGH
+    share = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_ENOUGH) + 0.5) / _ENOUGH)
+    return np.union1d(t, begin[few, None] + share * (end - begin)[few, None])
+
+
+def unsampled(times: ArrayLike, breaks: np.ndarray) -> np.ndarray:
+    """Return from when to when (s) there are breaks with no sample in between, a row each."""
+    begin, end, count = _between(np.asarray(times, dtype=float), breaks)
+    return np.column_stack([begin, end])[count == 0]
+
+
+def _between(t: np.ndarray, breaks: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pieces between breaks: begin and end (s), and their number of samples."""
+    breaks = breaks[(breaks > t[0]) & (breaks < t[-1])] if t.size else breaks[:0]
+    if not breaks.size:  # samples alone
+        return breaks, breaks, breaks
+    ends = np.concatenate([t[:1], breaks, t[-1:]])
+    near = _AT_ONCE * (t[-1] - t[0])
+    long = np.diff(ends) > near
+    first = np.searchsorted(t, ends[:-1] + near / t.size, "right")
+    last = np.searchsorted(t, ends[1:] - near / t.size, "left")  # at a break they are of no piece
+    first[0], last[-1] = 0, t.size
+    return ends[:-1][long], ends[1:][long], (last - first)[long]
 
 
 def with_breaks(function: Callable[..., float], breaks: np.ndarray | None) -> Callable[..., float]:

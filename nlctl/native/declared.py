@@ -69,7 +69,10 @@ def declared_now(
     for (what, _), node in _each(schedule.nodes):
         found[what].append(value(what, node))
     resets = [value("reset", node) for node in schedule.nodes if count_guards(node)]
-    watched = [[one.value(t, x, u, dict(schedule.overrides))] for one in schedule.watched]
+    kept = [place for node in schedule.nodes if _is_own(node) for place in memory(node)]
+    now = np.array(x, dtype=float)
+    now[kept] = np.concatenate([np.zeros(0), *found["commit"]])
+    watched = [[one.value(t, now, u, dict(schedule.overrides))] for one in schedule.watched]
     rows = [*found["switching"], *watched, *found["guard"], *found["commit"]]
     return np.concatenate([np.zeros(0), *rows]), np.concatenate([np.zeros(0), *resets])
 

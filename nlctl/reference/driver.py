@@ -113,7 +113,7 @@ class Driver:
                 )
                 self.known.step = (t, stop)
                 resumes = self.jumps.committed(t, x) if t >= end and what else None
-                left = self.jumps.watched_at(min(t, self._last), x) if t > begin else None
+                left = self.jumps.watched_before(min(t, self._last), x) if t > begin else None
                 x, sides = self.jumps.at(t, x, what, sides)
                 self._note_jumps(t, x, left)
                 self._record(t, x, ends=self._ended)
@@ -310,18 +310,28 @@ class Driver:
         s = t + STEP_PLACES[1] * (until - t)
         sides, x = self._signs(self._looked(s, state(s))), state(t)
         for i in np.flatnonzero(waits & (sides != 0.0)).tolist():
-            rises = bool(sides[i] > 0.0)
-            if not self.jumps.ends(i, rises):
-                self._note_change(i, t, rises, x)
+            self._note_first(i, t, bool(sides[i] > 0.0), x)
             self._came[i] = sides[i]
 
+    def _note_first(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
+        """Note what leaves the 0 at which it has been since the run began, which ends no run."""
+        if not self.jumps.ends(i, rises):
+            self._note_change(i, t, rises, x)
+
     def _note_jumps(self, t: float, x: np.ndarray, left: np.ndarray | None) -> None:
-        """Note the functions that the run watches whose signs have jumped at an instant."""
+        """Note the functions that the run watches whose signs have jumped at an instant.
+
+        One that has jumped to 0 is noted where it leaves that for the other side.
+        """
         if left is None or not left.size:
             return
         right, first = self.jumps.watched_at(t, x), sum(self.jumps.kinds) - left.size
-        for k in np.flatnonzero(np.sign(left) * np.sign(right) < 0.0).tolist():
-            self._note_change(first + k, t, bool(right[k] > 0.0), x)
+        came = self._came[first:] if self._came.size else left
+        came = np.sign(np.where(left == 0.0, came, left))
+        leaves = (came * np.sign(right) < 0.0) | ((came == 0.0) & (np.abs(right) > 0.0))
+        for k in np.flatnonzero(leaves).tolist():
+            notes = self._note_first if came[k] == 0.0 else self._note_change
+            notes(first + k, t, bool(right[k] > 0.0), x)
 
     def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
         """Note a change of sign, whether it ends the run, and whether there is an end of them."""

@@ -102,13 +102,21 @@ class Jumps:
         if self.crossings is not None:
             given = np.concatenate([u, self._leaving(t)])
             seen.append(np.asarray(self.crossings(t, x, given), dtype=float).reshape(-1))
+        become = np.concatenate([_NOTHING, *(row for _, row in found["commit"])])
+        if self.watched and become.size:
+            x = x.copy()
+            x[self.memories] = become
         seen.append(self.watched_at(t, x))
         if self.labels is None:
             self._label(found, sum(row.size for row in seen))
-        return np.concatenate([*seen, *(row for _, row in found["commit"])])
+        return np.concatenate([*seen, become])
+
+    def watched_before(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Return the functions that the run watches, before anything jumps at an instant."""
+        return self.watched_at(t, self.committed(t, x) if self.watched else x)
 
     def watched_at(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Return the functions that the run watches."""
+        """Return the functions that the run watches; memories are what they have become."""
         u = self.inputs(t) if self.watched else _NOTHING
         return np.array([one.value(t, x, u, self._overrides) for one in self.watched])
 

@@ -17,7 +17,7 @@ from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
 
-from ...metrics import breaks_of
+from ...metrics.breaks import breaks_of, sampled_between, unsampled
 from ..runs.experiment import Experiment, Prepared, evaluate, loop_of_row
 from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import checked_row
@@ -143,24 +143,28 @@ def _in_python_control(
     loop, given = loop_of_row(prepared, row)
     end = float(experiment.timepts[-1])
     replay = partial(_replay, "python-control", experiment, method=_REFERENCE)
+    run = partial(
+        input_output_response,
+        loop.system,
+        experiment.timepts,
+        experiment.inputs,
+        engine="python-control",
+        method=_REFERENCE,
+        rtol=experiment.rtol,
+        atol=experiment.atol,
+        initial_state=given["initial_state"],
+        params=given["params"],
+    )
     try:
-        response = input_output_response(
-            loop.system,
-            experiment.timepts,
-            experiment.inputs,
-            engine="python-control",
-            method=_REFERENCE,
-            rtol=experiment.rtol,
-            atol=experiment.atol,
-            initial_state=given["initial_state"],
-            params=given["params"],
-        )
+        response = run()
+        events = np.unique(response.events["time"].to_numpy(dtype=float))
+        if unsampled(response.time, events).size:  # a pulse between two samples, say
+            response = run(evaluation_times=sampled_between(response.time, events))
     except DivergedError as error:
         margin = unfinished_margin(error.time, end)
         return replay(Status.DIVERGED.name, error.time, margin)
     signals = dict(zip(loop.system.output_labels, np.atleast_2d(response.outputs), strict=True))
-    breaks = breaks_of(response)
-    margin = margins(experiment.spec, experiment.timepts, signals, breaks=breaks)["spec"]
+    margin = margins(experiment.spec, response.time, signals, breaks=breaks_of(response))["spec"]
     return replay(Status.OK.name, end, margin)
 
 

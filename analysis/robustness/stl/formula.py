@@ -15,7 +15,7 @@ extreme where samples support one; with the breaks of a run known, by curves bet
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -306,8 +306,8 @@ class SampledSignals:
     t: np.ndarray  # (m,): increasing times (s)
     samples: Mapping[str, np.ndarray]  # arrays of shape (m,)
     until: float  # time (s) at which windows without an end stop, at most ``t[-1]``
-    # (k,): increasing times (s) at which signals may jump or bend
-    breaks: np.ndarray = field(default_factory=lambda: np.empty(0))
+    # (k,): increasing times (s) at which signals may jump or bend; None where that is not known
+    breaks: np.ndarray | None = None
 
     @property
     def apart(self) -> float:
@@ -344,7 +344,7 @@ def margin_trace(formula: Formula, signals: SampledSignals, low: float, high: fl
 _AROUND = 6  # samples on each side of a window that its curves go through
 
 
-def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple[np.ndarray, ...]:
+def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple:
     """Return times, samples and breaks of the band's signal in [low, high] and a little around."""
     if band.signal not in signals.samples:
         raise unknown("signal", band.signal, signals.samples)
@@ -352,7 +352,8 @@ def _near(band: Band, signals: SampledSignals, low: float, high: float) -> tuple
     i, j = np.searchsorted(t, low, "right"), np.searchsorted(t, high, "left")
     near = slice(max(i - _AROUND, 0), j + _AROUND)
     t = t[near]
-    breaks = breaks[(breaks >= t[0]) & (breaks <= t[-1])]
+    if breaks is not None:
+        breaks = breaks[(breaks >= t[0]) & (breaks <= t[-1])]
     return t, signals.samples[band.signal][near], breaks
 
 

@@ -27,8 +27,13 @@ class Trace:
         return Trace(self.t, -self.y, self.jump)
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """Values at times between the first and the last."""
-        return np.interp(t, self.t, self.y)
+        """Values at times between the first and the last; within a jump those behind it."""
+        values = np.interp(t, self.t, self.y)
+        if self.jump:
+            k = np.clip(np.searchsorted(self.t, t, "left"), 1, self.t.size - 1)
+            jumps = (self.t[k] - self.t[k - 1] <= self.jump) & (t > self.t[k - 1])
+            values = np.where(jumps, self.y[k], values)
+        return values
 
     def between(self, low: float, high: float) -> Trace:
         """The part with low <= t <= high."""
@@ -50,15 +55,15 @@ _NONE = np.empty(0)
 
 
 def with_vertices(
-    t: np.ndarray, y: np.ndarray, breaks: np.ndarray = _NONE, apart: float = 0.0
+    t: np.ndarray, y: np.ndarray, breaks: np.ndarray | None = None, apart: float = 0.0
 ) -> Trace:
     """Return a signal between samples: lines, through the extremes that samples support."""
-    # Peaks between samples are then seen as `nlctl.analysis.metrics.highest` sees them. With breaks
-    # it is the path of `nlctl.analysis.metrics.curves`: curves between them, and jumps, each
-    # `apart` (s) before and after its break.
-    if breaks.size:
+    # Peaks between samples are then seen as `nlctl.analysis.metrics.highest` sees them. Where
+    # breaks are known, also that there are none, it is the path of `nlctl.analysis.metrics.curves`:
+    # curves between them, and jumps, each `apart` (s) before and after its break.
+    if breaks is not None:
         return Trace(*_path(t, y, breaks, apart), jump=3 * apart)
-    at, place, value = _vertices(t, y, breaks)
+    at, place, value = _vertices(t, y, _NONE)
     return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
 
 
@@ -83,16 +88,17 @@ def extremes(
     y: np.ndarray,
     low: float,
     high: float,
-    breaks: np.ndarray = _NONE,
+    breaks: np.ndarray | None = None,
     apart: float = 0.0,
 ) -> tuple[float, float]:
     """Return the least and the largest value of a signal between samples in [low, high]."""
     i, j = np.searchsorted(t, low, "left"), np.searchsorted(t, high, "right")
-    if breaks.size or t[i] != low or t[j - 1] != high:  # ends between samples
+    known = _NONE if breaks is None else breaks
+    if known.size or t[i] != low or t[j - 1] != high:  # ends between samples
         inside = with_vertices(t, y, breaks, apart).between(low, high).y
     else:
         inside = y[i:j]
-    _, place, value = _vertices(t, y, breaks)
+    _, place, value = _vertices(t, y, known)
     inside = np.concatenate([inside, value[(place > low) & (place < high)]])
     return float(np.min(inside)), float(np.max(inside))
 

@@ -251,7 +251,7 @@ def margin(
         Samples of shape (m,) by name.
     breaks : array_like of shape (k,), optional
         Increasing times (s) at which signals may jump or bend, such as those of the events of a
-        run.  Between them signals are smooth curves, and their limits there count; without them,
+        run.  Between them signals are smooth curves, and their limits there count; by default,
         samples alone say where a signal is smooth.
 
     Returns
@@ -296,9 +296,11 @@ def margin(
     return float(np.fmax(value, -FAILED))  # NaN becomes -FAILED
 
 
-def checked_breaks(breaks: ArrayLike | None) -> np.ndarray:
-    """Return times of breaks as an array; none by default."""
-    times = np.empty(0) if breaks is None else as_numbers(breaks)
+def checked_breaks(breaks: ArrayLike | None) -> np.ndarray | None:
+    """Return times of breaks as an array, None where none are known."""
+    if breaks is None:
+        return None
+    times = as_numbers(breaks)
     if times is None or times.ndim != 1 or not np.all(np.isfinite(times)):
         raise ParameterError(f"breaks need finite times (s) in one row, got {breaks!r}")
     if np.any(np.diff(times) < 0):

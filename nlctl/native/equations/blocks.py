@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -10,12 +10,14 @@ from typing import Any, NamedTuple
 import control as ct
 import numpy as np
 
+from ...blocks import supplied_of
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, as_array, leaf_vector, scalar
+from ...expressions.arrays import Tracer, as_array, concatenated, leaf_vector, scalar
 from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
 from ...expressions.trace import trace
 from ...responses.watched import watches_nan
 from ...sampling.system import Happening
+from ...sliding.relay import SLIDING
 from ...upstream.systems import System
 from ...wording import counted
 from ..codegen.solver import Solver
@@ -171,25 +173,24 @@ def _events(reader: Reader, schedule: Schedule) -> _Events:
     counts = [count_switching_functions(node) for node in reader.blocks]
     kept = [len(memory(node)) for node in reader.blocks]
     events = {i: reader.events(i) for i in range(len(counts)) if counts[i] or kept[i]}
-    watched = _watched(reader, schedule)
+    committed = _in_rows(kept, lambda i: events[i][counts[i] :])
     return _Events(
         declared=list(_in_rows(counts, lambda i: events[i][: counts[i]]).values()),
         guards=_in_rows(map(count_guards, reader.blocks), reader.guards, sum(counts)),
-        committed=_in_rows(kept, lambda i: events[i][counts[i] :]),
-        watched=watched,
+        committed=committed,
+        watched=_watched(reader, schedule, {i: become for i, (_, become) in committed.items()}),
     )
 
 
-def _watched(reader: Reader, schedule: Schedule) -> list[Located]:
+def _watched(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]) -> list[Located]:
     """Return functions that a run watches, as conditions located like those of the equations."""
     graph, system = reader.graph, schedule.system
-    sizes = (system.nstates or 0, system.ninputs or 0)
     rows = []
     for watch in schedule.watched:
 
         def arguments() -> tuple:
-            x, u = (leaf_vector(graph, k, 0, (n,)) for k, n in zip("xu", sizes, strict=True))
-            return time(graph), x, u, dict(schedule.overrides)
+            u = leaf_vector(graph, "u", 0, (system.ninputs or 0,))
+            return time(graph), _states_now(reader, schedule, become), u, dict(schedule.overrides)
 
         try:
             value = trace(graph, partial(watch.function), arguments)
@@ -203,3 +204,18 @@ def _watched(reader: Reader, schedule: Schedule) -> list[Located]:
         function = graph.number(value.reshape(-1)[0].only)
         rows.append(Located(function=function, block="", what=watch.name, bends=False))
     return rows
+
+
+def _states_now(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]) -> Tracer:
+    """Return all states within a step, with what memories `become` by then, by blocks' places."""
+    graph, at, parts = reader.graph, 0, []
+    known = {  # an ideal relay's mode is no function of the states
+        place: values[k : k + 1]
+        for i, values in become.items() if supplied_of(reader.blocks[i].system) is not SLIDING
+        for k, place in enumerate(memory(reader.blocks[i]))
+    }  # fmt: skip
+    for place in sorted(known):
+        parts += [leaf_vector(graph, "x", at, (place - at,)), known[place]]
+        at = place + 1
+    rest = leaf_vector(graph, "x", at, ((schedule.system.nstates or 0) - at,))
+    return concatenated(graph, [*parts, rest])

@@ -298,15 +298,18 @@ def _note_jumps(task, lanes, w, done):
     """Note the functions that the run watches whose signs have jumped at the ends of steps.
 
     With a condition of t alone, a sample, or a state behind a guard's fall.  One that has jumped to
-    0 is noted where it leaves that for the other side.
+    0 is noted where it leaves that for the other side, by another jump or without.
     """
     events = w.events
     for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
+        ends = task.rows.ending[i - task.rows.watched]
         for j in range(lanes.size):
             before, now = events.before_jump[i, j], events.g_start[i, j]
             if not done[j] or before == now:
                 continue
-            if opposite(before, now) and _counts(task, lanes[j], i, now):
+            came = events.behind[i, j] if before == 0.0 else before
+            leaves = opposite(came, now) or (came == 0.0 and abs(now) > 0.0 and not ends)
+            if leaves and _counts(task, lanes[j], i, now):
                 note(task, lanes[j], w, lanes[j].t, i, now > 0.0, j)
             events.behind[i, j] = np.sign(before) if now == 0.0 else 0.0
 
