@@ -104,6 +104,8 @@ class Graph:
         self.guards: list[Expr] = []
         # whether there are numbers of Python's own, which raise errors where NumPy's are infinite
         self.python_numbers = False
+        # choices between one of Python's integers and a float, which no path has told apart
+        self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
         self.implied: dict[Expr, bool] = {}  # what follows from that
@@ -253,6 +255,14 @@ class Graph:
         if a.op == "const":
             return a if a.kind == "i" else self.const(int(a.data))
         return a if a.kind == "i" else self.node(a.op, *a.args, data=a.data, size=a.size, kind="i")
+
+    def may_be_whole(self, a: Expr) -> bool:
+        """Whether Python may have an integer here, of which it makes arrays of integers."""
+        if a.kind != "f" or a in self.mixed:
+            return True
+        if not self.mixed or a.op not in (*INTEGER, "select", "concat"):
+            return a.op == "const" and bool(self.mixed) and float(a.data).is_integer()
+        return all(map(self.may_be_whole, a.args[a.op == "select" :]))
 
     def _of_truth_values(self, name: str, *args: Expr) -> Expr:
         """Return what NumPy makes of truth values alone."""

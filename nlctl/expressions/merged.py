@@ -242,4 +242,7 @@ def _selected(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
     kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
     if not kinds or ("b" in kinds and len(kinds) > 1):
         raise Untraceable("branches with something else than numbers")
-    return elementwise(graph, "select", scalar(graph, condition), a, b)
+    result = elementwise(graph, "select", scalar(graph, condition), a, b)
+    if len(kinds) > 1:
+        graph.mixed.add(result.only)
+    return result

@@ -262,12 +262,16 @@ def _power(base: Any, exponent: Any) -> Any:
     return elementwise(base.graph, "power", base, exponent)
 
 
+_OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
+
+
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        if not isinstance(other, Tracer | np.ndarray | float | int | bool | complex | np.generic):
+        row = bool(self.shape) and isinstance(other, list | tuple)
+        if not (row or isinstance(other, _OPERANDS)):
             if name in ("eq", "ne"):
                 raise Untraceable("comparison with what is not a number")  # Python would say False
-            return NotImplemented  # a tuple is not an array
+            return NotImplemented  # one of Python's own numbers adds to no list
         return elementwise(self.graph, name, *((other, self) if swapped else (self, other)))
 
     return method

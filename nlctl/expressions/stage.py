@@ -136,6 +136,8 @@ class Stage:
             return self._instead_of_builtin(value)
         if isinstance(value, np.ufunc) or (callable(value) and self._is_known(value)):
             return self._library("", value)
+        if isinstance(value, np.vectorize):
+            return self._vectorized(value)
         if _is_column(value):
             return self.fresh(np.array(value, dtype=float))
         return self._instead_of_object(value)
@@ -184,6 +186,12 @@ class Stage:
         if id(value) not in self._objects:  # one and the same: it may be asked with `is`
             self._objects[id(value)] = (value, StagedObject(value, self))
         return self._objects[id(value)][1]
+
+    def _vectorized(self, value: Any) -> Any:
+        """Return what `np.vectorize` has made of somebody's function."""
+        if value.signature is not None or value.excluded or value.cache:
+            raise Untraceable("np.vectorize with other arguments")
+        return WRITTEN[np.vectorize](self.graph, self.instead(value.pyfunc), value.otypes)
 
     def parent(self, thing: Any, cls: type) -> Any:
         """Return what ``super()`` is in a method of somebody's object."""

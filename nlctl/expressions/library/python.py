@@ -8,6 +8,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable
+from types import FunctionType, NoneType
 from typing import Any
 
 import numpy as np
@@ -219,6 +220,8 @@ def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
 def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
     """Return a function that is called for each element."""
 
+    are_floats = otypes in ("d", [float], [np.float64], ["d"], ["float"], ["f8"])
+
     def each(*arguments: Any) -> Any:
         arrays = [traced(graph, a).short() for a in arguments]
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
@@ -227,11 +230,62 @@ def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
         results = [
             traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
         ]
-        if any(f.shape or f.only.kind != "f" for f in results):
+        if any(f.shape or not (are_floats or _is_float(graph, f)) for f in results):
             raise Untraceable("np.vectorize of something else than floats")
+        results = [scalar(graph, graph.number(f.only)) for f in results]
         return traced(graph, results).reshape(shape) if shape else results[0]
 
     return each
+
+
+def _is_float(graph: Graph, number: Tracer) -> bool:
+    return number.only.kind == "f" and not (graph.mixed and graph.may_be_whole(number.only))
+
+
+@of(np.frompyfunc, makes=True)
+def frompyfunc(graph: Graph, function: Any, nin: int, nout: int) -> Any:
+    """Return a function of numbers; of arrays NumPy's returns arrays of objects."""
+
+    def of_numbers(*arguments: Any) -> Any:
+        if nout != 1 or any(traced(graph, a).shape for a in arguments):
+            raise Untraceable("np.frompyfunc of arrays")
+        return function(*arguments)
+
+    return of_numbers
+
+
+@of(functools.wraps, makes=True)
+def wraps(graph: Graph, *_: Any, **__: Any) -> Any:
+    """Return what leaves a function as it is: no equation asks for its name."""
+    return lambda function: function
+
+
+@of(functools.cache, functools.lru_cache, makes=True)
+def cached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) -> Any:
+    """Return a function that computes anew what Python's keeps."""
+    if function is None or isinstance(function, int):
+        return functools.partial(cached, graph)
+
+    around, first = getattr(function, "__closure__", None) or (), []
+
+    def anew(*arguments: Any, **named: Any) -> Any:
+        for value in (*arguments, *named.values()):
+            if isinstance(value, list | dict | set) or getattr(value, "shape", ()):
+                raise TypeError("a cache of what has no hash")
+        now = [cell.cell_contents for cell in around]
+        first.extend(now if not first else ())
+        same = all(a is b and _never_changes(a) for a, b in zip(now, first, strict=True))
+        if not same or not isinstance(function, FunctionType):
+            raise Untraceable("a cache of a function that reads what changes")
+        return function(*arguments, **named)
+
+    return anew
+
+
+def _never_changes(value: Any) -> bool:
+    is_number = isinstance(value, bool | int | float | str | NoneType)
+    is_alone = isinstance(value, FunctionType) and not value.__closure__
+    return is_number or is_alone or (isinstance(value, Tracer) and not value.shape)
 
 
 @of(np.apply_along_axis)

@@ -39,6 +39,7 @@ from .values import (
     holder,
     least_upper_bound,
     library,
+    remembered,
 )
 from .walk import Walk
 
@@ -328,6 +329,8 @@ class Expressions(ast.NodeVisitor):
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), [base], {})
+            if getter is not getattr(entry, "fget", None):
+                return remembered(result)
             return result if not result.own else FRESH
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return captured(getattr(thing, name))  # its name or its value

@@ -22,6 +22,7 @@ from .values import (
     SLICE,
     UNKNOWN_VALUE,
     Bound,
+    Cached,
     Impure,
     Instance,
     KnownValue,
@@ -36,9 +37,11 @@ from .values import (
     element,
     forgotten,
     function_choice,
+    holder,
     least_upper_bound,
     library,
     python_function,
+    remembered,
 )
 from .walk import Walk
 
@@ -108,7 +111,8 @@ def call(
 ) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
-        return walk.call(walk.captured(thing, "__wrapped__", thing.__wrapped__), given, named)
+        wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
+        return remembered(walk.call(wrapped, given, named))
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
         return FRESH
     owner = getattr(thing, "__self__", None)
@@ -135,6 +139,24 @@ def _of_python(
     if thing is functools.partial:
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
+    if thing is functools.wraps:
+        after = (("wrapped", given[0]),)
+        return KnownValue(True, True, known=Bound(captured(functools.update_wrapper), (), after))
+    if thing is functools.update_wrapper:
+        return given[0]
+    if thing is functools.lru_cache or thing is functools.cache:
+        is_function = bool(given) and not isinstance(given[0].known, int | None)
+        known = Cached(given[0]) if is_function else Bound(captured(functools.cache), ())
+        return KnownValue(True, True, known=known)
+    if thing is functools.reduce and not isinstance(given[0].known, Unknown):
+        first = [element(given[1]), *given[2:]]
+        return least_upper_bound([*first, walk.call(given[0], [OUTSIDE, first[0]], {})])
+    if thing is np.frompyfunc:
+        _call_functions(walk, given[:1])
+        return KnownValue(True, True, known=Pure())
+    if isinstance(thing, np.vectorize):
+        _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
+        return FRESH
     if thing is dataclasses.replace and given:
         return made.replaced_fields(walk, given[0], named)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
@@ -235,8 +257,9 @@ def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method that changes nothing."""
     if name == "get" and given:
         key = given[0].known
-        if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
-            return captured(base.known[key])
+        if isinstance(base.known, dict) and isinstance(key, str):
+            default = given[1] if len(given) > 1 else FRESH
+            return captured(base.known[key]) if key in base.known else default
         parts = [captured(v) for v in base.known.values()] if isinstance(base.known, dict) else []
         known = function_choice([*parts, *given[1:]])
         return replace(least_upper_bound([element(base), *given[1:]]), known=known)
@@ -252,10 +275,15 @@ def _written(base: KnownValue, what: str) -> None:
         raise Impure(f"changes with {what} what it did not make", MEMORY)
 
 
+_WITHOUT_CODE = (
+    Unknown | Local | Bound | Cached | Pure | RowOf | enum.Enum | enum.EnumType | BuiltinFunctionType
+)
+
+
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, Unknown | Local | Bound | Pure | RowOf | enum.Enum | BuiltinFunctionType):
+    if isinstance(thing, _WITHOUT_CODE):
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
@@ -292,6 +320,8 @@ def _builtin(
         return least_upper_bound(
             [element(given[0])] if len(given) == 1 else [forgotten(v) for v in given]
         )
+    if thing is map and not isinstance(given[0].known, Unknown):
+        return holder([walk.call(given[0], list(map(element, given[1:])), {})])
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
         inside = all(v.inside for v in given)
@@ -323,7 +353,7 @@ def _check_parts(value: KnownValue, name: str) -> None:
 def _functions_in(given: list[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for what calls one."""
     parts = [element(v) for v in given]
-    kinds = OneOf | Instance | Bound | Local | FunctionType
+    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
     functions = [v for v in parts if isinstance(v.known, kinds)]
     functions = [
         v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
@@ -385,5 +415,5 @@ def _call_functions(walk: Walk, values: Any) -> None:
             continue
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices)
-        elif isinstance(thing, Local | Bound | Instance) or callable(thing):
+        elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
             walk.call(value, [OUTSIDE] * 8, {})
