@@ -2,6 +2,7 @@
 
 * ``try``: its body runs to the end, or the function is called instead of traced.
 * ``raise`` and ``assert``: what an error would say is not made.
+* ``table[k]`` of an array of integers: which one `k` chooses follows from the values.
 * ``while angle > pi: angle -= 2 * pi``: how often follows from the values.
 """
 
@@ -14,6 +15,8 @@ from collections.abc import Callable
 from types import CodeType, FunctionType
 from typing import Any
 
+import numpy as np
+
 from .arrays import Tracer, traced
 from .graph import Expr, Graph, Untraceable
 from .library.python import is_of_arrays
@@ -24,7 +27,7 @@ from .source import Definition, Unreadable, definition
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _DIVIDING = ("div", "remainder", "fmod", "power")
 _KEYS = (int, float, bool)
-_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
+_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript)
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -82,6 +85,14 @@ class _Rewriter(ast.NodeTransformer):
             call_instead("numbered", node) if node.keys and len(numbers) == len(node.keys) else node
         )
 
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        self.generic_visit(node)
+        keys = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        names = any(isinstance(k, ast.Name | ast.Call | ast.BinOp | ast.Subscript) for k in keys)
+        return call_instead("item", node.value, _key(node.slice)) if names and isinstance(
+            node.ctx, ast.Load
+        ) else node  # fmt: skip
+
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
             node.exc = node.exc.func
@@ -128,6 +139,16 @@ def _steps(node: ast.While) -> tuple[str, float, ast.Compare, ast.expr] | None:
     return name, 1.0 if isinstance(operation, ast.Sub) else -1.0, test, step
 
 
+def _key(index: ast.expr) -> ast.expr:
+    """Return an index as an expression: ``a:b`` is ``slice(a, b, None)``."""
+    if isinstance(index, ast.Tuple):
+        return ast.Tuple(list(map(_key, index.elts)), ast.Load())
+    if not isinstance(index, ast.Slice):
+        return index
+    ends = (part or ast.Constant(None) for part in (index.lower, index.upper, index.step))
+    return call_instead("slice", *ends)
+
+
 def _is(name: str, node: ast.expr) -> bool:
     return isinstance(node, ast.Name) and node.id == name
 
@@ -138,6 +159,8 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("numbered"): NumberKeys,
         INSTEAD_NAME.format("attempt"): functools.partial(_Attempt, graph),
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
+        INSTEAD_NAME.format("item"): functools.partial(_item, graph),
+        INSTEAD_NAME.format("slice"): slice,
     }
 
 
@@ -161,6 +184,13 @@ class _Attempt:
         if node.op not in _DIVIDING or node.args[-1].op == "const":
             return False
         return self.graph.python_numbers or not any(map(is_of_arrays, node.args))
+
+
+def _item(graph: Graph, whole: Any, key: Any) -> Any:
+    """Return what Python finds at a key; of NumPy's integers what expressions choose."""
+    keys = key if isinstance(key, tuple) else (key,)
+    chosen = type(whole) is np.ndarray and any(isinstance(k, Tracer) for k in keys)
+    return (traced(graph, whole) if chosen else whole)[key]
 
 
 class NumberKeys(dict[Any, Any]):

@@ -123,7 +123,9 @@ def _is_raised(error: Exception) -> bool:
         return False
     code = place.tb_frame.f_code
     is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
-    is_pythons = isinstance(error, IndexError | KeyError | ZeroDivisionError | UnboundLocalError)
+    is_pythons = isinstance(
+        error, IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
+    )
     raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
     return is_staged and (raises or is_pythons)
 
