@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -127,6 +128,17 @@ def of_cholesky(
     return of_triangle(graph, c, first, trans=1 if lower else 0, lower=lower)
 
 
+def cholesky_factor(
+    graph: Graph, a: Any, lower: bool = False, overwrite_a: object = False,
+    check_finite: object = True,
+) -> tuple[Tracer, bool]:  # fmt: skip
+    """Return SciPy's `scipy.linalg.cho_factor`: in the other triangle the matrix stays."""
+    a = traced(graph, a)
+    factor = cholesky(graph, a if lower else a.T)
+    factor, places = (factor if lower else factor.T), np.tri(len(a), dtype=bool)
+    return elementwise(graph, "select", places if lower else places.T, factor, a), lower
+
+
 def of_triangles(
     graph: Graph,
     lu_and_piv: Any,
@@ -148,13 +160,31 @@ def of_triangles(
     return of_triangle(graph, lu, first)
 
 
+def _of_each(written: Any) -> Any:
+    """Return a function of one matrix as one of many, one after the other."""
+
+    @functools.wraps(written)
+    def function(graph: Graph, a: Any, *rest: Any) -> Any:
+        a, others = traced(graph, a), [traced(graph, b) for b in rest]
+        if a.ndim < 3:
+            return written(graph, a, *others)
+        each = [b if b.ndim == a.ndim else [b] * len(a) for b in others]
+        if any(b.ndim == a.ndim and len(b) != len(a) for b in others):
+            raise Untraceable("many matrices at once, with other shapes")
+        return traced(graph, [function(graph, *parts) for parts in zip(a, *each, strict=True)])
+
+    return function
+
+
 @of(np.linalg.solve)
+@_of_each
 def _solve(graph: Graph, a: Any, b: Any) -> Tracer:
     """Return the solution of linear equations."""
     return solved(graph, a, b)
 
 
 @of(np.linalg.inv)
+@_of_each
 def inv(graph: Graph, a: Any) -> Tracer:
     """Return the inverse of a matrix."""
     n = len(traced(graph, a))
@@ -162,6 +192,7 @@ def inv(graph: Graph, a: Any) -> Tracer:
 
 
 @of(np.linalg.det)
+@_of_each
 def det(graph: Graph, a: Any) -> Any:
     """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
     rows = _square(graph, a)

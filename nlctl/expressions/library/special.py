@@ -12,7 +12,7 @@ from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
-from .linear_algebra import of_cholesky, of_triangle, of_triangles
+from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
 from .reductions import prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, formula, of
@@ -30,6 +30,7 @@ def enter_scipy() -> None:
     for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
+    enter([linalg.cho_factor], cholesky_factor)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
     for name in ("erf", "erfc"):
@@ -57,8 +58,9 @@ def _of_linalg(name: str) -> Any:
     def function(graph: Graph, *arguments: Any, **options: Any) -> Any:
         if name == "cholesky":
             lower = options.pop("lower", False)
-            upper = written(graph, *arguments)
-            return upper if lower else upper.T
+            a = traced(graph, arguments[0])  # SciPy reads the triangle that it returns
+            lower = arguments[1] if len(arguments) > 1 else lower
+            return written(graph, a) if lower else written(graph, a.T).T
         options = {k: v for k, v in options.items() if k not in _HOW}
         return written(graph, *arguments, **options)
 

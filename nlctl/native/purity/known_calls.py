@@ -70,6 +70,7 @@ _TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 _OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
 _OF_TABLES = ("to_numpy", "tolist")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
+_SEEDED = ("default_rng", "RandomState")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
            "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
@@ -217,6 +218,8 @@ def method(
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given)
+    if isinstance(thing, Pure) and name == "shuffle":
+        _written(given[0], "shuffle()")
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -376,6 +379,8 @@ def _library(
     walk: Walk, thing: object, module: str, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     name = getattr(thing, "__name__", "")
+    if name in _SEEDED and given and type(given[0].known) is int:
+        return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
