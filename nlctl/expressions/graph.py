@@ -85,6 +85,13 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 
+FOLLOWED = "is followed"  # attribute of an error that a traced function may catch
+
+
+class Namespace(dict[str, Any]):
+    """Builtins of the copies of functions that are traced, known by it from other code."""
+
+
 class OpenCondition(BaseException):  # (what is traced may catch exceptions)
     """A function asks whether a condition holds that is not known when it is traced."""
 
@@ -102,8 +109,10 @@ class Graph:
         self.lengths = dict(lengths or {})
         # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
-        # whether there are numbers of Python's own, which raise errors where NumPy's are infinite
-        self.python_numbers = False
+        self.attempts = 0  # how many ``try`` are around: an error in these is a way of its own
+        # expressions that are numbers of Python's own somewhere, which raise errors where NumPy's
+        # are infinite
+        self.of_python: set[Expr] = set()
         # choices between one of Python's integers and a float, which no path has told apart
         self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
@@ -122,6 +131,15 @@ class Graph:
         if condition not in self.decisions:
             raise OpenCondition(condition)
         return self.decisions[condition]
+
+    def guard(self, condition: Expr, error: type[Exception]) -> None:
+        """Note what holds unless Python raises an error; within ``try`` ask, and raise it."""
+        if not self.attempts:
+            self.guards.append(condition)
+        elif not self.decided(condition):
+            raised = error("as Python does")
+            vars(raised)[FOLLOWED] = True
+            raise raised
 
     def assumed(self, integer: Expr) -> int:
         """Return the value of an integer; from now on the parameters behind it are fixed."""

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from ..upstream.numba_internals import CPUDispatcher
-from .arrays import Special, Tracer, traced
+from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
-from .library.python import Builtins, guard_of_math
+from .library.python import Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
@@ -268,9 +268,8 @@ class Stage:
         return value if is_plain else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
-        self.graph.python_numbers = True
         if name not in MATH:
-            return self._library(name, real)
+            return self._of_python(self._library(name, real))
         operation, of_numbers = MATH[name], self.for_numbers(real)
         count = numpy_function(operation).nin
 
@@ -283,17 +282,28 @@ class Stage:
                 result = traced(self.graph, arguments[0]) ** arguments[1]
             else:
                 result = elementwise(self.graph, operation, *arguments)
-            guard_of_math(self.graph, result, arguments)
-            return result
+            return of_math(self.graph, operation, result, arguments)
 
         return function
+
+    def _of_python(self, function: Any) -> Any:
+        """Return a function of math whose results are numbers of Python's own."""
+        if not callable(function):
+            return function
+
+        def of_python(*arguments: Any, **options: Any) -> Any:
+            result = function(*arguments, **options)
+            is_number = isinstance(result, Tracer) and not result.shape
+            return python_number(self.graph, result.only) if is_number else result
+
+        return of_python
 
     # -- classes -----------------------------------------------------------------------------------
 
     def _type(self, cls: type) -> Any:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
-            return NumberType(np.float64, self._builtins["float"].make)
+            return NumberType(np.float64, self._float64)
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -306,6 +316,11 @@ class Stage:
         if issubclass(cls, tuple) or not any(map(_has_code, vars(cls).values())):
             return cls
         return self.copied_class(cls)
+
+    def _float64(self, value: Any = 0.0) -> Any:
+        """Return a number as one of NumPy's."""
+        number: Any = self._builtins["float"].make(value)
+        return scalar(self.graph, number.only) if isinstance(number, Tracer) else np.float64(number)
 
     def copied_class(self, cls: type) -> type:
         """Return a copy of a class whose methods lead to the stage."""

@@ -40,7 +40,7 @@ def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
     for pivot in pivots:
         guard = elementwise(graph, "ne", pivot, 0.0).only
         if guard.op != "const":
-            graph.guards.append(guard)
+            graph.guard(guard, np.linalg.LinAlgError)
         elif not guard.data:
             raise Untraceable("a singular matrix")
 
@@ -69,7 +69,7 @@ def _solved_as_one(graph: Graph, rows: _Rows, right: Tracer) -> Tracer:
     if not right.ndim or len(right) != len(rows) or right.ndim > 2:
         raise Untraceable("right-hand sides that do not fit to their matrix")
     lu = _factors(graph, rows)
-    graph.guards.append(regular(graph, lu))
+    graph.guard(regular(graph, lu), np.linalg.LinAlgError)
     columns = 1 if right.ndim == 1 else right.shape[1]
     pieces = [p for row in (right if right.ndim == 2 else [right]) for p in row.pieces()]
     whole = solution(graph, lu, len(rows), pieces)
@@ -250,7 +250,7 @@ def cholesky(graph: Graph, a: Any) -> Tracer:
             rest = rest - lower[j][k] * lower[j][k]
         guard = elementwise(graph, "gt", rest, 0.0).only
         if guard.op != "const":
-            graph.guards.append(guard)
+            graph.guard(guard, np.linalg.LinAlgError)
         lower[j][j] = np_.sqrt(rest)
         for i in range(j + 1, n):
             rest = rows[i][j]

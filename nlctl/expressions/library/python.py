@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, scalar, traced
-from ..graph import Expr, Graph, Untraceable
+from ..arrays import Tracer, python_number, scalar, traced
+from ..graph import Expr, Graph, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
@@ -25,13 +25,18 @@ _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "
 # these ask their arguments, as they do of arrays
 
 
-def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
-    """Note when Python's function raises an error where NumPy's gives NaN or infinity."""
+def of_math(graph: Graph, operation: str, result: Any, arguments: Any) -> Any:
+    """Return the result of a function of math, which raises errors where NumPy's does not."""
     if not isinstance(result, Tracer):
-        return
+        return result
     if result.shape:
         raise Untraceable("a function of math of an array")
     op = functools.partial(elementwise, graph)
+    if graph.attempts:
+        undefined = op("ne", result, result)
+        for value in arguments:
+            undefined = op("and", undefined, op("eq", value, value))
+        graph.guard(op("not", undefined).only, ValueError)
     finite = op("lt", op("absolute", result), math.inf)
     for value in arguments:
         given = traced(graph, value)
@@ -40,11 +45,24 @@ def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
         passed = op("and", infinite, op("eq", result, result))
         finite = op("or", finite, op("or", nan, passed))
     if finite.only.op != "const" or not finite.only.data:
-        graph.guards.append(finite.only)
+        if operation in _UNSETTLED and graph.attempts:
+            raise Untraceable("try around what may raise one of several errors")
+        graph.guard(finite.only, OverflowError if operation in _OVERFLOWING else ValueError)
+    return python_number(graph, result.only)
 
 
-class Namespace(dict[str, Any]):
-    """Builtins of the copies of functions that are traced, known by it from other code."""
+_OVERFLOWING = ("exp", "expm1", "exp2", "sinh", "cosh")
+_UNSETTLED = ("power", "hypot", "tan")
+
+
+def guard_whole(graph: Graph, value: Tracer) -> None:
+    """Note that Python makes no integer of NaN or infinity."""
+    op = functools.partial(elementwise, graph)
+    if graph.attempts:
+        graph.guard(op("eq", value, value).only, ValueError)
+    finite = op("lt", op("absolute", value), math.inf).only
+    if finite.op != "const":
+        graph.guard(finite, OverflowError)
 
 
 class Builtins:
@@ -75,8 +93,7 @@ class Builtins:
             return float(value)
         if value.shape:
             raise Untraceable("the float of an array")
-        self.graph.python_numbers = True
-        return scalar(self.graph, self.graph.number(value.only))
+        return python_number(self.graph, self.graph.number(value.only))
 
     def _complex(self, *parts: Any) -> Any:
         if not any(map(is_traced, parts)):
@@ -88,20 +105,21 @@ class Builtins:
             return int(value, *rest)
         if value.shape:
             raise Untraceable("the integer of an array")
-        only, self.graph.python_numbers = value.only, True
+        only = value.only
         if only.op == "const":
             return int(only.data)
         if only.kind == "i":
-            return value.__index__() if only.value is not None else value  # type: ignore[attr-defined]
+            whole = python_number(self.graph, only)
+            return value.__index__() if only.value is not None else whole  # type: ignore[attr-defined]
         if only.kind == "b":
-            return scalar(self.graph, self.graph.integer(only))
+            return python_number(self.graph, self.graph.integer(only))
         return self._whole("trunc", value)
 
     def _whole(self, name: str, value: Tracer) -> Tracer:
         """Return an integer; Python raises an error where there is none."""
-        finite = elementwise(self.graph, "lt", elementwise(self.graph, "absolute", value), math.inf)
-        self.graph.guards.append(finite.only)
-        return scalar(self.graph, self.graph.integer(elementwise(self.graph, name, value).only))
+        guard_whole(self.graph, value)
+        whole = self.graph.integer(elementwise(self.graph, name, value).only)
+        return python_number(self.graph, whole)
 
     def _round(self, value: Any, digits: Any = None) -> Any:
         if not isinstance(value, Tracer):
@@ -227,9 +245,8 @@ def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
         zero = traced(graph, np.zeros(shape))
         arrays = [elementwise(graph, "add", a, zero) for a in arrays]
-        results = [
-            traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
-        ]
+        numbers = [[_handed_over(graph, a[index]) for a in arrays] for index in np.ndindex(shape)]
+        results = [traced(graph, function(*each)) for each in numbers]
         if any(f.shape or not (are_floats or _is_float(graph, f)) for f in results):
             raise Untraceable("np.vectorize of something else than floats")
         results = [scalar(graph, graph.number(f.only)) for f in results]
@@ -249,9 +266,14 @@ def frompyfunc(graph: Graph, function: Any, nin: int, nout: int) -> Any:
     def of_numbers(*arguments: Any) -> Any:
         if nout != 1 or any(traced(graph, a).shape for a in arguments):
             raise Untraceable("np.frompyfunc of arrays")
-        return function(*arguments)
+        return function(*(_handed_over(graph, a) for a in arguments))
 
     return of_numbers
+
+
+def _handed_over(graph: Graph, value: Any) -> Any:
+    """Return what NumPy hands a function for an element: a number of Python's."""
+    return python_number(graph, traced(graph, value).only)
 
 
 @of(functools.wraps, makes=True)

@@ -13,6 +13,7 @@ from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
 from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
+from .python import guard_whole
 from .reductions import prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, formula, of
@@ -135,9 +136,7 @@ def _whole(name: str) -> Any:
         value = traced(graph, x)
         if value.shape:
             raise Untraceable("a function of math of an array")
-        finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
-        if finite.op != "const":
-            graph.guards.append(finite)
+        guard_whole(graph, value)
         return whole_numbers(graph, elementwise(graph, name, value))
 
     return written

@@ -279,7 +279,15 @@ def _written(base: KnownValue, what: str) -> None:
 
 
 _WITHOUT_CODE = (
-    Unknown | Local | Bound | Cached | Pure | RowOf | enum.Enum | enum.EnumType | BuiltinFunctionType
+    Unknown
+    | Local
+    | Bound
+    | Cached
+    | Pure
+    | RowOf
+    | enum.Enum
+    | enum.EnumType
+    | BuiltinFunctionType
 )
 
 
