@@ -88,6 +88,13 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
 FOLLOWED = "is followed"  # attribute of an error that a traced function may catch
 
 
+def followed(error: type[Exception]) -> Exception:
+    """Return an error that Python raises where a traced function is."""
+    raised = error("as Python does")
+    vars(raised)[FOLLOWED] = True
+    return raised
+
+
 class Namespace(dict[str, Any]):
     """Builtins of the copies of functions that are traced, known by it from other code."""
 
@@ -121,6 +128,7 @@ class Graph:
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
+        self._results: dict[tuple[Any, ...], Expr] = {}
 
     def decided(self, condition: Expr) -> bool:
         """Return whether a condition holds on this path; ask the tracer if that is open."""
@@ -137,9 +145,7 @@ class Graph:
         if not self.attempts:
             self.guards.append(condition)
         elif not self.decided(condition):
-            raised = error("as Python does")
-            vars(raised)[FOLLOWED] = True
-            raise raised
+            raise followed(error)
 
     def assumed(self, integer: Expr) -> int:
         """Return the value of an integer; from now on the parameters behind it are fixed."""
@@ -220,6 +226,12 @@ class Graph:
 
     def op(self, name: str, *args: Expr) -> Expr:
         """Return an operation on numbers, or on the elements of vectors."""
+        key = (name, *args)  # every way through a function begins as others did
+        if key not in self._results:
+            self._results[key] = self._operation(name, *args)
+        return self._results[key]
+
+    def _operation(self, name: str, *args: Expr) -> Expr:
         kinds = {a.kind for a in args}
         if kinds == {"i"} and name in INTEGER:
             return self._of_integers(name, *args)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Tracer, traced
-from .graph import FOLLOWED, Ambiguous, Graph, Namespace, Untraceable
+from .graph import FOLLOWED, Ambiguous, Graph, Namespace, Untraceable, followed
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
@@ -28,7 +28,8 @@ _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
 _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
-_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript)
+_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
+          ast.Attribute)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -96,6 +97,13 @@ class _Rewriter(ast.NodeTransformer):
         return call_instead("item", node.value, _key(node.slice)) if names and isinstance(
             node.ctx, ast.Load
         ) else node  # fmt: skip
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        self.generic_visit(node)
+        plain = len(node.args) == 1 and not node.keywords and isinstance(node.func, ast.Attribute)
+        if not plain or node.func.attr != "index":  # type: ignore[attr-defined]
+            return node
+        return call_instead("index", node.func.value, *node.args)  # type: ignore[attr-defined]
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -165,6 +173,7 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
         INSTEAD_NAME.format("item"): functools.partial(_item, graph),
         INSTEAD_NAME.format("slice"): slice,
+        INSTEAD_NAME.format("index"): _index,
     }
 
 
@@ -220,6 +229,16 @@ def _is_float(value: Any) -> bool:
     return (value.only.kind == "f" if not value.shape else False) if isinstance(
         value, Tracer
     ) else type(value) is float  # fmt: skip
+
+
+def _index(whole: Any, value: Any) -> Any:
+    """Return where a list has a value: each place is asked in turn."""
+    if type(whole) not in (list, tuple) or not any(isinstance(v, Tracer) for v in (*whole, value)):
+        return whole.index(value)
+    for k, v in enumerate(whole):
+        if v is value or v == value:
+            return k
+    raise followed(ValueError)
 
 
 class NumberKeys(dict[Any, Any]):

@@ -145,7 +145,9 @@ class Stage:
     def _is_known(self, value: object) -> bool:
         module = getattr(value, "__module__", None) or ""
         foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
-        if foreign or module.startswith(("scipy.special", "scipy.linalg", "scipy.integrate")):
+        if foreign or module.startswith(
+            ("scipy.special", "scipy.linalg", "scipy.integrate", "scipy.spatial.distance")
+        ):
             enter_scipy()
         if module.startswith("scipy.interpolate"):
             enter_splines()

@@ -9,6 +9,7 @@ hold before says nothing of where a thing is that may be NaN.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -137,7 +138,10 @@ def _place(error: BaseException) -> str:
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:
     """Return a result, NaN where Python would have raised an error on the way."""
-    for condition in graph.guards:
+    guards = graph.guards
+    if len(guards) > _FEW:  # all at once: ways that begin alike have the same beginning
+        guards = [functools.reduce(functools.partial(graph.op, "and"), guards)]
+    for condition in guards:
         result = elementwise(graph, "select", scalar(graph, condition), result, np.nan)
     return result
 

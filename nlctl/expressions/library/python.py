@@ -31,28 +31,32 @@ def of_math(graph: Graph, operation: str, result: Any, arguments: Any) -> Any:
         return result
     if result.shape:
         raise Untraceable("a function of math of an array")
-    op = functools.partial(elementwise, graph)
-    if graph.attempts:
-        undefined = op("ne", result, result)
-        for value in arguments:
-            undefined = op("and", undefined, op("eq", value, value))
-        graph.guard(op("not", undefined).only, ValueError)
-    finite = op("lt", op("absolute", result), math.inf)
-    for value in arguments:
-        given = traced(graph, value)
-        nan = op("ne", given, given)
-        infinite = op("eq", op("absolute", given), math.inf)
-        passed = op("and", infinite, op("eq", result, result))
-        finite = op("or", finite, op("or", nan, passed))
-    if finite.only.op != "const" or not finite.only.data:
+    if operation in _DEFINED:
+        return python_number(graph, result.only)
+    op, infinity, value = graph.op, graph.const(math.inf), result.only
+    given = [traced(graph, v).only for v in arguments]
+    if operation in _PERIODIC:
+        finite = op("not", op("eq", op("absolute", given[0]), infinity))
+    else:
+        if graph.attempts:
+            undefined = [op("ne", value, value), *(op("eq", v, v) for v in given)]
+            graph.guard(op("not", functools.reduce(functools.partial(op, "and"), undefined)),
+                        ValueError)  # fmt: skip
+        finite = op("lt", op("absolute", value), infinity)
+        for v in given:
+            passed = op("and", op("eq", op("absolute", v), infinity), op("eq", value, value))
+            finite = op("or", finite, op("or", op("ne", v, v), passed))
+    if finite.op != "const" or not finite.data:
         if operation in _UNSETTLED and graph.attempts:
             raise Untraceable("try around what may raise one of several errors")
-        graph.guard(finite.only, OverflowError if operation in _OVERFLOWING else ValueError)
-    return python_number(graph, result.only)
+        graph.guard(finite, OverflowError if operation in _OVERFLOWING else ValueError)
+    return python_number(graph, value)
 
 
+_DEFINED = ("tanh", "arctan", "arctan2", "arcsinh", "cbrt", "erf", "erfc", "absolute", "copysign")
+_PERIODIC = ("sin", "cos", "tan")  # everywhere but at infinity
 _OVERFLOWING = ("exp", "expm1", "exp2", "sinh", "cosh")
-_UNSETTLED = ("power", "hypot", "tan")
+_UNSETTLED = ("power", "hypot")
 
 
 def guard_whole(graph: Graph, value: Tracer) -> None:

@@ -23,8 +23,12 @@ from .table import WRITTEN, Facade, enter, formula, of
 def enter_scipy() -> None:
     """Enter functions of SciPy, as soon as somebody uses one."""
     from scipy import integrate, linalg, special
+    from scipy.spatial import distance
 
     formula(integrate.cumulative_trapezoid)(cumulative_trapezoid)
+    enter([integrate.trapezoid], WRITTEN[np.trapezoid])
+    formula(distance.euclidean)(_distance)
+    formula(distance.cdist)(_distances)
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
@@ -51,6 +55,18 @@ def cumulative_trapezoid(
     width = dx if x is None else np.diff(traced(np.graph, x))
     sums = np.cumsum(width * (y[1:] + y[:-1]) / 2.0)
     return sums if initial is None else np.concatenate([[initial], sums])
+
+
+def _distance(np: Facade, u: Any, v: Any) -> Any:
+    apart = np.subtract(u, v)
+    return np.sqrt(np.sum(apart * apart))
+
+
+def _distances(np: Facade, one: Any, other: Any) -> Any:
+    """Return the distances of all points of one list from all of another."""
+    a, b = traced(np.graph, one), traced(np.graph, other)
+    apart = a[:, None, :] - b[None, :, :]
+    return np.sqrt(np.sum(apart * apart, axis=-1))
 
 
 def _of_linalg(name: str) -> Any:

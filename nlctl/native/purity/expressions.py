@@ -213,7 +213,8 @@ class Expressions(ast.NodeVisitor):
         if results:
             return least_upper_bound(results)
         self.operands(plain)
-        return FRESH
+        of_library = any(isinstance(v.known, Pure) for v in plain)
+        return KnownValue(True, True, known=Pure()) if of_library else FRESH
 
     def operands(self, values: Sequence[KnownValue]) -> None:
         """Check that operators are those of numbers, arrays and containers."""

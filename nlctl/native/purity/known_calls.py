@@ -6,6 +6,7 @@ import builtins
 import dataclasses
 import enum
 import functools
+import inspect
 import logging
 import warnings
 from collections import Counter, OrderedDict, defaultdict, deque
@@ -152,6 +153,10 @@ def _of_python(
     if thing is functools.reduce and not isinstance(given[0].known, Unknown):
         first = [element(given[1]), *given[2:]]
         return least_upper_bound([*first, walk.call(given[0], [OUTSIDE, first[0]], {})])
+    if isinstance(thing, enum.EnumType) and len(given) == 1 and not issubclass(thing, enum.Flag):
+        if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
+            raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
+        return element(captured(thing))
     if thing is np.frompyfunc:
         _call_functions(walk, given[:1])
         return KnownValue(True, True, known=Pure())

@@ -134,7 +134,17 @@ class CallWalker(Expressions):
 
     def visit_If(self, node: ast.If) -> None:
         self.condition(node.test)
-        self.either([node.body, node.orelse])
+        if self.is_off(node.test):
+            self.statements(node.orelse)
+        else:
+            self.either([node.body, node.orelse])
+
+    def is_off(self, test: ast.expr) -> bool:
+        """Whether a test is a global that is False: it is looked at again before each run."""
+        around: Frame | None = self.frame
+        while around is not None and isinstance(test, ast.Name) and test.id not in around.names:
+            around = around.parent
+        return isinstance(test, ast.Name) and around is None and self.visit(test).known is False
 
     def either(self, bodies: Sequence[Sequence[ast.stmt]]) -> None:
         """Walk several ways of which one is taken."""
