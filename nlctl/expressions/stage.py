@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import dataclasses
 import enum
 import functools
 import inspect
@@ -172,6 +173,8 @@ class Stage:
         if isinstance(value, functools.partial | MethodType):
             return self.called_object(value)
         if isinstance(value, CPUDispatcher | FunctionType):
+            if value is dataclasses.dataclass:  # it looks at types and defaults alone
+                return value
             return self.for_numbers(value) if is_of_a_library(value) else self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
@@ -321,7 +324,8 @@ class Stage:
 
     def _float64(self, value: Any = 0.0) -> Any:
         """Return a number as one of NumPy's."""
-        number: Any = self._builtins["float"].make(value)
+        of_floats: Any = self._builtins["float"]
+        number = of_floats.make(value)
         return scalar(self.graph, number.only) if isinstance(number, Tracer) else np.float64(number)
 
     def copied_class(self, cls: type) -> type:

@@ -13,6 +13,7 @@ from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
+from .local_classes import constants_of, made_class
 from .values import (
     FRESH,
     OUTSIDE,
@@ -239,6 +240,15 @@ class CallWalker(Expressions):
         for decorator in reversed(node.decorator_list):
             value = self.walk.call(self.visit(decorator), [value], {})
         self.assign(node.name, value)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> None:
+        for value in constants_of(node):
+            self.visit(value)
+        if node not in self.walk.classes:
+            calls = [d.func if isinstance(d, ast.Call) else d for d in node.decorator_list]
+            decorators = [self.visit(call).known for call in calls]
+            self.walk.classes[node] = made_class(node, self.frame.function, decorators)
+        self.assign(node.name, captured(self.walk.classes[node]))
 
 
 def _imported(name: str, package: str | None = None) -> Any:
