@@ -297,7 +297,7 @@ class Stage:
             return function
 
         def of_python(*arguments: Any, **options: Any) -> Any:
-            result = function(*arguments, **options)
+            result: Any = function(*arguments, **options)
             is_number = isinstance(result, Tracer) and not result.shape
             return python_number(self.graph, result.only) if is_number else result
 
