@@ -35,6 +35,8 @@ class Computed(Special):
 
 def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: Computed, *other: Any) -> Any:
+        if self.graph.attempts and name == "div":
+            raise Untraceable("try around a division of what is no number")
         return self.operation(self.graph, name, (*other, self) if reflected else (self, *other))
 
     return method
@@ -74,6 +76,7 @@ class Tracer:
     version: int = 0  # how often a long array has been assigned to
     # elements of which this long array was made as another shape, and what they were then
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
+    is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
     methods: ClassVar[Callable[[Tracer, str], Any] | None] = None  # what finds those of arrays
@@ -337,6 +340,12 @@ def full_index(key: Any, ndim: int) -> list[Any]:
 def scalar(graph: Graph, expr: Expr) -> Tracer:
     """Return an array without axes that holds one expression."""
     return Tracer(graph, as_array(expr))
+
+
+def python_number(graph: Graph, expr: Expr) -> Tracer:
+    """Return a number that is one of Python's own."""
+    graph.of_python.add(expr)
+    return Tracer(graph, as_array(expr), is_pythons=True)
 
 
 def traced(graph: Graph, value: object) -> Tracer:

@@ -85,6 +85,20 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 
+FOLLOWED = "is followed"  # attribute of an error that a traced function may catch
+
+
+def followed(error: type[Exception]) -> Exception:
+    """Return an error that Python raises where a traced function is."""
+    raised = error("as Python does")
+    vars(raised)[FOLLOWED] = True
+    return raised
+
+
+class Namespace(dict[str, Any]):
+    """Builtins of the copies of functions that are traced, known by it from other code."""
+
+
 class OpenCondition(BaseException):  # (what is traced may catch exceptions)
     """A function asks whether a condition holds that is not known when it is traced."""
 
@@ -102,14 +116,19 @@ class Graph:
         self.lengths = dict(lengths or {})
         # conditions without which Python would have raised an error on this path
         self.guards: list[Expr] = []
-        # whether there are numbers of Python's own, which raise errors where NumPy's are infinite
-        self.python_numbers = False
+        self.attempts = 0  # how many ``try`` are around: an error in these is a way of its own
+        # expressions that are numbers of Python's own somewhere, which raise errors where NumPy's
+        # are infinite
+        self.of_python: set[Expr] = set()
+        # choices between one of Python's integers and a float, which no path has told apart
+        self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
         self.implied: dict[Expr, bool] = {}  # what follows from that
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
         self._known: dict[Any, Expr] = {}
+        self._results: dict[tuple[Any, ...], Expr] = {}
 
     def decided(self, condition: Expr) -> bool:
         """Return whether a condition holds on this path; ask the tracer if that is open."""
@@ -120,6 +139,13 @@ class Graph:
         if condition not in self.decisions:
             raise OpenCondition(condition)
         return self.decisions[condition]
+
+    def guard(self, condition: Expr, error: type[Exception]) -> None:
+        """Note what holds unless Python raises an error; within ``try`` ask, and raise it."""
+        if not self.attempts:
+            self.guards.append(condition)
+        elif not self.decided(condition):
+            raise followed(error)
 
     def assumed(self, integer: Expr) -> int:
         """Return the value of an integer; from now on the parameters behind it are fixed."""
@@ -200,6 +226,12 @@ class Graph:
 
     def op(self, name: str, *args: Expr) -> Expr:
         """Return an operation on numbers, or on the elements of vectors."""
+        key = (name, *args)  # every way through a function begins as others did
+        if key not in self._results:
+            self._results[key] = self._operation(name, *args)
+        return self._results[key]
+
+    def _operation(self, name: str, *args: Expr) -> Expr:
         kinds = {a.kind for a in args}
         if kinds == {"i"} and name in INTEGER:
             return self._of_integers(name, *args)
@@ -253,6 +285,14 @@ class Graph:
         if a.op == "const":
             return a if a.kind == "i" else self.const(int(a.data))
         return a if a.kind == "i" else self.node(a.op, *a.args, data=a.data, size=a.size, kind="i")
+
+    def may_be_whole(self, a: Expr) -> bool:
+        """Whether Python may have an integer here, of which it makes arrays of integers."""
+        if a.kind != "f" or a in self.mixed:
+            return True
+        if not self.mixed or a.op not in (*INTEGER, "select", "concat"):
+            return a.op == "const" and bool(self.mixed) and float(a.data).is_integer()
+        return all(map(self.may_be_whole, a.args[a.op == "select" :]))
 
     def _of_truth_values(self, name: str, *args: Expr) -> Expr:
         """Return what NumPy makes of truth values alone."""

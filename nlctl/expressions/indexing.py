@@ -88,7 +88,7 @@ def _candidates(self: Tracer, key: Any, place: int) -> tuple[Tracer, range]:
 def guard(graph: Graph, chosen: Tracer, name: str, bound: float, possible: float) -> None:
     """Note that Python raises an error beyond a bound, unless that is never reached."""
     if bound != possible:
-        graph.guards.append(elementwise(graph, name, chosen, bound).only)
+        graph.guard(elementwise(graph, name, chosen, bound).only, IndexError)
 
 
 def _gathered(self: Tracer, key: object, place: int) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -62,7 +62,10 @@ class Masked(Computed):
     def _text(self, *_: Any) -> Any:
         raise Untraceable("elements that a mask chooses, whose number only the run knows")
 
-    __len__ = __iter__ = __getitem__ = __bool__ = __str__ = __repr__ = _text
+    def __iter__(self) -> Iterator[Any]:
+        return (self.whole[k] for k in MaskedPlaces(self.mask))
+
+    __len__ = __getitem__ = __bool__ = __str__ = __repr__ = _text
 
 
 class MaskedPlaces(Special):
@@ -76,6 +79,12 @@ class MaskedPlaces(Special):
         return total(elementwise(self.mask.graph, "select", self.mask, 1, 0))
 
     size = property(count)
+
+    def __iter__(self) -> Iterator[int]:
+        """Go through the places; whether each is chosen is asked when its turn comes."""
+        if self.mask.ndim != 1:
+            raise Untraceable("places in a matrix, one after the other")
+        return (k for k in range(len(self.mask)) if self.mask[k])
 
 
 def _power(self: Masked, exponent: Any) -> Masked:

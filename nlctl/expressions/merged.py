@@ -56,7 +56,7 @@ class Merger(ast.NodeTransformer):
         node.test = ast.Name(test, ast.Load())
         targets = [target for target, _, _ in values]
         branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
-        branches = [self.visit(ast.parse(ast.unparse(b), mode="eval").body) for b in branches]
+        branches = [self.visit(copy.deepcopy(b)) for b in branches]
         chosen = call_instead("choices", node.test, *map(_later, branches))
         is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
         stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
@@ -93,7 +93,7 @@ def _of_branches(node: ast.If) -> list[tuple[ast.expr, ast.expr, ast.expr]] | No
     result = []
     for name in dict.fromkeys([*yes, *no]):
         target = (yes.get(name) or no[name])[0]
-        same = ast.parse(name, mode="eval").body
+        same = _as_read(target)
         result.append((target, yes.get(name, (None, same))[1], no.get(name, (None, same))[1]))
     return result
 
@@ -123,12 +123,19 @@ def _one(statement: ast.stmt) -> _Values | None:
     if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
         target, value = statement.targets[0], statement.value
     elif isinstance(statement, ast.AugAssign):
-        target, name = statement.target, ast.unparse(statement.target)
-        value = ast.BinOp(ast.parse(name, mode="eval").body, statement.op, statement.value)
+        target = statement.target
+        value = ast.BinOp(_as_read(target), statement.op, statement.value)
     else:
         return None
     plain = isinstance(target, ast.Name | ast.Subscript)
     return {ast.unparse(target): (target, value)} if plain else None
+
+
+def _as_read(target: Any) -> ast.expr:
+    """Return the expression that reads what is assigned to."""
+    same = copy.deepcopy(target)
+    same.ctx = ast.Load()
+    return same
 
 
 def _truth(test: ast.expr) -> ast.expr:
@@ -242,4 +249,7 @@ def _selected(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
     kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
     if not kinds or ("b" in kinds and len(kinds) > 1):
         raise Untraceable("branches with something else than numbers")
-    return elementwise(graph, "select", scalar(graph, condition), a, b)
+    result = elementwise(graph, "select", scalar(graph, condition), a, b)
+    if len(kinds) > 1:
+        graph.mixed.add(result.only)
+    return result

@@ -8,13 +8,14 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
 
-from .arrays import Special, Tracer, as_array, is_complex, mapped, scalar, traced
-from .graph import SMALL, Ambiguous, Expr, Graph, Untraceable
+from .arrays import Special, Tracer, as_array, is_complex, mapped, python_number, scalar, traced
+from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable
 
 _Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
@@ -219,9 +220,17 @@ def _hash(self: Tracer) -> int:
 
 
 def _floor_division(self: Tracer, other: object) -> Any:
+    if self.graph.attempts:
+        _ask_divisor(self.graph, self, other)
     if _is_integer(self) and self.only.value is not None and isinstance(other, int):
         return operator.floordiv(_integer(self), other)
     return floor_quotient(self.graph, self, other)
+
+
+def _floor_division_by(self: Tracer, other: object) -> Any:
+    if self.graph.attempts:
+        _ask_divisor(self.graph, other, self)
+    return floor_quotient(self.graph, other, self)
 
 
 def floor_quotient(graph: Graph, a: Any, b: Any) -> Tracer:
@@ -253,31 +262,92 @@ def _power(base: Any, exponent: Any) -> Any:
     if isinstance(exponent, float) and exponent.is_integer():
         exponent = int(exponent)
     if isinstance(exponent, Tracer):
+        if exponent.graph.attempts:
+            raise Untraceable("try around a power of what may be Python's own numbers")
         return elementwise(exponent.graph, "power", base, exponent)
     if not isinstance(base, Tracer):
         return base**exponent
+    if base.graph.attempts and not _is_numpys(base.graph, base):
+        raise Untraceable("try around a power of what may be Python's own numbers")
     if isinstance(exponent, int | np.integer) and abs(exponent) <= 64:
         cells = mapped(lambda e: base.graph.power(e, int(exponent)), base.cells)
         return Tracer(base.graph, cells, base.axis, base.length)
     return elementwise(base.graph, "power", base, exponent)
 
 
+_OPERANDS = Tracer | np.ndarray | float | int | bool | complex | np.generic
+
+
 def _operator(name: str, swapped: bool = False) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        if not isinstance(other, Tracer | np.ndarray | float | int | bool | complex | np.generic):
+        row = bool(self.shape) and isinstance(other, list | tuple)
+        if not (row or isinstance(other, _OPERANDS)):
             if name in ("eq", "ne"):
                 raise Untraceable("comparison with what is not a number")  # Python would say False
-            return NotImplemented  # a tuple is not an array
-        return elementwise(self.graph, name, *((other, self) if swapped else (self, other)))
+            return NotImplemented  # one of Python's own numbers adds to no list
+        operands = (other, self) if swapped else (self, other)
+        if name in ("div", "remainder") and self.graph.attempts:
+            _ask_divisor(self.graph, *operands)
+        result = elementwise(self.graph, name, *operands)
+        return _as_their_result(result, operands)
 
     return method
 
 
+def _as_their_result(result: Any, operands: Sequence[Any]) -> Any:
+    """Return a result, one of Python's own numbers where its operands are."""
+    if result is NotImplemented or not all(map(_is_pythons, operands)):
+        return result
+    return python_number(result.graph, result.only)
+
+
+def _is_pythons(value: Any) -> bool:
+    return value.is_pythons if isinstance(value, Tracer) else type(value) in (float, int, bool)
+
+
+def _ask_divisor(graph: Graph, a: Any, b: Any) -> None:
+    """Follow the error of Python's own division by zero, of which NumPy's knows none."""
+    frame = sys._getframe(1)
+    while frame.f_globals is globals() and frame.f_back is not None:
+        frame = frame.f_back
+    if not isinstance(frame.f_globals.get("__builtins__"), Namespace):
+        return  # formulas of functions of NumPy divide as NumPy does
+    if _is_pythons(a) and _is_pythons(b):
+        graph.guard(elementwise(graph, "ne", b, 0.0).only, ZeroDivisionError)
+    elif not (_is_numpys(graph, a) or _is_numpys(graph, b)):
+        raise Untraceable("try around a division of what may be Python's own numbers")
+
+
+def _is_numpys(graph: Graph, value: Any) -> bool:
+    """Whether a number is known to be one of NumPy's: it is made of states or inputs."""
+    if not isinstance(value, Tracer) or value.shape:
+        return isinstance(value, Tracer | np.ndarray | np.generic)
+    return not value.is_pythons and _comes_from_arrays(value.only, graph.of_python)
+
+
+def _comes_from_arrays(expr: Expr, without: Collection[Expr]) -> bool:
+    """Whether an expression depends on states or inputs, other than by some expressions."""
+    known: dict[Expr, bool] = dict.fromkeys(without, False)
+    waiting = [expr]
+    while waiting:
+        node = waiting[-1]
+        if node in known:
+            waiting.pop()
+        elif node.op in ("call", "solve", "leaf"):
+            known[node] = node.op != "leaf" or node.data[0] in ("x", "u")
+        elif missing := [arg for arg in node.args if arg not in known]:
+            waiting += missing
+        else:
+            every = node.op == "select"  # either may be what comes out
+            known[node] = (all if every else any)(known[a] for a in node.args[every:])
+    return known[expr]
+
+
 def _in_place(name: str) -> Callable[[Any, Any], Any]:
     def method(self: Tracer, other: object) -> Any:
-        result = elementwise(self.graph, name, self, other)
         if not self.shape:
-            return result  # a number is not changed but replaced
+            return _operator(name)(self, other)  # a number is not changed but replaced
+        result = elementwise(self.graph, name, self, other)
         if result.shape != self.shape:
             raise Untraceable("assignment of another shape")
         self[...] = result
@@ -294,7 +364,8 @@ for _name, _op in (_BINARY | {"and": "and", "or": "or", "xor": "xor"}).items():
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Tracer, f"__{_name}__", _operator(_name))
 for _name, _op in {"neg": "neg", "abs": "absolute"}.items():
-    setattr(Tracer, f"__{_name}__", lambda self, op=_op: elementwise(self.graph, op, self))
+    _method = lambda self, op=_op: _as_their_result(elementwise(self.graph, op, self), [self])  # noqa: E731
+    setattr(Tracer, f"__{_name}__", _method)
 for _name, _method in {
     "invert": _invert,
     "bool": _truth,
@@ -304,8 +375,9 @@ for _name, _method in {
     "rpow": lambda self, other: _power(other, self),
     "hash": _hash,
     "floordiv": _floor_division,
-    "rfloordiv": lambda self, other: floor_quotient(self.graph, other, self),
+    "rfloordiv": _floor_division_by,
     "divmod": lambda self, other: (self // other, self % other),
+    "rdivmod": lambda self, other: (other // self, other % self),
     "pos": lambda self: self,
     "matmul": lambda self, other: _matrix_product(self.graph, self, other),
     "rmatmul": lambda self, other: _matrix_product(self.graph, other, self),

@@ -2,6 +2,7 @@
 
 * ``try``: its body runs to the end, or the function is called instead of traced.
 * ``raise`` and ``assert``: what an error would say is not made.
+* ``table[k]`` of an array of integers: which one `k` chooses follows from the values.
 * ``while angle > pi: angle -= 2 * pi``: how often follows from the values.
 """
 
@@ -9,22 +10,26 @@ from __future__ import annotations
 
 import ast
 import copy
+import dis
 import functools
 from collections.abc import Callable
 from types import CodeType, FunctionType
 from typing import Any
 
+import numpy as np
+
 from .arrays import Tracer, traced
-from .graph import Expr, Graph, Untraceable
-from .library.python import is_of_arrays
+from .graph import FOLLOWED, Ambiguous, Graph, Namespace, Untraceable, followed
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
-_DIVIDING = ("div", "remainder", "fmod", "power")
+_LEAVING = ast.Return | ast.Break | ast.Continue
+_PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
-_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict)
+_WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
+          ast.Attribute)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -68,12 +73,15 @@ def _inside(code: CodeType, name: str) -> CodeType:
 class _Rewriter(ast.NodeTransformer):
     def visit_Try(self, node: ast.Try) -> Any:
         self.generic_visit(node)
-        if all(isinstance(h.type, ast.Name) and h.type.id == "KeyError" for h in node.handlers):
-            return node
-        if any(isinstance(n, ast.Return) for part in node.finalbody for n in ast.walk(part)):
-            raise Untraceable("a return within finally")
+        if any(isinstance(n, _LEAVING) for part in node.finalbody for n in ast.walk(part)):
+            raise Untraceable("a way out of finally")
+        for handler in node.handlers:  # what ends a trace is no error of the function's
+            caught = [n for n in ast.walk(handler.type or handler) if isinstance(n, ast.Name)]
+            if handler.type is None or any(n.id == "BaseException" for n in caught):
+                handler.type = ast.Name("Exception", ast.Load())
         attempt = ast.With([ast.withitem(call_instead("attempt"))], node.body)
-        return [ast.copy_location(attempt, node), *node.orelse, *node.finalbody]
+        node.body = [ast.copy_location(attempt, node)] if node.handlers else node.body
+        return node
 
     def visit_Dict(self, node: ast.Dict) -> Any:
         self.generic_visit(node)
@@ -81,6 +89,21 @@ class _Rewriter(ast.NodeTransformer):
         return (
             call_instead("numbered", node) if node.keys and len(numbers) == len(node.keys) else node
         )
+
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        self.generic_visit(node)
+        keys = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        names = any(isinstance(k, ast.Name | ast.Call | ast.BinOp | ast.Subscript) for k in keys)
+        return call_instead("item", node.value, _key(node.slice)) if names and isinstance(
+            node.ctx, ast.Load
+        ) else node  # fmt: skip
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        self.generic_visit(node)
+        plain = len(node.args) == 1 and not node.keywords and isinstance(node.func, ast.Attribute)
+        if not plain or node.func.attr != "index":  # type: ignore[attr-defined]
+            return node
+        return call_instead("index", node.func.value, *node.args)  # type: ignore[attr-defined]
 
     def visit_Raise(self, node: ast.Raise) -> Any:
         if isinstance(node.exc, ast.Call):
@@ -128,6 +151,16 @@ def _steps(node: ast.While) -> tuple[str, float, ast.Compare, ast.expr] | None:
     return name, 1.0 if isinstance(operation, ast.Sub) else -1.0, test, step
 
 
+def _key(index: ast.expr) -> ast.expr:
+    """Return an index as an expression: ``a:b`` is ``slice(a, b, None)``."""
+    if isinstance(index, ast.Tuple):
+        return ast.Tuple(list(map(_key, index.elts)), ast.Load())
+    if not isinstance(index, ast.Slice):
+        return index
+    ends = (part or ast.Constant(None) for part in (index.lower, index.upper, index.step))
+    return call_instead("slice", *ends)
+
+
 def _is(name: str, node: ast.expr) -> bool:
     return isinstance(node, ast.Name) and node.id == name
 
@@ -138,29 +171,74 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("numbered"): NumberKeys,
         INSTEAD_NAME.format("attempt"): functools.partial(_Attempt, graph),
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
+        INSTEAD_NAME.format("item"): functools.partial(_item, graph),
+        INSTEAD_NAME.format("slice"): slice,
+        INSTEAD_NAME.format("index"): _index,
     }
 
 
 class _Attempt:
-    """The body of a ``try``: what a handler would catch never happens, or it is not traced."""
+    """The body of a ``try``: an error of Python's is raised and caught, on a way of its own."""
 
     def __init__(self, graph: Graph) -> None:
-        self.graph, self.guards, self.nodes = graph, len(graph.guards), len(graph.nodes)
+        self.graph, self.guards = graph, len(graph.guards)
 
     def __enter__(self) -> None:
-        pass
+        self.graph.attempts += 1
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        failed = kind is not None and issubclass(kind, Exception)
-        divides = any(map(self._may_divide_by_zero, self.graph.nodes[self.nodes :]))
-        if failed or divides or len(self.graph.guards) > self.guards:
-            raise Untraceable("try around what may raise an error")
+    def __exit__(self, kind: Any, error: BaseException | None, *_: object) -> None:
+        self.graph.attempts -= 1
+        if isinstance(error, Exception) and not is_raised(error):
+            raise Unfollowed from error
+        if len(self.graph.guards) > self.guards:
+            raise Unfollowed from Untraceable("try around what may raise an error")
 
-    def _may_divide_by_zero(self, node: Expr) -> bool:
-        """Whether Python's own numbers are divided, instead of NumPy's."""
-        if node.op not in _DIVIDING or node.args[-1].op == "const":
-            return False
-        return self.graph.python_numbers or not any(map(is_of_arrays, node.args))
+
+class Unfollowed(BaseException):
+    """What ends a trace, whatever a traced function catches."""
+
+
+def is_raised(error: BaseException) -> bool:
+    """Whether an error is one that a traced function raises itself, or that Python raises in it."""
+    if isinstance(error, Untraceable | Ambiguous):
+        return False
+    if FOLLOWED in vars(error):
+        return True
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None or place.tb_frame.f_globals.get("__builtins__") is None:
+        return False
+    code = place.tb_frame.f_code
+    is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
+    is_staged |= code in (_item.__code__, NumberKeys.__getitem__.__code__)
+    raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
+    return is_staged and (raises or isinstance(error, _PYTHONS))
+
+
+def _item(graph: Graph, whole: Any, key: Any) -> Any:
+    """Return what Python finds at a key; of NumPy's integers what expressions choose."""
+    keys = key if isinstance(key, tuple) else (key,)
+    if not any(isinstance(k, Tracer) for k in keys):
+        return whole[key]
+    of_floats = type(whole) in (list, tuple) and all(map(_is_float, whole))
+    return (traced(graph, whole) if of_floats or type(whole) is np.ndarray else whole)[key]
+
+
+def _is_float(value: Any) -> bool:
+    return (value.only.kind == "f" if not value.shape else False) if isinstance(
+        value, Tracer
+    ) else type(value) is float  # fmt: skip
+
+
+def _index(whole: Any, value: Any) -> Any:
+    """Return where a list has a value: each place is asked in turn."""
+    if type(whole) not in (list, tuple) or not any(isinstance(v, Tracer) for v in (*whole, value)):
+        return whole.index(value)
+    for k, v in enumerate(whole):
+        if v is value or v == value:
+            return k
+    raise followed(ValueError)
 
 
 class NumberKeys(dict[Any, Any]):
@@ -170,7 +248,7 @@ class NumberKeys(dict[Any, Any]):
         if not isinstance(key, Tracer):
             return super().__getitem__(key)
         known = functools.reduce(lambda a, b: a | b, (_is_key(key, k) for k in self))
-        key.graph.guards.append(known.only)  # beyond there is an error
+        key.graph.guard(known.only, KeyError)
         return self._chosen(key, next(reversed(self.values())))
 
     def get(self, key: Any, default: Any = None) -> Any:

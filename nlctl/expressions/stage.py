@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import dataclasses
 import enum
 import functools
 import inspect
@@ -19,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from ..upstream.numba_internals import CPUDispatcher
-from .arrays import Special, Tracer, traced
+from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
-from .library.python import Builtins, guard_of_math
+from .library.python import Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
@@ -136,6 +137,8 @@ class Stage:
             return self._instead_of_builtin(value)
         if isinstance(value, np.ufunc) or (callable(value) and self._is_known(value)):
             return self._library("", value)
+        if isinstance(value, np.vectorize):
+            return self._vectorized(value)
         if _is_column(value):
             return self.fresh(np.array(value, dtype=float))
         return self._instead_of_object(value)
@@ -143,7 +146,9 @@ class Stage:
     def _is_known(self, value: object) -> bool:
         module = getattr(value, "__module__", None) or ""
         foreign = isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is not value
-        if foreign or module.startswith(("scipy.special", "scipy.linalg", "scipy.integrate")):
+        if foreign or module.startswith(
+            ("scipy.special", "scipy.linalg", "scipy.integrate", "scipy.spatial.distance")
+        ):
             enter_scipy()
         if module.startswith("scipy.interpolate"):
             enter_splines()
@@ -168,6 +173,8 @@ class Stage:
         if isinstance(value, functools.partial | MethodType):
             return self.called_object(value)
         if isinstance(value, CPUDispatcher | FunctionType):
+            if value is dataclasses.dataclass:  # it looks at types and defaults alone
+                return value
             return self.for_numbers(value) if is_of_a_library(value) else self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
@@ -184,6 +191,12 @@ class Stage:
         if id(value) not in self._objects:  # one and the same: it may be asked with `is`
             self._objects[id(value)] = (value, StagedObject(value, self))
         return self._objects[id(value)][1]
+
+    def _vectorized(self, value: Any) -> Any:
+        """Return what `np.vectorize` has made of somebody's function."""
+        if value.signature is not None or value.excluded or value.cache:
+            raise Untraceable("np.vectorize with other arguments")
+        return WRITTEN[np.vectorize](self.graph, self.instead(value.pyfunc), value.otypes)
 
     def parent(self, thing: Any, cls: type) -> Any:
         """Return what ``super()`` is in a method of somebody's object."""
@@ -260,9 +273,8 @@ class Stage:
         return value if is_plain else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
-        self.graph.python_numbers = True
         if name not in MATH:
-            return self._library(name, real)
+            return self._of_python(self._library(name, real))
         operation, of_numbers = MATH[name], self.for_numbers(real)
         count = numpy_function(operation).nin
 
@@ -275,17 +287,28 @@ class Stage:
                 result = traced(self.graph, arguments[0]) ** arguments[1]
             else:
                 result = elementwise(self.graph, operation, *arguments)
-            guard_of_math(self.graph, result, arguments)
-            return result
+            return of_math(self.graph, operation, result, arguments)
 
         return function
+
+    def _of_python(self, function: Any) -> Any:
+        """Return a function of math whose results are numbers of Python's own."""
+        if not callable(function):
+            return function
+
+        def of_python(*arguments: Any, **options: Any) -> Any:
+            result: Any = function(*arguments, **options)
+            is_number = isinstance(result, Tracer) and not result.shape
+            return python_number(self.graph, result.only) if is_number else result
+
+        return of_python
 
     # -- classes -----------------------------------------------------------------------------------
 
     def _type(self, cls: type) -> Any:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
-            return NumberType(np.float64, self._builtins["float"].make)
+            return NumberType(np.float64, self._float64)
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -298,6 +321,12 @@ class Stage:
         if issubclass(cls, tuple) or not any(map(_has_code, vars(cls).values())):
             return cls
         return self.copied_class(cls)
+
+    def _float64(self, value: Any = 0.0) -> Any:
+        """Return a number as one of NumPy's."""
+        of_floats: Any = self._builtins["float"]
+        number = of_floats.make(value)
+        return scalar(self.graph, number.only) if isinstance(number, Tracer) else np.float64(number)
 
     def copied_class(self, cls: type) -> type:
         """Return a copy of a class whose methods lead to the stage."""

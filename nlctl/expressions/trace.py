@@ -9,7 +9,7 @@ hold before says nothing of where a thing is that may be NaN.
 
 from __future__ import annotations
 
-import dis
+import functools
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -19,9 +19,18 @@ from typing import Any
 import numpy as np
 
 from .arrays import Tracer, concatenated, scalar, traced
-from .graph import BUDGET, UNLIMITED, Ambiguous, Expr, Graph, OpenCondition, Untraceable
-from .library.python import Namespace
+from .graph import (
+    BUDGET,
+    UNLIMITED,
+    Ambiguous,
+    Expr,
+    Graph,
+    Namespace,
+    OpenCondition,
+    Untraceable,
+)
 from .operators import elementwise
+from .rewritten import Unfollowed, is_raised
 from .stage import Stage
 from .staged import LIBRARIES
 
@@ -66,7 +75,7 @@ def _traced(
         graph.assumptions = assumptions
         raise Untraceable(f"{error}{_place(error)}") from error
     finally:
-        graph.decisions, graph.implied, graph.guards = {}, {}, []
+        graph.decisions, graph.implied, graph.guards, graph.attempts = {}, {}, [], 0
         graph.limit = UNLIMITED
 
 
@@ -75,12 +84,15 @@ def _followed(
 ) -> Tracer | None:
     """Follow a function from where the decisions have led; None where it raises an error."""
     graph.decisions, graph.implied, graph.guards = decisions, {}, []
+    graph.attempts = 0
     try:
         result = _guarded(graph, run())
+    except Unfollowed as end:
+        raise end.__cause__ or end from end
     except OpenCondition as question:
         condition = question.condition
     except Exception as error:
-        if not decisions or not _is_raised(error):
+        if not decisions or not is_raised(error):
             raise
         return _counted(left, None)
     else:
@@ -112,22 +124,6 @@ def _counted(left: list[int], result: Tracer | None) -> Tracer | None:
     return result
 
 
-def _is_raised(error: Exception) -> bool:
-    """Whether an error is one that a traced function raises itself, or that Python raises in it."""
-    if isinstance(error, Untraceable | Ambiguous):
-        return False
-    place = error.__traceback__
-    while place is not None and place.tb_next is not None:
-        place = place.tb_next
-    if place is None or place.tb_frame.f_globals.get("__builtins__") is None:
-        return False
-    code = place.tb_frame.f_code
-    is_staged = isinstance(place.tb_frame.f_globals["__builtins__"], Namespace)
-    is_pythons = isinstance(error, IndexError | KeyError | ZeroDivisionError | UnboundLocalError)
-    raises = code.co_code[place.tb_lasti] == dis.opmap["RAISE_VARARGS"]
-    return is_staged and (raises or is_pythons)
-
-
 def _place(error: BaseException) -> str:
     """Return at which line of somebody's function an error was raised, in brackets."""
     where, frame = "", error.__traceback__
@@ -142,7 +138,10 @@ def _place(error: BaseException) -> str:
 
 def _guarded(graph: Graph, result: Tracer) -> Tracer:
     """Return a result, NaN where Python would have raised an error on the way."""
-    for condition in graph.guards:
+    guards = graph.guards
+    if len(guards) > _FEW:  # all at once: ways that begin alike have the same beginning
+        guards = [functools.reduce(functools.partial(graph.op, "and"), guards)]
+    for condition in guards:
         result = elementwise(graph, "select", scalar(graph, condition), result, np.nan)
     return result
 

@@ -206,23 +206,29 @@ def rect(graph: Graph, size: Any, angle: Any) -> ComplexPair:
 
 
 def _transform(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a discrete Fourier transform, by its matrix."""
+    """Return a discrete Fourier transform, by its matrices: of the real and imaginary parts."""
 
     def written(graph: Graph, values: Any, n: Any = None, axis: int = -1, norm: Any = None) -> Any:
         z = paired(graph, values)
-        if z.ndim != 1 or n is not None or norm is not None or axis not in (0, -1):
+        if z.ndim != 1 or not isinstance(n, int | None) or norm is not None or axis not in (0, -1):
             raise Untraceable("a Fourier transform with other arguments")
-        matrix = function(np.eye(len(z)), axis=0)
-        parts = (traced(graph, np.ascontiguousarray(p)) for p in (matrix.real, matrix.imag))
-        real, imag = (functools.partial(product, part) for part in parts)
-        if not holds_complex(values):
-            return ComplexPair(graph, real(z.real), imag(z.real))
-        return ComplexPair(graph, real(z.real) - imag(z.imag), real(z.imag) + imag(z.real))
+        parts = [(1.0, z.real), *([(1j, z.imag)] if holds_complex(values) else [])]
+        whole = [(function(unit * np.eye(len(z)), n, axis=0), part) for unit, part in parts]
+        of = lambda name: _sum_of_products(graph, name, whole)  # noqa: E731
+        return ComplexPair(graph, of("real"), of("imag")) if whole[0][0].dtype == complex else (
+            of("real")
+        )  # fmt: skip
 
     return written
 
 
-for _function in (np.fft.fft, np.fft.ifft):
+def _sum_of_products(graph: Graph, name: str, whole: Sequence[tuple[Any, Tracer]]) -> Any:
+    matrices = [np.ascontiguousarray(getattr(matrix, name)) for matrix, _ in whole]
+    terms = [product(traced(graph, m), part) for m, (_, part) in zip(matrices, whole, strict=True)]
+    return functools.reduce(lambda a, b: a + b, terms)
+
+
+for _function in (np.fft.fft, np.fft.ifft, np.fft.rfft, np.fft.irfft):
     enter([_function], _transform(_function))
 enter([complex], complex_number)
 enter([cmath.rect], rect)

@@ -98,6 +98,8 @@ def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin:
     result = _of_floats(graph, traced(graph, values)).copy()
     if dtype is None and len({e.kind for e in result.values.flat}) > 1:
         raise Untraceable("an array of integers and truth values")
+    if dtype is None and graph.mixed and all(map(graph.may_be_whole, result.values.flat)):
+        raise Untraceable("an array of integers or floats, as the state decides")
     if dtype is not None:
         result = elementwise(graph, "add", result, 0.0)
     return (

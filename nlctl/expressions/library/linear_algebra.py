@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,7 +40,7 @@ def _guard(graph: Graph, pivots: Sequence[Any]) -> None:
     for pivot in pivots:
         guard = elementwise(graph, "ne", pivot, 0.0).only
         if guard.op != "const":
-            graph.guards.append(guard)
+            graph.guard(guard, np.linalg.LinAlgError)
         elif not guard.data:
             raise Untraceable("a singular matrix")
 
@@ -68,7 +69,7 @@ def _solved_as_one(graph: Graph, rows: _Rows, right: Tracer) -> Tracer:
     if not right.ndim or len(right) != len(rows) or right.ndim > 2:
         raise Untraceable("right-hand sides that do not fit to their matrix")
     lu = _factors(graph, rows)
-    graph.guards.append(regular(graph, lu))
+    graph.guard(regular(graph, lu), np.linalg.LinAlgError)
     columns = 1 if right.ndim == 1 else right.shape[1]
     pieces = [p for row in (right if right.ndim == 2 else [right]) for p in row.pieces()]
     whole = solution(graph, lu, len(rows), pieces)
@@ -127,6 +128,17 @@ def of_cholesky(
     return of_triangle(graph, c, first, trans=1 if lower else 0, lower=lower)
 
 
+def cholesky_factor(
+    graph: Graph, a: Any, lower: bool = False, overwrite_a: object = False,
+    check_finite: object = True,
+) -> tuple[Tracer, bool]:  # fmt: skip
+    """Return SciPy's `scipy.linalg.cho_factor`: in the other triangle the matrix stays."""
+    a = traced(graph, a)
+    factor = cholesky(graph, a if lower else a.T)
+    factor, places = (factor if lower else factor.T), np.tri(len(a), dtype=bool)
+    return elementwise(graph, "select", places if lower else places.T, factor, a), lower
+
+
 def of_triangles(
     graph: Graph,
     lu_and_piv: Any,
@@ -148,13 +160,31 @@ def of_triangles(
     return of_triangle(graph, lu, first)
 
 
+def _of_each(written: Any) -> Any:
+    """Return a function of one matrix as one of many, one after the other."""
+
+    @functools.wraps(written)
+    def function(graph: Graph, a: Any, *rest: Any) -> Any:
+        a, others = traced(graph, a), [traced(graph, b) for b in rest]
+        if a.ndim < 3:
+            return written(graph, a, *others)
+        each = [b if b.ndim == a.ndim else [b] * len(a) for b in others]
+        if any(b.ndim == a.ndim and len(b) != len(a) for b in others):
+            raise Untraceable("many matrices at once, with other shapes")
+        return traced(graph, [function(graph, *parts) for parts in zip(a, *each, strict=True)])
+
+    return function
+
+
 @of(np.linalg.solve)
+@_of_each
 def _solve(graph: Graph, a: Any, b: Any) -> Tracer:
     """Return the solution of linear equations."""
     return solved(graph, a, b)
 
 
 @of(np.linalg.inv)
+@_of_each
 def inv(graph: Graph, a: Any) -> Tracer:
     """Return the inverse of a matrix."""
     n = len(traced(graph, a))
@@ -162,6 +192,7 @@ def inv(graph: Graph, a: Any) -> Tracer:
 
 
 @of(np.linalg.det)
+@_of_each
 def det(graph: Graph, a: Any) -> Any:
     """Return the determinant of a matrix: the product of the pivots, each exchange a minus."""
     rows = _square(graph, a)
@@ -219,7 +250,7 @@ def cholesky(graph: Graph, a: Any) -> Tracer:
             rest = rest - lower[j][k] * lower[j][k]
         guard = elementwise(graph, "gt", rest, 0.0).only
         if guard.op != "const":
-            graph.guards.append(guard)
+            graph.guard(guard, np.linalg.LinAlgError)
         lower[j][j] = np_.sqrt(rest)
         for i in range(j + 1, n):
             rest = rows[i][j]

@@ -8,12 +8,13 @@ import functools
 import math
 import sys
 from collections.abc import Callable
+from types import FunctionType, NoneType
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, scalar, traced
-from ..graph import Expr, Graph, Untraceable
+from ..arrays import Tracer, python_number, scalar, traced
+from ..graph import Expr, Graph, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
@@ -24,26 +25,48 @@ _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "
 # these ask their arguments, as they do of arrays
 
 
-def guard_of_math(graph: Graph, result: Any, arguments: Any) -> None:
-    """Note when Python's function raises an error where NumPy's gives NaN or infinity."""
+def of_math(graph: Graph, operation: str, result: Any, arguments: Any) -> Any:
+    """Return the result of a function of math, which raises errors where NumPy's does not."""
     if not isinstance(result, Tracer):
-        return
+        return result
     if result.shape:
         raise Untraceable("a function of math of an array")
+    if operation in _DEFINED:
+        return python_number(graph, result.only)
+    op, infinity, value = graph.op, graph.const(math.inf), result.only
+    given = [traced(graph, v).only for v in arguments]
+    if operation in _PERIODIC:
+        finite = op("not", op("eq", op("absolute", given[0]), infinity))
+    else:
+        if graph.attempts:
+            undefined = [op("ne", value, value), *(op("eq", v, v) for v in given)]
+            graph.guard(op("not", functools.reduce(functools.partial(op, "and"), undefined)),
+                        ValueError)  # fmt: skip
+        finite = op("lt", op("absolute", value), infinity)
+        for v in given:
+            passed = op("and", op("eq", op("absolute", v), infinity), op("eq", value, value))
+            finite = op("or", finite, op("or", op("ne", v, v), passed))
+    if finite.op != "const" or not finite.data:
+        if operation in _UNSETTLED and graph.attempts:
+            raise Untraceable("try around what may raise one of several errors")
+        graph.guard(finite, OverflowError if operation in _OVERFLOWING else ValueError)
+    return python_number(graph, value)
+
+
+_DEFINED = ("tanh", "arctan", "arctan2", "arcsinh", "cbrt", "erf", "erfc", "absolute", "copysign")
+_PERIODIC = ("sin", "cos", "tan")  # everywhere but at infinity
+_OVERFLOWING = ("exp", "expm1", "exp2", "sinh", "cosh")
+_UNSETTLED = ("power", "hypot")
+
+
+def guard_whole(graph: Graph, value: Tracer) -> None:
+    """Note that Python makes no integer of NaN or infinity."""
     op = functools.partial(elementwise, graph)
-    finite = op("lt", op("absolute", result), math.inf)
-    for value in arguments:
-        given = traced(graph, value)
-        nan = op("ne", given, given)
-        infinite = op("eq", op("absolute", given), math.inf)
-        passed = op("and", infinite, op("eq", result, result))
-        finite = op("or", finite, op("or", nan, passed))
-    if finite.only.op != "const" or not finite.only.data:
-        graph.guards.append(finite.only)
-
-
-class Namespace(dict[str, Any]):
-    """Builtins of the copies of functions that are traced, known by it from other code."""
+    if graph.attempts:
+        graph.guard(op("eq", value, value).only, ValueError)
+    finite = op("lt", op("absolute", value), math.inf).only
+    if finite.op != "const":
+        graph.guard(finite, OverflowError)
 
 
 class Builtins:
@@ -74,8 +97,7 @@ class Builtins:
             return float(value)
         if value.shape:
             raise Untraceable("the float of an array")
-        self.graph.python_numbers = True
-        return scalar(self.graph, self.graph.number(value.only))
+        return python_number(self.graph, self.graph.number(value.only))
 
     def _complex(self, *parts: Any) -> Any:
         if not any(map(is_traced, parts)):
@@ -87,20 +109,21 @@ class Builtins:
             return int(value, *rest)
         if value.shape:
             raise Untraceable("the integer of an array")
-        only, self.graph.python_numbers = value.only, True
+        only = value.only
         if only.op == "const":
             return int(only.data)
         if only.kind == "i":
-            return value.__index__() if only.value is not None else value  # type: ignore[attr-defined]
+            whole = python_number(self.graph, only)
+            return value.__index__() if only.value is not None else whole  # type: ignore[attr-defined]
         if only.kind == "b":
-            return scalar(self.graph, self.graph.integer(only))
+            return python_number(self.graph, self.graph.integer(only))
         return self._whole("trunc", value)
 
     def _whole(self, name: str, value: Tracer) -> Tracer:
         """Return an integer; Python raises an error where there is none."""
-        finite = elementwise(self.graph, "lt", elementwise(self.graph, "absolute", value), math.inf)
-        self.graph.guards.append(finite.only)
-        return scalar(self.graph, self.graph.integer(elementwise(self.graph, name, value).only))
+        guard_whole(self.graph, value)
+        whole = self.graph.integer(elementwise(self.graph, name, value).only)
+        return python_number(self.graph, whole)
 
     def _round(self, value: Any, digits: Any = None) -> Any:
         if not isinstance(value, Tracer):
@@ -219,19 +242,76 @@ def copied(graph: Graph, value: Any, memo: Any = None) -> Any:
 def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
     """Return a function that is called for each element."""
 
+    are_floats = otypes in ("d", [float], [np.float64], ["d"], ["float"], ["f8"])
+
     def each(*arguments: Any) -> Any:
         arrays = [traced(graph, a).short() for a in arguments]
         shape = np.broadcast_shapes(*(a.shape for a in arrays))
         zero = traced(graph, np.zeros(shape))
         arrays = [elementwise(graph, "add", a, zero) for a in arrays]
-        results = [
-            traced(graph, function(*(a[index] for a in arrays))) for index in np.ndindex(shape)
-        ]
-        if any(f.shape or f.only.kind != "f" for f in results):
+        numbers = [[_handed_over(graph, a[index]) for a in arrays] for index in np.ndindex(shape)]
+        results = [traced(graph, function(*each)) for each in numbers]
+        if any(f.shape or not (are_floats or _is_float(graph, f)) for f in results):
             raise Untraceable("np.vectorize of something else than floats")
+        results = [scalar(graph, graph.number(f.only)) for f in results]
         return traced(graph, results).reshape(shape) if shape else results[0]
 
     return each
+
+
+def _is_float(graph: Graph, number: Tracer) -> bool:
+    return number.only.kind == "f" and not (graph.mixed and graph.may_be_whole(number.only))
+
+
+@of(np.frompyfunc, makes=True)
+def frompyfunc(graph: Graph, function: Any, nin: int, nout: int) -> Any:
+    """Return a function of numbers; of arrays NumPy's returns arrays of objects."""
+
+    def of_numbers(*arguments: Any) -> Any:
+        if nout != 1 or any(traced(graph, a).shape for a in arguments):
+            raise Untraceable("np.frompyfunc of arrays")
+        return function(*(_handed_over(graph, a) for a in arguments))
+
+    return of_numbers
+
+
+def _handed_over(graph: Graph, value: Any) -> Any:
+    """Return what NumPy hands a function for an element: a number of Python's."""
+    return python_number(graph, traced(graph, value).only)
+
+
+@of(functools.wraps, makes=True)
+def wraps(graph: Graph, *_: Any, **__: Any) -> Any:
+    """Return what leaves a function as it is: no equation asks for its name."""
+    return lambda function: function
+
+
+@of(functools.cache, functools.lru_cache, makes=True)
+def cached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) -> Any:
+    """Return a function that computes anew what Python's keeps."""
+    if function is None or isinstance(function, int):
+        return functools.partial(cached, graph)
+
+    around, first = getattr(function, "__closure__", None) or (), []
+
+    def anew(*arguments: Any, **named: Any) -> Any:
+        for value in (*arguments, *named.values()):
+            if isinstance(value, list | dict | set) or getattr(value, "shape", ()):
+                raise TypeError("a cache of what has no hash")
+        now = [cell.cell_contents for cell in around]
+        first.extend(now if not first else ())
+        same = all(a is b and _never_changes(a) for a, b in zip(now, first, strict=True))
+        if not same or not isinstance(function, FunctionType):
+            raise Untraceable("a cache of a function that reads what changes")
+        return function(*arguments, **named)
+
+    return anew
+
+
+def _never_changes(value: Any) -> bool:
+    is_number = isinstance(value, bool | int | float | str | NoneType)
+    is_alone = isinstance(value, FunctionType) and not value.__closure__
+    return is_number or is_alone or (isinstance(value, Tracer) and not value.shape)
 
 
 @of(np.apply_along_axis)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Tracer, concatenated, scalar, traced
+from ..arrays import Tracer, concatenated, python_number, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from ..masked import Masked
 from ..operators import elementwise, product
@@ -273,17 +273,18 @@ def _filled(graph: Graph, values: Tracer, value: object) -> None:
 
 def _listed(graph: Graph, values: Tracer) -> Any:
     """Return an array as lists of numbers."""
-    graph.python_numbers = True
-    return [_listed(graph, v) for v in values] if values.shape else values
+    if values.shape:
+        return [_listed(graph, v) for v in values]
+    return python_number(graph, values.only)
 
 
 def item(graph: Graph, values: Tracer, *_place: Any) -> Any:
     """Return one element as a number."""
-    graph.python_numbers = True
     if not _place and values.size != 1:
         raise Untraceable("the only element of an array that has more")
     flat = values.reshape(-1) if values.shape else values.reshape(1)
-    return flat[0] if not _place else flat[_place[0]] if len(_place) == 1 else values[_place]
+    place = flat[0] if not _place else flat[_place[0]] if len(_place) == 1 else values[_place]
+    return python_number(graph, place.only)
 
 
 ARRAY_METHODS.update(transpose=permuted, fill=_filled, tolist=_listed, item=item)

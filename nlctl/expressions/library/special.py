@@ -12,7 +12,8 @@ from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
-from .linear_algebra import of_cholesky, of_triangle, of_triangles
+from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
+from .python import guard_whole
 from .reductions import prod, sum_along
 from .shapes import by_moving
 from .table import WRITTEN, Facade, enter, formula, of
@@ -22,14 +23,19 @@ from .table import WRITTEN, Facade, enter, formula, of
 def enter_scipy() -> None:
     """Enter functions of SciPy, as soon as somebody uses one."""
     from scipy import integrate, linalg, special
+    from scipy.spatial import distance
 
     formula(integrate.cumulative_trapezoid)(cumulative_trapezoid)
+    enter([integrate.trapezoid], WRITTEN[np.trapezoid])
+    formula(distance.euclidean)(_distance)
+    formula(distance.cdist)(_distances)
     for name in ("solve", "inv", "det", "cholesky", "norm"):
         enter([getattr(linalg, name)], _of_linalg(name))
     enter([linalg.block_diag], by_moving(linalg.block_diag))
     for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
+    enter([linalg.cho_factor], cholesky_factor)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
     for name in ("erf", "erfc"):
@@ -51,14 +57,27 @@ def cumulative_trapezoid(
     return sums if initial is None else np.concatenate([[initial], sums])
 
 
+def _distance(np: Facade, u: Any, v: Any) -> Any:
+    apart = np.subtract(u, v)
+    return np.sqrt(np.sum(apart * apart))
+
+
+def _distances(np: Facade, one: Any, other: Any) -> Any:
+    """Return the distances of all points of one list from all of another."""
+    a, b = traced(np.graph, one), traced(np.graph, other)
+    apart = a[:, None, :] - b[None, :, :]
+    return np.sqrt(np.sum(apart * apart, axis=-1))
+
+
 def _of_linalg(name: str) -> Any:
     written = WRITTEN[getattr(np.linalg, name)]
 
     def function(graph: Graph, *arguments: Any, **options: Any) -> Any:
         if name == "cholesky":
             lower = options.pop("lower", False)
-            upper = written(graph, *arguments)
-            return upper if lower else upper.T
+            a = traced(graph, arguments[0])  # SciPy reads the triangle that it returns
+            lower = arguments[1] if len(arguments) > 1 else lower
+            return written(graph, a) if lower else written(graph, a.T).T
         options = {k: v for k, v in options.items() if k not in _HOW}
         return written(graph, *arguments, **options)
 
@@ -133,9 +152,7 @@ def _whole(name: str) -> Any:
         value = traced(graph, x)
         if value.shape:
             raise Untraceable("a function of math of an array")
-        finite = elementwise(graph, "lt", elementwise(graph, "absolute", value), math.inf).only
-        if finite.op != "const":
-            graph.guards.append(finite)
+        guard_whole(graph, value)
         return whole_numbers(graph, elementwise(graph, name, value))
 
     return written

@@ -25,6 +25,7 @@ from .values import (
     FRESH,
     OUTSIDE,
     Bound,
+    Cached,
     Impure,
     Instance,
     KnownValue,
@@ -38,6 +39,7 @@ from .values import (
     holder,
     least_upper_bound,
     python_function,
+    remembered,
 )
 from .walk import Walk
 
@@ -95,6 +97,8 @@ class FunctionWalk(Walk):
         if isinstance(thing, Bound):
             first = list(thing.given)
             return self.call(thing.function, first + given, dict(thing.named) | named)
+        if isinstance(thing, Cached):
+            return remembered(self.call(thing.function, given, named))
         if isinstance(thing, Instance):
             method = made.attribute(self, function, "__call__")
             return self.call(method, given, named)

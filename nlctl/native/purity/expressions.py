@@ -39,6 +39,7 @@ from .values import (
     holder,
     least_upper_bound,
     library,
+    remembered,
 )
 from .walk import Walk
 
@@ -212,7 +213,8 @@ class Expressions(ast.NodeVisitor):
         if results:
             return least_upper_bound(results)
         self.operands(plain)
-        return FRESH
+        of_library = any(isinstance(v.known, Pure) for v in plain)
+        return KnownValue(True, True, known=Pure()) if of_library else FRESH
 
     def operands(self, values: Sequence[KnownValue]) -> None:
         """Check that operators are those of numbers, arrays and containers."""
@@ -328,6 +330,8 @@ class Expressions(ast.NodeVisitor):
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), [base], {})
+            if getter is not getattr(entry, "fget", None):
+                return remembered(result)
             return result if not result.own else FRESH
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return captured(getattr(thing, name))  # its name or its value

@@ -6,6 +6,7 @@ import builtins
 import dataclasses
 import enum
 import functools
+import inspect
 import logging
 import warnings
 from collections import Counter, OrderedDict, defaultdict, deque
@@ -22,6 +23,7 @@ from .values import (
     SLICE,
     UNKNOWN_VALUE,
     Bound,
+    Cached,
     Impure,
     Instance,
     KnownValue,
@@ -36,9 +38,11 @@ from .values import (
     element,
     forgotten,
     function_choice,
+    holder,
     least_upper_bound,
     library,
     python_function,
+    remembered,
 )
 from .walk import Walk
 
@@ -67,6 +71,7 @@ _TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 _OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
 _OF_TABLES = ("to_numpy", "tolist")
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
+_SEEDED = ("default_rng", "RandomState")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
 READING = {"all", "any", "argmax", "argmin", "argsort", "astype", "clip", "conj", "conjugate",
            "copy", "cumprod", "cumsum", "dot", "flatten", "item", "max", "mean", "min", "nonzero",
@@ -108,7 +113,8 @@ def call(
 ) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
-        return walk.call(walk.captured(thing, "__wrapped__", thing.__wrapped__), given, named)
+        wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
+        return remembered(walk.call(wrapped, given, named))
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
         return FRESH
     owner = getattr(thing, "__self__", None)
@@ -135,6 +141,28 @@ def _of_python(
     if thing is functools.partial:
         rest = tuple(named.items())
         return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
+    if thing is functools.wraps:
+        after = (("wrapped", given[0]),)
+        return KnownValue(True, True, known=Bound(captured(functools.update_wrapper), (), after))
+    if thing is functools.update_wrapper:
+        return given[0]
+    if thing is functools.lru_cache or thing is functools.cache:
+        is_function = bool(given) and not isinstance(given[0].known, int | None)
+        known = Cached(given[0]) if is_function else Bound(captured(functools.cache), ())
+        return KnownValue(True, True, known=known)
+    if thing is functools.reduce and not isinstance(given[0].known, Unknown):
+        first = [element(given[1]), *given[2:]]
+        return least_upper_bound([*first, walk.call(given[0], [OUTSIDE, first[0]], {})])
+    if isinstance(thing, enum.EnumType) and len(given) == 1 and not issubclass(thing, enum.Flag):
+        if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
+            raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
+        return element(captured(thing))
+    if thing is np.frompyfunc:
+        _call_functions(walk, given[:1])
+        return KnownValue(True, True, known=Pure())
+    if isinstance(thing, np.vectorize):
+        _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
+        return FRESH
     if thing is dataclasses.replace and given:
         return made.replaced_fields(walk, given[0], named)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
@@ -195,6 +223,8 @@ def method(
     thing = base.known
     if isinstance(thing, ListOf):
         return _of_list(base, name, given)
+    if isinstance(thing, Pure) and name == "shuffle":
+        _written(given[0], "shuffle()")
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -235,8 +265,9 @@ def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method that changes nothing."""
     if name == "get" and given:
         key = given[0].known
-        if isinstance(base.known, dict) and isinstance(key, str) and key in base.known:
-            return captured(base.known[key])
+        if isinstance(base.known, dict) and isinstance(key, str):
+            default = given[1] if len(given) > 1 else FRESH
+            return captured(base.known[key]) if key in base.known else default
         parts = [captured(v) for v in base.known.values()] if isinstance(base.known, dict) else []
         known = function_choice([*parts, *given[1:]])
         return replace(least_upper_bound([element(base), *given[1:]]), known=known)
@@ -252,10 +283,23 @@ def _written(base: KnownValue, what: str) -> None:
         raise Impure(f"changes with {what} what it did not make", MEMORY)
 
 
+_WITHOUT_CODE = (
+    Unknown
+    | Local
+    | Bound
+    | Cached
+    | Pure
+    | RowOf
+    | enum.Enum
+    | enum.EnumType
+    | BuiltinFunctionType
+)
+
+
 def check_object(value: KnownValue, what: str) -> None:
     """Check that what a value does by itself is known: no iterator, no class of somebody."""
     thing = value.known
-    if isinstance(thing, Unknown | Local | Bound | Pure | RowOf | enum.Enum | BuiltinFunctionType):
+    if isinstance(thing, _WITHOUT_CODE):
         return
     if isinstance(thing, OneOf | ListOf):
         for choice in thing.choices:
@@ -292,6 +336,8 @@ def _builtin(
         return least_upper_bound(
             [element(given[0])] if len(given) == 1 else [forgotten(v) for v in given]
         )
+    if thing is map and not isinstance(given[0].known, Unknown):
+        return holder([walk.call(given[0], list(map(element, given[1:])), {})])
     if thing in MAKING:
         _call_functions(walk, [*given, *named.values()])
         inside = all(v.inside for v in given)
@@ -323,7 +369,7 @@ def _check_parts(value: KnownValue, name: str) -> None:
 def _functions_in(given: list[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for what calls one."""
     parts = [element(v) for v in given]
-    kinds = OneOf | Instance | Bound | Local | FunctionType
+    kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
     functions = [v for v in parts if isinstance(v.known, kinds)]
     functions = [
         v if isinstance(v.known, OneOf) else replace(v, known=OneOf((v,))) for v in functions
@@ -346,6 +392,8 @@ def _library(
     walk: Walk, thing: object, module: str, given: list[KnownValue], named: dict[str, KnownValue]
 ) -> KnownValue:
     name = getattr(thing, "__name__", "")
+    if name in _SEEDED and given and type(given[0].known) is int:
+        return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
     if module.startswith("pandas") and name.startswith(("read_", "to_")):
@@ -385,5 +433,5 @@ def _call_functions(walk: Walk, values: Any) -> None:
             continue
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices)
-        elif isinstance(thing, Local | Bound | Instance) or callable(thing):
+        elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
             walk.call(value, [OUTSIDE] * 8, {})

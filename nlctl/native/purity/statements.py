@@ -13,6 +13,7 @@ from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
+from .local_classes import constants_of, made_class
 from .values import (
     FRESH,
     OUTSIDE,
@@ -134,7 +135,17 @@ class CallWalker(Expressions):
 
     def visit_If(self, node: ast.If) -> None:
         self.condition(node.test)
-        self.either([node.body, node.orelse])
+        if self.is_off(node.test):
+            self.statements(node.orelse)
+        else:
+            self.either([node.body, node.orelse])
+
+    def is_off(self, test: ast.expr) -> bool:
+        """Whether a test is a global that is False: it is looked at again before each run."""
+        around: Frame | None = self.frame
+        while around is not None and isinstance(test, ast.Name) and test.id not in around.names:
+            around = around.parent
+        return isinstance(test, ast.Name) and around is None and self.visit(test).known is False
 
     def either(self, bodies: Sequence[Sequence[ast.stmt]]) -> None:
         """Walk several ways of which one is taken."""
@@ -229,6 +240,15 @@ class CallWalker(Expressions):
         for decorator in reversed(node.decorator_list):
             value = self.walk.call(self.visit(decorator), [value], {})
         self.assign(node.name, value)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> None:
+        for value in constants_of(node):
+            self.visit(value)
+        if node not in self.walk.classes:
+            calls = [d.func if isinstance(d, ast.Call) else d for d in node.decorator_list]
+            decorators = [self.visit(call).known for call in calls]
+            self.walk.classes[node] = made_class(node, self.frame.function, decorators)
+        self.assign(node.name, captured(self.walk.classes[node]))
 
 
 def _imported(name: str, package: str | None = None) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from enum import EnumType
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -70,6 +71,13 @@ class Bound:
     function: KnownValue
     given: tuple[KnownValue, ...]
     named: tuple[tuple[str, KnownValue], ...] = ()
+
+
+@dataclass(frozen=True)
+class Cached:
+    """A function that the call has wrapped by `functools.lru_cache`: results come again."""
+
+    function: KnownValue
 
 
 @dataclass(frozen=True)
@@ -142,6 +150,8 @@ def _marks(known: Any) -> Any:
     if isinstance(known, Bound):
         named = tuple((name, v.marks) for name, v in known.named)
         return "bound", known.function.marks, tuple(v.marks for v in known.given), named
+    if isinstance(known, Cached):
+        return "cached", known.function.marks
     if isinstance(known, Instance):
         return "instance", id(known), known.version
     if isinstance(known, Parent):
@@ -202,7 +212,7 @@ def element(value: KnownValue) -> KnownValue:
         if len(inner) == len(known.choices):
             return replace(plain, known=_of_any(inner))
         return least_upper_bound([plain, *inner]) if inner else replace(plain, known=known)
-    if isinstance(known, list | tuple) and known:
+    if isinstance(known, list | tuple | EnumType) and known:
         return replace(plain, known=_among(known))
     return plain
 
@@ -226,7 +236,7 @@ def holder(values: Iterable[KnownValue]) -> KnownValue:
 def function_choice(values: Iterable[KnownValue]) -> Any:
     """Return the choice between functions; UNKNOWN where not all values are functions."""
     values = tuple(values)
-    kinds = Local | Bound | OneOf | ListOf | Instance | Pure
+    kinds = Local | Bound | Cached | OneOf | ListOf | Instance | Pure
     functions = all(isinstance(v.known, kinds) or callable(v.known) for v in values)
     if not values or not functions:
         return UNKNOWN_VALUE
@@ -237,6 +247,12 @@ def function_choice(values: Iterable[KnownValue]) -> Any:
 def forgotten(value: KnownValue) -> KnownValue:
     """Return the same without the object: a part of it, or another view."""
     return replace(value, known=UNKNOWN_VALUE)
+
+
+def remembered(value: KnownValue) -> KnownValue:
+    """Return what is known of a result that a cache hands out again: it outlives the call."""
+    known = value.known if isinstance(value.known, (*PLAIN, Pure, FunctionType)) else UNKNOWN_VALUE
+    return replace(value, own=False, inside=False, known=known)
 
 
 def library(thing: object) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from types import FunctionType
@@ -21,6 +22,7 @@ class Walk(ABC):
     def __init__(self) -> None:
         self.read: dict[tuple[int, str], Captured] = {}
         self.unbound: list[str] = []
+        self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:

@@ -1,0 +1,200 @@
+"""What outlives a call is nobody's to change: results of caches, what is handed on, classes."""
+
+import functools
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+from nlctl.errors import CompileError
+
+COUNT = [0]
+GAIN = 2.0
+
+
+class Counting:
+    """A model that is another after each call."""
+
+    def __init__(self):
+        self.n = 0
+
+    def grown(self, v):
+        self.n += 1
+        return v * self.n
+
+    @functools.cached_property
+    def buffer(self):
+        return np.zeros(2)
+
+
+MODELS = [Counting()]
+
+
+def counted(v):
+    COUNT[0] += 1
+    return v * COUNT[0]
+
+
+VECTORIZED = np.vectorize(counted, otypes=[float])
+
+
+@functools.lru_cache
+def zeros(n):
+    return np.zeros(n)
+
+
+@functools.cache
+def model():
+    return Counting()
+
+
+def adds_to_what_a_cache_returned(t, x, u, p):
+    dx = zeros(2)
+    dx += x
+    return dx.copy()
+
+
+def adds_to_a_row_of_it(t, x, u, p):
+    rows = zeros((2, 2))
+    rows[0][:] = x
+    return rows[0] * 1.0
+
+
+def adds_to_a_cached_property(t, x, u, p):
+    dx = MODELS[0].buffer
+    dx += x
+    return dx.copy()
+
+
+def changes_an_object_of_a_cache(t, x, u, p):
+    return model().grown(x)
+
+
+def adds_to_what_its_own_cache_returned(t, x, u, p):
+    @functools.lru_cache(maxsize=None)  # noqa: UP033
+    def own(n):
+        return np.zeros(n)
+
+    one, other = own(2), own(2)
+    one += x
+    return one + other
+
+
+def hands_a_method_to_reduce(t, x, u, p):
+    return functools.reduce(lambda v, m: m.grown(v), MODELS, x)
+
+
+def hands_a_method_to_map(t, x, u, p):
+    return sum(map(lambda m: m.grown(x), MODELS))  # noqa: C417
+
+
+def calls_a_vectorized_function(t, x, u, p):
+    return VECTORIZED(x)
+
+
+def shuffles_its_argument(t, x, u, p):
+    np.random.default_rng(3).shuffle(x)
+    return x * 1.0
+
+
+def draws_without_a_seed(t, x, u, p):
+    return x + np.random.default_rng().normal(size=2)
+
+
+def counts_in_a_class(t, x, u, p):
+    class Law:
+        gain = counted(1.0)
+
+    return -Law.gain * x
+
+
+def keeps_in_a_class(t, x, u, p):
+    class Law:
+        past = []
+
+        def __call__(self, v):
+            self.past.append(v)
+            return v * len(self.past)
+
+    return Law()(x) + Law()(x)
+
+
+def writes_into_a_class(t, x, u, p):
+    class Law:
+        gain = 1.0
+
+    Law.gain = x[0]
+    return Law.gain * x
+
+
+REFUSED = (
+    adds_to_what_a_cache_returned, adds_to_a_row_of_it, adds_to_a_cached_property,
+    changes_an_object_of_a_cache, adds_to_what_its_own_cache_returned, hands_a_method_to_reduce,
+    hands_a_method_to_map, calls_a_vectorized_function, shuffles_its_argument,
+    draws_without_a_seed, counts_in_a_class, keeps_in_a_class, writes_into_a_class,
+)  # fmt: skip
+
+
+def block(update):
+    return ct.nlsys(update, None, inputs=1, outputs=2, states=2, name="b")
+
+
+@pytest.mark.parametrize("update", REFUSED)
+def test_what_outlives_a_call_is_not_changed(update):
+    before = COUNT[0], MODELS[0].n
+    with pytest.raises(CompileError, match="block 'b' cannot be compiled: its update function"):
+        nlctl.compile(block(update))
+    assert (COUNT[0], MODELS[0].n) == before
+
+
+def gain_of_its_class(t, x, u, p):
+    class Law:
+        gain = GAIN
+
+    return -Law.gain * x
+
+
+def test_a_constant_of_a_class_is_looked_at_again(monkeypatch):
+    compiled = nlctl.compile(block(gain_of_its_class))
+    np.testing.assert_array_equal(compiled.dynamics(0.0, [1.0, 2.0], [0.0]), [-2.0, -4.0])
+    monkeypatch.setitem(globals(), "GAIN", 3.0)
+    with pytest.raises(nlctl.errors.UsageError, match="compile again"):
+        nlctl.input_output_response(compiled, [0.0, 1.0], 0.0, [1.0, 2.0])
+
+
+def cache_of_what_changes(t, x, u, p):
+    k = 1.0
+
+    @functools.lru_cache
+    def scaled(v):
+        return k * v
+
+    one = scaled(1.0)
+    k = 2.0
+    return [one * x[0], scaled(1.0) * x[1]]
+
+
+def vectorized_to_the_kind_of_the_first(t, x, u, p):
+    return np.vectorize(lambda v: 0 if abs(v) < 0.5 else v - 0.5)(x)
+
+
+def array_of_integers_or_floats(t, x, u, p):
+    y = np.asarray([1 if v > 0 else 0.0 for v in x])
+    y[0] = x[0]
+    return y
+
+
+def quotient_of_what_may_be_numpys(t, x, u, p):
+    try:
+        return [1.0 / np.sqrt(float(x[0])), x[1]]
+    except ZeroDivisionError:
+        return [0.0, x[1]]
+
+
+@pytest.mark.parametrize("update", [
+    cache_of_what_changes, vectorized_to_the_kind_of_the_first, array_of_integers_or_floats,
+    quotient_of_what_may_be_numpys,
+])  # fmt: skip
+def test_what_is_not_known_is_called_as_it_stands(update):
+    assert nlctl.compile(block(update)).equations.calls
