@@ -72,8 +72,8 @@ def with_parameters_of(other: Any) -> Callable[[_F], _F]:
             entries = dict.fromkeys(known[name] for name in names if name in known)
             head, _, rest = text.partition(_PARAMETERS)
             behind = _SECTION.search(rest)
-            rest = f"\n\n{rest[behind.start() :]}" if behind else ""
-            function.__doc__ = head + _PARAMETERS + "\n".join(entries) + rest
+            others = head + (rest[behind.start() :] if behind else "")
+            function.__doc__ = _with_section(others, _PARAMETERS + "\n".join(entries))
         return function
 
     return completed
