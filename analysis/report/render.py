@@ -31,6 +31,10 @@ from .typography import plain_text
 
 RARE = ("ids", "links")
 DRAWN = ("figure", "time", "signals", "bands", "program")  # curves are on the page only
+_IN_FILE = (  # in this order
+    *("title", "question", "verdict", "author", "revision", "date", "lead", "claims", "sections"),
+    *("numbers", "command", "methods", "limits", "references", "provenance", "inputs", "files"),
+)
 _TITLES = {
     "methods": "Methods",
     "limits": "Limits of validity",
@@ -154,13 +158,7 @@ def render_json(report: Report) -> str:
     >>> json.loads(render_json(report))["numbers"]
     {'e': 0.14, 'settling': 'inf'}
     """
-    content = {
-        "title": report.title,
-        "question": report.question,
-        "verdict": report.verdict,
-        "author": report.author,
-        "revision": report.revision,
-        "date": report.date,
+    content = {name: getattr(report, name) for name in _IN_FILE} | {
         "lead": None if report.lead is None else _plain(report.lead),
         "claims": [_said(vars(claim)) for claim in report.claims],
         "sections": {
@@ -170,14 +168,6 @@ def render_json(report: Report) -> str:
             }
             for part in place_anchors(report)
         },
-        "numbers": report.numbers,
-        "command": report.command,
-        "methods": report.methods,
-        "limits": report.limits,
-        "references": report.references,
-        "provenance": report.provenance,
-        "inputs": report.inputs,
-        "files": report.files,
     }
     if report.headline is not None:
         content["headline"] = vars(report.headline)
