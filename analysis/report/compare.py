@@ -86,7 +86,6 @@ def compare_contents(
     numbers.e: 0.14 -> 0.15
     []
     """
-    _check_tolerance(rtol)
     return differing_numbers(read_report(first), read_report(second), rtol, common=common)
 
 
@@ -94,20 +93,15 @@ def differing_numbers(
     first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
 ) -> list[Difference]:
     """Compare two reports as `compare_contents` does, given what is in their files."""
-    _check_tolerance(rtol)
-    reports = (first, second)
-    both = set(reports[0]["sections"]) & set(reports[1]["sections"])
-    one, two = (_flat(report, both if common else set(report["sections"])) for report in reports)
+    if not 0 <= rtol < math.inf:
+        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
+    both = set(first["sections"]) & set(second["sections"])
+    one, two = (_flat(r, both if common else set(r["sections"])) for r in (first, second))
     return [
         Difference(where=where, first=one.get(where, ABSENT), second=two.get(where, ABSENT))
         for where in dict.fromkeys([*one, *two])
         if where not in one or where not in two or not _same(one[where], two[where], rtol)
     ]
-
-
-def _check_tolerance(rtol: float) -> None:
-    if not 0 <= rtol < math.inf:
-        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
 
 
 def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
