@@ -86,6 +86,7 @@ def compare_contents(
     numbers.e: 0.14 -> 0.15
     []
     """
+    _check_tolerance(rtol)
     return differing_numbers(read_report(first), read_report(second), rtol, common=common)
 
 
@@ -93,8 +94,7 @@ def differing_numbers(
     first: Mapping[str, Any], second: Mapping[str, Any], rtol: float = 0.0, *, common: bool = False
 ) -> list[Difference]:
     """Compare two reports as `compare_contents` does, given what is in their files."""
-    if not 0 <= rtol < math.inf:
-        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
+    _check_tolerance(rtol)
     both = set(first["sections"]) & set(second["sections"])
     one, two = (_flat(r, both if common else set(r["sections"])) for r in (first, second))
     return [
@@ -102,6 +102,11 @@ def differing_numbers(
         for where in dict.fromkeys([*one, *two])
         if where not in one or where not in two or not _same(one[where], two[where], rtol)
     ]
+
+
+def _check_tolerance(rtol: float) -> None:
+    if not 0 <= rtol < math.inf:
+        raise ParameterError(f"compare needs a finite rtol >= 0, got {rtol:g}")
 
 
 def read_report(path: str | os.PathLike[str]) -> Mapping[str, Any]:
