@@ -9,8 +9,6 @@ from __future__ import annotations
 from nlctl.attributes import described_record
 from nlctl.wording import counted
 
-__all__ = ["GUIDES", "ControllerGuide", "Costs", "rows_of"]
-
 
 @described_record
 class Costs:

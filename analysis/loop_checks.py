@@ -24,16 +24,6 @@ from nlctl.wording import counted, some_of
 from .lyapunov.ledger import Ledger, ledger
 from .report.document import Headline, Section, Table
 
-__all__ = [
-    "LoopCheck",
-    "checks_of",
-    "checks_section",
-    "headline",
-    "in_sentences",
-    "proof_check",
-    "proof_of",
-]
-
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
 _LATE = 0.05  # of the run: its end, whose samples are compared
 _TIGHTER = 1e-2  # of the tolerances, for the comparison
