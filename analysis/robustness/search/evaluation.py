@@ -17,7 +17,7 @@ from ..uncertainty.space import Space, moved, nominal
 # takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
 # ``functools.partial(evaluate, prepared)``
 Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
-Row = dict[str, Any]
+_Row = dict[str, Any]
 
 
 def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
@@ -59,7 +59,7 @@ def margins_at(evaluate: Evaluate, space: Space, rows: Iterable[Mapping[str, Any
 
 def towards_nominal(
     space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
-) -> Row:
+) -> _Row:
     """Return the row with the deviations of numbers from nominal multiplied by `factor`."""
     middle = nominal(space)
 
@@ -73,14 +73,14 @@ def towards_nominal(
 
 
 def nearest_violation(
-    margins: Callable[[list[Row]], np.ndarray],
+    margins: Callable[[list[_Row]], np.ndarray],
     space: Space,
-    found: tuple[Row, float],
+    violation: tuple[_Row, float],
     steps: int,
     names: Collection[str] | None = None,
-) -> tuple[Row, float]:
+) -> tuple[_Row, float]:
     """Move numbers of a violation towards nominal as far as bisection keeps it one."""
-    (full, _), low, high = found, 0.0, 1.0
+    (full, _), low, high = violation, 0.0, 1.0
     for _ in range(steps):
         middle = (low + high) / 2
         nearer = towards_nominal(space, full, middle, names)
@@ -88,8 +88,8 @@ def nearest_violation(
         if margin > 0:
             low = middle
         else:
-            found, high = (nearer, margin), middle
-    return found
+            violation, high = (nearer, margin), middle
+    return violation
 
 
 def row_text(row: Mapping[str, Any]) -> str:

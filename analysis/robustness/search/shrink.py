@@ -16,8 +16,9 @@ from nlctl.errors import ParameterError
 from nlctl.wording import counted, some_of
 
 from ..uncertainty.space import Space, checked_row, nominal
-from .evaluation import Evaluate, Row, margins_at, nearest_violation, row_text
+from .evaluation import Evaluate, margins_at, nearest_violation, row_text
 
+_Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
 
 
@@ -125,18 +126,18 @@ class _Task:
         self.evaluate, self.space, self.middle = evaluate, space, nominal(space)
         self.runs = 0
 
-    def margins(self, rows: Sequence[Row]) -> np.ndarray:
+    def margins(self, rows: Sequence[_Row]) -> np.ndarray:
         self.runs += len(rows)
         return margins_at(self.evaluate, self.space, rows)
 
-    def deviating(self, row: Row) -> list[str]:
+    def deviating(self, row: _Row) -> list[str]:
         return [name for name in self.space.names if row[name] != self.middle[name]]
 
-    def without(self, row: Row, names: Collection[str]) -> Row:
+    def without(self, row: _Row, names: Collection[str]) -> _Row:
         return row | {name: self.middle[name] for name in names}
 
 
-def _deleted(task: _Task, row: Row) -> Row:
+def _deleted(task: _Task, row: _Row) -> _Row:
     """Set back one deviation after the other while the spec stays violated."""
     while names := task.deviating(row):
         rows = [task.without(row, [name]) for name in names]
@@ -148,7 +149,7 @@ def _deleted(task: _Task, row: Row) -> Row:
     return row
 
 
-def _fewest(task: _Task, row: Row, size: int, most: int) -> tuple[Row | None, bool]:
+def _fewest(task: _Task, row: _Row, size: int, most: int) -> tuple[_Row | None, bool]:
     """Try all sets of less than `size` deviations; return a violation, and whether it tried."""
     names = task.deviating(row)
     if sum(math.comb(len(names), count) for count in range(size)) > most:
@@ -163,7 +164,7 @@ def _fewest(task: _Task, row: Row, size: int, most: int) -> tuple[Row | None, bo
     return None, True
 
 
-def _scaled(task: _Task, row: Row, steps: int) -> Row:
+def _scaled(task: _Task, row: _Row, steps: int) -> _Row:
     """Move one number after the other towards nominal by bisection."""
     for name in [q.name for q in task.space.quantities if q.name in task.deviating(row)]:
         row, _ = nearest_violation(task.margins, task.space, (row, np.nan), steps, [name])
