@@ -9,7 +9,21 @@ from __future__ import annotations
 from nlctl.attributes import described_record
 from nlctl.wording import counted
 
-__all__ = ["GUIDES", "ControllerGuide", "rows_of"]
+
+@described_record
+class Costs:
+    """What a controller takes with these defaults; printed, it is a line."""
+
+    states: int  # Every state is an integrator.
+    parameters: int
+    # Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``); None
+    # where it does not fit that loop.
+    time: float | None = None
+
+    def __str__(self) -> str:
+        time = "" if self.time is None else f"; time of a run, with PID as 1: {self.time:g}"
+        counts = f"{counted(self.states, 'state')}, {counted(self.parameters, 'parameter')}"
+        return counts + time
 
 
 @described_record
@@ -24,11 +38,7 @@ class ControllerGuide:
     # Name of the kind of certificate that `nlctl.analysis.lyapunov.certify` finds for its loops;
     # empty if there is none.
     proof: str = ""
-    states: int  # How many the controller has with these defaults: every state is an integrator.
-    parameters: int
-    # Time of a run of Example 1 with it, with PID as 1 (``python benchmarks/controllers.py``); None
-    # where it does not fit that loop.
-    time: float | None
+    costs: Costs
     code: str  # One line that makes it.
     instead: tuple[str, ...] = ()  # Names of `nlctl` that may replace a piece of it.
 
@@ -46,9 +56,7 @@ GUIDES = (
         measured=(*_STATES, "yd", "yd1"),
         known="the sign of the gain; gains are tuned for the plant",
         proved="nothing",
-        states=2,
-        parameters=6,
-        time=1.0,
+        costs=Costs(states=2, parameters=6, time=1.0),
         code="nlctl.PID()",
         instead=("PID2",),
     ),
@@ -59,9 +67,7 @@ GUIDES = (
         known="the sign of the gain; a bound of what disturbs",
         proved="|r| is bounded for all time where K dominates",
         proof="sliding mode",
-        states=0,
-        parameters=3,
-        time=1.4,
+        costs=Costs(states=0, parameters=3, time=1.4),
         code="nlctl.sliding_mode()",
         instead=("SlidingModeLaw",),
     ),
@@ -71,9 +77,7 @@ GUIDES = (
         measured=(*_STATES, *_REFERENCE),
         known="the sign of the gain; a bound of the rate of what disturbs",
         proved=f"{_PUBLISHED} r = 0 in finite time for r' = u + d without the boundary layer",
-        states=1,
-        parameters=4,
-        time=1.6,
+        costs=Costs(states=1, parameters=4, time=1.6),
         code="nlctl.sliding_mode(law=nlctl.controllers.SuperTwistingLaw())",
     ),
     ControllerGuide(
@@ -82,9 +86,7 @@ GUIDES = (
         measured=(*_STATES, "yd", "yd1"),
         known="the sign of the gain; a bound of the initial errors",
         proved=f"{_PUBLISHED} that e stays in the funnel; at its boundary u is NaN",
-        states=0,
-        parameters=4,
-        time=4.1,
+        costs=Costs(states=0, parameters=4, time=4.1),
         code="nlctl.controllers.FunnelControl()",
     ),
     ControllerGuide(
@@ -93,9 +95,7 @@ GUIDES = (
         measured=(*_STATES, "yd"),
         known="the sign of the gain; a bound of the initial errors; no derivative of the reference",
         proved=f"{_PUBLISHED} that e stays within its bound; at the bound u is NaN",
-        states=0,
-        parameters=4,
-        time=1.9,
+        costs=Costs(states=0, parameters=4, time=1.9),
         code="nlctl.controllers.PrescribedPerformance()",
     ),
     ControllerGuide(
@@ -104,9 +104,7 @@ GUIDES = (
         measured=(*_STATES, *_REFERENCE),
         known="the order: neither plant, nor actuator, nor the sign of the gain",
         proved="nothing for all time: the theorem fails as printed; the ledger checks its lines",
-        states=29,
-        parameters=9,
-        time=2.1,
+        costs=Costs(states=29, parameters=9, time=2.1),
         code="nlctl.adaptive_neural(order=2)",
         instead=("LeakyNussbaumLaw", "DeadZoneNussbaumLaw", "MonotoneNussbaumLaw", "FixedGainLaw"),
     ),
@@ -117,9 +115,7 @@ GUIDES = (
         known="the sign of the gain, and a lower bound of it",
         proved="|r| is bounded for all time, from a set of starts",
         proof="known sign",
-        states=28,
-        parameters=11,
-        time=1.8,
+        costs=Costs(states=28, parameters=11, time=1.8),
         code="nlctl.adaptive_neural(order=2, law=nlctl.controllers.KnownSignLaw())",
     ),
     ControllerGuide(
@@ -128,9 +124,7 @@ GUIDES = (
         measured=(*_STATES, "yd", "yd1"),
         known="the sign of the gain, and about its size",
         proved=f"{_PUBLISHED} that all signals stay bounded from a compact set",
-        states=28,
-        parameters=7,
-        time=1.5,
+        costs=Costs(states=28, parameters=7, time=1.5),
         code="nlctl.dynamic_surface_control()",
     ),
     ControllerGuide(
@@ -140,9 +134,7 @@ GUIDES = (
         known="the regressor psi, and the gain of the input",
         proved="|E| is bounded for all time, with weights that stay bounded",
         proof="reference model",
-        states=5,
-        parameters=7,
-        time=1.3,
+        costs=Costs(states=5, parameters=7, time=1.3),
         code="nlctl.mrac()",
         instead=(
             *("EModifiedWeights", "ProjectedWeights", "ConcurrentWeights", "HistoryStack"),
@@ -156,9 +148,7 @@ GUIDES = (
         known="the regressor psi, and the sign of the gain",
         proved="|E| is bounded for all time, with weights that stay bounded",
         proof="reference model",
-        states=5,
-        parameters=6,
-        time=1.1,
+        costs=Costs(states=5, parameters=6, time=1.1),
         code="nlctl.mrac(law=nlctl.controllers.DirectLaw())",
     ),
     ControllerGuide(
@@ -167,9 +157,7 @@ GUIDES = (
         measured=(*_STATES, "yd"),
         known="the regressor psi, the sign of the gain, the limits",
         proved=f"{_PUBLISHED} a bounded error, from states from which the plant can be held",
-        states=8,
-        parameters=8,
-        time=1.3,
+        costs=Costs(states=8, parameters=8, time=1.3),
         code=(
             "nlctl.mrac(error=nlctl.controllers.ConstrainedError(), "
             "law=nlctl.controllers.ConstrainedLaw())"
@@ -181,9 +169,7 @@ GUIDES = (
         measured=(*_STATES, "yd"),
         known="the gain of the input, and a ball that the weights lie in",
         proved=f"{_PUBLISHED} a bound of the error under an L1 condition that you check",
-        states=6,
-        parameters=10,
-        time=4.1,
+        costs=Costs(states=6, parameters=10, time=4.1),
         code="nlctl.l1_adaptive()",
     ),
     ControllerGuide(
@@ -192,9 +178,7 @@ GUIDES = (
         measured=("u_d", "r"),
         known="the plant; lower bounds of the slopes",
         proved=f"{_PUBLISHED} that r goes to 0 while the estimate is wide enough",
-        states=4,
-        parameters=4,
-        time=None,
+        costs=Costs(states=4, parameters=4),
         code="nlctl.controllers.AdaptiveDeadZoneInverse()",
     ),
     ControllerGuide(
@@ -203,9 +187,7 @@ GUIDES = (
         measured=("y",),
         known="the sign of the curvature",
         proved=f"{_PUBLISHED} that it ends near the extremum, on average and from nearby",
-        states=3,
-        parameters=5,
-        time=None,
+        costs=Costs(states=3, parameters=5),
         code="nlctl.controllers.ExtremumSeeking()",
     ),
 )
@@ -214,14 +196,11 @@ GUIDES = (
 
 def rows_of(guide: ControllerGuide) -> dict[str, str]:
     """Return plant, measured, known, proved, costs and code of a controller, in words."""
-    costs = f"{counted(guide.states, 'state')}, {counted(guide.parameters, 'parameter')}"
-    if guide.time is not None:
-        costs += f"; time of a run, with PID as 1: {guide.time:g}"
     return {
         "plant": guide.plant,
         "measured": ", ".join(guide.measured),
         "known": guide.known,
         "proved": guide.proved,
-        "costs": costs,
+        "costs": str(guide.costs),
         "code": guide.code,
     }

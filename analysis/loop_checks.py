@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,16 +23,6 @@ from nlctl.wording import counted, some_of
 
 from .lyapunov.ledger import Ledger, ledger
 from .report.document import Headline, Section, Table
-
-__all__ = [
-    "LoopCheck",
-    "checks_of",
-    "checks_section",
-    "headline",
-    "in_sentences",
-    "proof_check",
-    "proof_of",
-]
 
 _REST = 1e-3  # of how far a state has moved, within the time of the run: slower is at rest
 _LATE = 0.05  # of the run: its end, whose samples are compared
@@ -57,10 +47,11 @@ class LoopCheck:
 
 def checks_of(loop: Any, response: Any, params: Mapping[str, Any]) -> list[LoopCheck]:
     """Return what is checked of a loop and one run of it; a check that has no meaning says why."""
+    answers = {what: answer(loop, response, dict(params)) for what, answer in _CHECKS.items()}
     return [
-        *_engine(loop, response, params),
-        _tolerance(loop, response, params),
-        _rest(loop, response, params),
+        LoopCheck(what=what, found=answer[0], status=answer[1])
+        for what, answer in answers.items()
+        if answer is not None
     ]
 
 
@@ -122,39 +113,44 @@ def proof_of(
         return LoopCheck(what=what, found=str(error), status="not applicable")
 
 
-def _engine(loop: Any, response: Any, params: Mapping[str, Any]) -> Iterator[LoopCheck]:
-    """Yield who has computed the run, and what is known of its conditions."""
-    run, what = response.statistics, "The equations of the run are python-control's"
+_Answer = tuple[str, str]  # what was found, and its status
+
+
+def _engine(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
+    """Return who has computed the run."""
+    run = response.statistics
     if run is None:
-        yield LoopCheck(what=what, found="python-control ran them itself", status="pass")
-        return
+        return "python-control ran them itself", "pass"
     steps = f"{counted(run.accepted, 'step')}, {counted(run.events, 'event')}"
-    finding = f"machine code was compared with them along the run, which took {steps}"
-    yield LoopCheck(what=what, found=finding, status="pass")
-    reading = native.compile(loop, params=dict(params))
-    what = "Steps end where equations switch"
-    opaque = list(called(reading))
-    if opaque:
-        yield LoopCheck(what=what, found=f"not known of: {'; '.join(opaque)}", status="caution")
-    else:
-        numbers = {"of the equations": run.conditions, "of blocks": reading.program.switching}
-        located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
-        finding = f"{' and '.join(located)} located" if located else "nothing switches"
-        yield LoopCheck(what=what, found=finding, status="pass")
+    return f"machine code was compared with them along the run, which took {steps}", "pass"
 
 
-def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
+def _switching(loop: Any, response: Any, params: dict[str, Any]) -> _Answer | None:
+    """Return what is known of the conditions of a run, unless python-control ran it."""
+    if response.statistics is None:
+        return None
+    reading = native.compile(loop, params=params)
+    if opaque := list(called(reading)):
+        return f"not known of: {'; '.join(opaque)}", "caution"
+    numbers = {
+        "of the equations": response.statistics.conditions,
+        "of blocks": reading.program.switching,
+    }
+    located = [f"{counted(n, 'condition')} {whose}" for whose, n in numbers.items() if n]
+    return f"{' and '.join(located)} located" if located else "nothing switches", "pass"
+
+
+def _tolerance(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
     """Compare a run with one of tighter tolerances."""
-    what = "The run does not depend on its tolerances"
     if not ct.isctime(loop):
-        return LoopCheck(what=what, found="discrete time has none", status="not applicable")
+        return "discrete time has none", "not applicable"
     try:
         again = input_output_response(
             loop, response.time, response.u, response.x[:, 0], params=params,
             rtol=_TIGHTER * RTOL, atol=_TIGHTER * ATOL,
         )  # fmt: skip
     except DivergedError as error:
-        return LoopCheck(what=what, found=f"with tighter ones {error}", status="fail")
+        return f"with tighter ones {error}", "fail"
     scale = np.maximum(np.ptp(response.y, axis=1), np.finfo(float).tiny)
     off = np.max(np.abs(again.y - response.y), axis=1) / scale
     worst = int(np.argmax(off))
@@ -162,40 +158,37 @@ def _tolerance(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck
         f"at rtol {_TIGHTER * RTOL:.0e} {response.output_labels[worst]} differs most, by "
         f"{off[worst]:.1e} of its range"
     )
-    return LoopCheck(what=what, found=finding, status="pass" if off[worst] <= _SAME else "caution")
+    return finding, "pass" if off[worst] <= _SAME else "caution"
 
 
-def _rest(loop: Any, response: Any, params: Mapping[str, Any]) -> LoopCheck:
+def _rest(loop: Any, response: Any, params: dict[str, Any]) -> _Answer:
     """Say whether the loop is at rest at the end, and what its linearisation there says."""
-    what = "The state at the end is a stable equilibrium"
     if not (ct.isctime(loop) and loop.nstates):
-        return LoopCheck(what=what, found="the loop has no rates", status="not applicable")
+        return "the loop has no rates", "not applicable"
     delayed = supplied_blocks(loop, PAST)
     if delayed:
         finding = (
             f"'{delayed[0].name}' delays its signals, and what is on the way is not a state; "
             "nlctl.frequency_response is exact with delays, and so are margins of it"
         )
-        return LoopCheck(what=what, found=finding, status="not applicable")
+        return finding, "not applicable"
     t, x, u = float(response.time[-1]), response.x[:, -1], response.u[:, -1]
     share = _still_moves(loop, response, params)
     if not np.max(share) <= _REST:
         name = response.state_names[int(np.argmax(share))]
-        return LoopCheck(what=what, found=f"{name} still moves at the end", status="not applicable")
+        return f"{name} still moves at the end", "not applicable"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InexactWarning)  # that is said in another line
-            linear = native.compile(loop, params=dict(params)).linearize(x, u, t, dict(params))
+            linear = native.compile(loop, params=params).linearize(x, u, t, params)
     except UsageError as error:
-        return LoopCheck(what=what, found=str(error), status="not applicable")
+        return str(error), "not applicable"
     poles, per_period = np.linalg.eigvals(linear.A), not linear.isctime()
     size = "absolute value" if per_period else "real part"
     slowest = float(np.max(np.abs(poles) if per_period else poles.real))
     finding = f"the largest {size} of an eigenvalue of its linearisation is {slowest:.4g}"
     finding += f", per {linear.dt:g} s" if per_period else " 1/s"
-    return LoopCheck(
-        what=what, found=finding, status="pass" if slowest < float(per_period) else "caution"
-    )
+    return finding, "pass" if slowest < float(per_period) else "caution"
 
 
 def _still_moves(loop: Any, response: Any, params: Mapping[str, Any]) -> np.ndarray:
@@ -209,3 +202,11 @@ def _still_moves(loop: Any, response: Any, params: Mapping[str, Any]) -> np.ndar
         return np.ptp(late, axis=1) / _LATE / moved
     rates, _ = rates_and_outputs(loop, dict(params))(float(t[-1]), x[:, -1], response.u[:, -1])
     return np.abs(rates) * span / moved
+
+
+_CHECKS = {
+    "The equations of the run are python-control's": _engine,
+    "Steps end where equations switch": _switching,
+    "The run does not depend on its tolerances": _tolerance,
+    "The state at the end is a stable equilibrium": _rest,
+}

@@ -34,20 +34,6 @@ from nlctl.sampling.clock import moments
 from nlctl.sampling.system import Sampled, clocks_of, happening
 from nlctl.upstream.systems import System
 
-__all__ = [
-    "array_text",
-    "difference_text",
-    "fact_differences",
-    "facts_and_unseen",
-    "loop_facts",
-    "loop_values",
-    "short_key",
-    "text_key",
-    "unseen_parts",
-    "value_text",
-    "values_differ",
-]
-
 _T = TypeVar("_T")
 _EQUATIONS = ("update", "output", "switching", "commit")
 SHAPE = ("inputs", "outputs", "states", "feedthrough", "vector", "memory", "initial")

@@ -21,8 +21,6 @@ from nlctl.sliding.relay import SLIDING
 from nlctl.upstream.systems import System, SystemResponse
 from nlctl.wording import counted
 
-__all__ = ["check_response", "check_shape", "own_outputs", "own_parameters"]
-
 _PLACES = 12  # samples, and spans between samples, that are compared
 _SHORTEST = 1 / 200  # of the response: over shorter spans its states hardly move
 _FOLLOWS = 1e-2  # of how far a state moves in a span

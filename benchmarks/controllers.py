@@ -35,14 +35,14 @@ def seconds(loop: nlctl.native.Compiled) -> float:
 
 def main() -> None:
     """Print the table, and what the records say."""
-    loops = {g.name: compiled(g.code) for g in GUIDES if g.time is not None}
+    loops = {g.name: compiled(g.code) for g in GUIDES if g.costs.time is not None}
     rounds = [{name: seconds(loop) for name, loop in loops.items()} for _ in range(ROUNDS)]
     spent = {name: min(timed[name] for timed in rounds) for name in loops}
     table = Table("controller", "ms a run", "with PID as 1", "recorded")
     for guide in GUIDES:
         if guide.name in spent:
             ratio = spent[guide.name] / spent["PID"]
-            row = (f"{spent[guide.name] * 1e3:.1f}", f"{ratio:.2g}", f"{guide.time:g}")
+            row = (f"{spent[guide.name] * 1e3:.1f}", f"{ratio:.2g}", f"{guide.costs.time:g}")
             table.add_row(guide.name, *row)
     Console().print(table)
 

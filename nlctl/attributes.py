@@ -51,29 +51,30 @@ def described_record(cls: Any = None, /, *, made_by: str = "", **options: bool) 
 
 def with_returned(function: Any) -> str | None:
     """Return the docstring of a function, with the section Returns for a described record."""
-    text, name = function.__doc__, function.__annotations__.get("return")
+    name, text = function.__annotations__.get("return"), inspect.cleandoc(function.__doc__ or "")
     docstring = vars(function.__globals__.get(name, object)).get("__doc__")
-    if not text or not isinstance(docstring, _Docstring) or "Returns\n    ---" in text:
-        return text
+    if not text or not isinstance(docstring, _Docstring) or "Returns\n---" in text:
+        return function.__doc__
     summary = docstring.text.partition("\n\n")[0]
-    return _with_section(
-        inspect.cleandoc(text), f"Returns\n-------\n{name}\n    {summary}", after_parameters=True
-    )
+    section = f"Returns\n-------\n{name}\n    {summary}"
+    return _with_section(text, section, after_parameters=True)
 
 
 def with_parameters_of(other: Any) -> Callable[[_F], _F]:
     """Return a decorator: parameters that a docstring does not describe are as another one has."""
+    # `other` is a function, or a docstring.
 
     def completed(function: _F) -> _F:
-        text, others = (inspect.cleandoc(one.__doc__ or "") for one in (function, other))
+        described = other if isinstance(other, str) else other.__doc__
+        text, others = (inspect.cleandoc(one or "") for one in (function.__doc__, described))
         if text:
             known = _parameters(others) | _parameters(text)
             names = inspect.signature(function).parameters
             entries = dict.fromkeys(known[name] for name in names if name in known)
             head, _, rest = text.partition(_PARAMETERS)
             behind = _SECTION.search(rest)
-            rest = f"\n\n{rest[behind.start() :]}" if behind else ""
-            function.__doc__ = head + _PARAMETERS + "\n".join(entries) + rest
+            others = head + (rest[behind.start() :] if behind else "")
+            function.__doc__ = _with_section(others, _PARAMETERS + "\n".join(entries))
         return function
 
     return completed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -27,14 +27,23 @@ def draws(function: _F) -> _F:
     return as_annotated(function)
 
 
+def panels(
+    height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure as wide as the page with axes in rows; options as of `Figure.subplots`."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    axes = list(np.ravel(figure.subplots(rows, columns, **options)))
+    for ax in axes:
+        set_style(ax)
+    return figure, axes
+
+
 def number_axes(names: Iterable[object]) -> tuple[Figure, Axes]:
     """Return axes with one line for each name, from the top: names may be alike once cut."""
     labels = [plain(name) for name in names]
     if not labels:
         raise ValueError("there are no rows to draw")
-    figure = Figure(figsize=(WIDTH, 0.32 * len(labels) + 0.9), layout="constrained")
-    ax = figure.subplots()
-    set_style(ax)
+    figure, (ax,) = panels(0.32 * len(labels) + 0.9)
     ax.set_yticks(np.arange(len(labels)), labels, parse_math=False)
     ax.set_ylim(len(labels) - 0.4, -0.6)
     return figure, ax

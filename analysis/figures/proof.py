@@ -18,15 +18,13 @@ from nlctl.plotting.axes import (
     SHORT_LINE,
     STYLES,
     TIME,
-    WIDTH,
     legend_above,
-    set_style,
     stacked_axes,
 )
 
 from ..lyapunov.loop.signals import Margin
 from ..lyapunov.nussbaum.long_run import LongRun
-from .labels import draws
+from .labels import draws, panels
 
 
 @draws
@@ -38,11 +36,9 @@ def burst(run: LongRun) -> Figure:
     run : LongRun
         A run that ends in a burst.
     """
-    figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")
-    (whole, end), (error, signals) = figure.subplots(2, 2, sharex="col", width_ratios=(1.25, 1))
+    figure, axes = panels(4.6, 2, 2, sharex="col", width_ratios=(1.25, 1))
+    whole, end, error, signals = axes
     time, s = run.time, run.signals
-    for ax in (whole, end, error, signals):
-        set_style(ax)
     for ax, across in ((whole, time), (end, left := run.time[-1] + 1e-5 - time)):
         ax.axhline(run.lobe.high, color=GREY, linewidth=1.0, linestyle="--")
         ax.plot(across, s["zeta"], "-", color=BLUE, linewidth=1.4)
@@ -84,10 +80,7 @@ def story(time: np.ndarray, y: np.ndarray, yd: np.ndarray, run: LongRun | None) 
     run : LongRun or None
         The same loop until its burst; without it only the output is drawn.
     """
-    figure = Figure(figsize=(WIDTH, 2.3 if run is None else 4.2), layout="constrained")
-    axes = np.ravel(figure.subplots(1 if run is None else 2, 1))
-    for ax in axes:
-        set_style(ax)
+    figure, axes = panels(2.3) if run is None else panels(4.2, 2)
     axes[0].plot(time, yd, "--", color=GREY, linewidth=1.6, label="reference $y_d$")
     axes[0].plot(time, y, "-", color=BLUE, linewidth=1.4, label="output $y$")
     legend_above(axes[0])
@@ -231,12 +224,10 @@ def equality_residuals(margins: Sequence[Margin]) -> Figure:
 def _panels(margins: Sequence[Margin], *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
     """Two panels in a row, one for each margin, with its number as the title."""
     rows = -(-len(margins) // 2)
-    figure = Figure(figsize=(WIDTH, 1.45 * rows + 0.3), layout="constrained")
-    axes = list(np.ravel(figure.subplots(rows, 2, sharex=True, sharey=sharey, squeeze=False)))
+    figure, axes = panels(1.45 * rows + 0.3, rows, 2, sharex=True, sharey=sharey)
     for ax in axes[len(margins) :]:
         ax.set_axis_off()
     for ax, margin in zip(axes, margins, strict=False):
-        set_style(ax)
         ax.set_title(margin.equation, fontsize="medium", loc="left")
     for ax in axes[: len(margins)][-2:]:
         ax.set_xlabel(TIME)
@@ -265,9 +256,7 @@ def bounds(values: Mapping[str, tuple[float, str]]) -> Figure:
     """
     shown = {name: pair for name, pair in values.items() if np.isfinite(pair[0])}
     numbers = [number for number, _ in shown.values()]
-    figure = Figure(figsize=(WIDTH, 0.3 * len(shown) + 0.6), layout="constrained")
-    ax = figure.subplots()
-    set_style(ax)
+    figure, (ax,) = panels(0.3 * len(shown) + 0.6)
     for kind, colour in (("proved", GREEN), ("along this run", BLUE), ("what happens", GREY)):
         places = [i for i, (_, group) in enumerate(shown.values()) if group == kind]
         bars = ax.barh(places, [numbers[i] for i in places], 0.55, color=colour, label=kind)

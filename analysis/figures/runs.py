@@ -15,22 +15,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
-from nlctl.plotting.axes import (
-    BLUE,
-    GREY,
-    ORANGE,
-    SHORT_LINE,
-    TIME,
-    WIDTH,
-    legend_above,
-    set_style,
-    stacked_axes,
-)
+from nlctl.plotting.axes import BLUE, GREY, ORANGE, SHORT_LINE, TIME, legend_above, stacked_axes
 from nlctl.plotting.bands import Limit, bands
 from nlctl.plotting.labels import plain
 
 from ..robustness.stl.spec import violates
-from .labels import arms, draws, within_reach
+from .labels import arms, draws, panels, within_reach
 
 CLIP = 2.0
 """Margins below -CLIP are drawn at -CLIP: beyond, how far says little."""
@@ -52,8 +42,7 @@ def margins_figure(values: np.ndarray) -> Figure:
     values : ndarray of shape (runs,)
         Margins; those of runs that ended early are drawn at the edge.
     """
-    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
-    counts, part = figure.subplots(1, 2)
+    figure, (counts, part) = panels(2.6, 1, 2)
     y = clipped_margins(values)
     violated = violates(y)
     low, high = min(float(y.min()), 0.0), max(float(y.max()), 0.0)
@@ -76,7 +65,6 @@ def margins_figure(values: np.ndarray) -> Figure:
     part.set(xlabel="margin (1)", ylabel="share of runs", ylim=(0.0, 1.02))
     part.yaxis.set_major_formatter(PercentFormatter(1.0, symbol="\N{NO-BREAK SPACE}%"))
     for ax in (counts, part):
-        set_style(ax)
         ax.xaxis.set_major_locator(MaxNLocator(4))  # of -0.25 and the like there is room for
     counts.yaxis.set_major_locator(MaxNLocator(integer=True))
     return figure

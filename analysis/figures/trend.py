@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, WIDTH, legend_above, set_style
+from nlctl.plotting.axes import BLUE, GREY, LINE, ORANGE, legend_above
 from nlctl.plotting.labels import plain
 
-from .labels import draws
+from .labels import draws, panels
 
 _LOOKS = {  # how a claim ended: colour, marker, word
     "holds": (BLUE, "o", "holds"),
@@ -43,12 +43,9 @@ def trend(
         By name; what is not finite is a gap.
     """
     heights = [_FRAME / 2 + ROW * len(claims)] * bool(claims) + [PANEL] * len(numbers)
-    figure = Figure(figsize=(WIDTH, sum(heights) + _FRAME), layout="constrained")
-    count = max(1, len(heights))
-    rows = list(np.ravel(figure.subplots(count, 1, sharex=True, height_ratios=heights or None)))
+    shape = {"sharex": True, "height_ratios": heights or None}
+    figure, rows = panels(sum(heights) + _FRAME, max(1, len(heights)), **shape)
     at = np.arange(len(labels))
-    for ax in rows:
-        set_style(ax)
     if claims:
         _marks(rows.pop(0), claims)
     for ax, (name, row) in zip(rows, numbers.items(), strict=False):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -10,40 +9,31 @@ import numpy as np
 from numba.extending import overload
 
 from nlctl.annotations import reporting
+from nlctl.attributes import with_parameters_of
 from nlctl.equations import equation
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_SAMPLES = {  # what arguments of the same name are, as an entry of a docstring
-    "t": "t : ndarray, shape (n,)\n    Sample times (s), increasing (two for integrals).\n",
-    "y": "y : ndarray, shape (n,)\n    Samples.\n",
-}
-_BREAKS = (
-    "breaks : ndarray, shape (m,), optional\n    Increasing times (s) at which y may jump or bend. "
-    " The limits there count as values.\n"
-)
+
+
+_SHARED = """What arguments of the same name are.
+
+Parameters
+----------
+t : ndarray, shape (n,)
+    Sample times (s), increasing (two for integrals).
+y : ndarray, shape (n,)
+    Samples.
+breaks : ndarray, shape (m,), optional
+    Increasing times (s) at which y may jump or bend.  The limits there count as values.
+"""
 
 
 def of_samples(function: _F) -> _F:
     """Mark a function of samples as an equation that says which argument is not as annotated."""
-    if function.__doc__:  # Python has none with -OO
-        function.__doc__ = _described(function, function.__doc__)
-    plain = equation(function)
+    plain = equation(with_parameters_of(_SHARED)(function))
     called = reporting(plain, function.__name__, _lengths)
     overload(called, strict=False)(lambda *_, **__: plain)
     return called
-
-
-def _described(function: Any, text: str) -> str:
-    """Return a docstring with what all of them take: times and samples first, breaks last."""
-    names, doc = inspect.signature(function).parameters, inspect.cleandoc(text)
-    shared = "".join(entry for name, entry in _SAMPLES.items() if name in names)
-    if not shared:
-        return doc
-    before, _, after = doc.partition("\n\nReturns\n")
-    summary, _, others = before.partition("\n\nParameters\n----------\n")
-    entries = f"{shared}{others}\n" if others else shared
-    section = f"Parameters\n----------\n{entries}{_BREAKS if 'breaks' in names else ''}"
-    return f"{summary}\n\n{section}\nReturns\n{after}"
 
 
 def _lengths(given: Mapping[str, Any]) -> str | None:

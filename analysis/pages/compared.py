@@ -37,6 +37,7 @@ _NUMBER_COLUMNS = (
     "number", "before", "after", "after − before", "share of the larger", "tolerance",
 )  # fmt: skip
 _LINE = re.compile(r"^numbers\.(study\.)?(tables|running estimate)\b")  # of a table of a study
+_NO_SIGNALS = "No chart of signals over time is next to both pages (signals.json)."
 _TOLD_APART = ("title", "verdict", "question", "revision", "date")
 
 
@@ -63,21 +64,21 @@ def comparison_page(
     differences = differing_numbers(first.content, second.content, rtol, common=common)
     claims = claim_changes(first.content["claims"], second.content["claims"])
     numbers, words = _sorted_out(differences)
-    pictures = [
-        *figure_changes([c.content for c in (first, second)], [first.folder, second.folder])
-    ]
+    folders = (first.folder, second.folder)
+    pictures = [*figure_changes((first.content, second.content), folders)]
     curves = [*_signal_items(curves_of(first.folder), curves_of(second.folder), rtol)]
     sections = [
         _claims_section(claims),
         _numbers_section(numbers, rtol),
-        _signals_section(curves),
+        _section("signal_changes", "Signals of both over time", curves, _NO_SIGNALS),
         _figures_section(pictures),
         _words_section(words, others),
         _compared_section(first, second),
     ]
+    titles = dict.fromkeys(str(c.content["title"]) for c in (first, second))
     count = len(numbers) + len(words) + len(others) + sum(c.is_changed for c in claims)
     return Report(
-        title=_title(first, second),
+        title=f"Compared: {', and '.join(titles)}",
         question="what does the second report say that the first did not?",
         verdict=_verdict(claims, numbers, pictures, curves),
         headline=_headline(claims, count, len(pictures)),
@@ -87,11 +88,6 @@ def comparison_page(
         provenance=versions(),
         numbers={"differences": count, "rtol": rtol},
     )
-
-
-def _title(first: Compared, second: Compared) -> str:
-    titles = dict.fromkeys(str(c.content["title"]) for c in (first, second))
-    return f"Compared: {', and '.join(titles)}"
 
 
 def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headline:
@@ -106,15 +102,12 @@ def _headline(claims: Sequence[ClaimChange], count: int, figures_: int) -> Headl
             if len(claims) > 1
             else ("The claim ends as before" if claims else "Neither report makes a claim")
         )
-        return Headline(look="neutral" if count else "pass", text=f"{same}{_differ(count)}.")
+        differ = f"; {counted(count, 'difference')}" if count else ", and nothing differs"
+        return Headline(look="neutral" if count else "pass", text=f"{same}{differ}.")
     sentences = [f"{counted(len(c), 'claim')}: {_moved(*s)}" for s, c in moved.items()]
     worst = max(change.worse for change in claims)
     looks = {2: "fail", 1: "caution", 0: "neutral"}
     return Headline(look=looks.get(worst, "pass"), text=f"{'; '.join(sentences)}.")
-
-
-def _differ(count: int) -> str:
-    return f"; {counted(count, 'difference')}" if count else ", and nothing differs"
 
 
 def _moved(before: str, after: str) -> str:
@@ -211,13 +204,13 @@ def _numbers_section(numbers: Sequence[Difference], rtol: float) -> Section:
     close = f"further apart than {rtol:g} of the larger" if rtol else "that are not equal"
     lines = [one for one in numbers if _LINE.search(one.where)]
     main = [one for one in numbers if not _LINE.search(one.where)]
-    items: list[Item] = []
-    if main:
-        items.append(_numbers_table(f"Numbers {close}", main, rtol, folded=False))
-    if lines:
-        items.append(_numbers_table(f"Lines of tables {close}", lines, rtol, folded=True))
+    items = [
+        _numbers_table(f"{what} {close}", these, rtol, folded=these is lines)
+        for what, these in (("Numbers", main), ("Lines of tables", lines))
+        if these
+    ]
     none = f"No two numbers are {close.removeprefix('that are ')}."
-    return Section(key="number_changes", title="Numbers", items=items or [Paragraph(text=none)])
+    return _section("number_changes", "Numbers", items, none)
 
 
 def _numbers_table(
@@ -280,46 +273,30 @@ def _range_share(curves: Curves, name: str, apart: float) -> float:
     return apart / span if span else (0.0 if apart == 0 else np.nan)
 
 
-def _signals_section(curves: Sequence[Item]) -> Section:
-    none = "No chart of signals over time is next to both pages (signals.json)."
-    return Section(
-        key="signal_changes",
-        title="Signals of both over time",
-        items=list(curves) or [Paragraph(text=none)],
-    )
+def _section(
+    key: str, title: str, items: Sequence[Item], none: str, *, folded: bool = False
+) -> Section:
+    """Return a section; one without items says so."""
+    return Section(key=key, title=title, items=items or [Paragraph(text=none)], folded=folded)
 
 
 def _figures_section(pictures: Sequence[tuple[str, str, str]]) -> Section:
     other = [row for row in pictures if not row[2].endswith("as before")]
-    items: list[Item] = [Paragraph(text="Every figure is as before.")]
-    if other:
-        items = [
-            Table(caption="Figures that differ.", columns=("figure", "caption", "is"), rows=other)
-        ]
-    elif not pictures:
-        items = [Paragraph(text="There are no figures.")]
-    return Section(key="figure_changes", title="Figures", items=items)
+    table = Table(caption="Figures that differ.", columns=("figure", "caption", "is"), rows=other)
+    none = "Every figure is as before." if pictures else "There are no figures."
+    return _section("figure_changes", "Figures", [table] * bool(other), none)
 
 
 def _words_section(words: Sequence[Difference], others: Sequence[str]) -> Section:
-    rows = [(_place(d.where), d.first, d.second) for d in words[:_LISTED]]
-    items: list[Item] = []
-    if rows:
-        more = f" The first {_LISTED} of {len(words)}." * (len(words) > _LISTED)
-        items.append(
-            Table(
-                caption=f"Words, and what only one report has ({ABSENT} in the other).{more}",
-                columns=("place", "before", "after"),
-                rows=rows,
-            )
-        )
-    items += [Paragraph(text=f"{text}.") for text in others]
-    return Section(
-        key="word_changes",
-        title="What else differs",
-        items=items or [Paragraph(text="Nothing else differs.")],
-        folded=len(rows) > 10,
+    more = f" The first {_LISTED} of {len(words)}." * (len(words) > _LISTED)
+    table = Table(
+        caption=f"Words, and what only one report has ({ABSENT} in the other).{more}",
+        columns=("place", "before", "after"),
+        rows=[(_place(d.where), d.first, d.second) for d in words[:_LISTED]],
     )
+    items = [table] * bool(words) + [Paragraph(text=f"{text}.") for text in others]
+    none, folded = "Nothing else differs.", len(words) > 10
+    return _section("word_changes", "What else differs", items, none, folded=folded)
 
 
 def _compared_section(first: Compared, second: Compared) -> Section:

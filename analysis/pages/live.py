@@ -20,7 +20,7 @@ from nlctl.responses.arguments import state_array
 from nlctl.responses.time_response import as_response
 
 from ..report.document import Live
-from ..robustness.stl.formula import Always, And, Band, Eventually, Formula, Not
+from ..robustness.stl.formula import And, Band, Formula, Not, Temporal
 from ..robustness.stl.spec import Requirement, limits_of_requirements
 from .study.histories import Histories
 
@@ -188,10 +188,8 @@ def _formula(formula: Formula) -> list[Any]:
             return ["not", _formula(formula.part)]
         case And():
             return ["and", *map(_formula, formula.parts)]
-        case Always():
-            return ["always", _formula(formula.part), formula.start, _finite(formula.end)]
-        case Eventually():
-            return ["eventually", _formula(formula.part), formula.start, _finite(formula.end)]
+        case Temporal():
+            return [formula.word, _formula(formula.part), formula.start, _finite(formula.end)]
     raise TypeError(f"no formula: {formula!r}")
 
 

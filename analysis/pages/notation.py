@@ -8,6 +8,7 @@ symbol of the paper, a function, or a single letter; numbers and signs next to i
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 
@@ -42,7 +43,7 @@ def formulas(words: str) -> str:
     for kind, token in _tokens(words):
         if kind in ("integral", "function", "name", "number", "sign", "space", "label"):
             run.append((kind, token))
-        elif token == "," and _depth(run) > 0:
+        elif token == "," and _depths(run)[-1] > 0:
             run.append(("sign", token))
         else:
             text, run = text + _segment(run) + token, []
@@ -57,21 +58,16 @@ def _tokens(words: str) -> Iterator[tuple[str, str]]:
         alone = before[-1] in ("", "space", "other", "word")
         if kind == "name" and token in ARTICLES and alone and words[match.end() :][:1] == " ":
             kind = "word"
-        if (
-            kind == "name"
-            and token == "s"
-            and before[1] == "space"
-            and before[0] in ("number", "]")
-        ):
+        if kind == "name" and token == "s" and before in (["number", "space"], ["]", "space"]):
             kind = "word"
         yield kind, token
         before = [before[-1], token if token == "]" else kind]
 
 
-def _depth(run: list[tuple[str, str]]) -> int:
-    """Return how many brackets of a run are open."""
+def _depths(run: list[tuple[str, str]]) -> list[int]:
+    """Return how many brackets of a run are open, at first and after each of its signs."""
     signs = [token for kind, token in run if kind == "sign"]
-    return sum(s in OPENING for s in signs) - sum(s in _CLOSING for s in signs)
+    return [0, *itertools.accumulate((s in OPENING) - (s in _CLOSING) for s in signs)]
 
 
 def _segment(run: list[tuple[str, str]]) -> str:
@@ -85,19 +81,10 @@ def _segment(run: list[tuple[str, str]]) -> str:
     while end - 1 > named[-1] and run[end - 1][0] in ("space", "label"):
         end -= 1
     before, after = ("".join(token for _, token in part) for part in (run[:start], run[end:]))
-    if _unbalanced(run[start:end]):
+    depths = _depths(run[start:end])
+    if min(depths) < 0 or depths[-1] > 0:
         return _without_brackets(run)
     return rf"{before}\({_latex(run[start:end])}\){after}"
-
-
-def _unbalanced(run: list[tuple[str, str]]) -> bool:
-    depth = 0
-    for kind, token in run:
-        if kind == "sign":
-            depth += (token in OPENING) - (token in _CLOSING)
-        if depth < 0:
-            return True
-    return depth > 0
 
 
 def _without_brackets(run: list[tuple[str, str]]) -> str:
@@ -114,10 +101,9 @@ def _without_brackets(run: list[tuple[str, str]]) -> str:
 def _latex(run: list[tuple[str, str]]) -> str:
     """Return the LaTeX of tokens; factors that a space sets apart get a thin one."""
     latex = ""
-    tokens = list(run)
-    for place, (kind, token) in enumerate(tokens):
+    for place, (kind, token) in enumerate(run):
         if kind == "space":
-            sides = tokens[place - 1], tokens[place + 1]
+            sides = run[place - 1], run[place + 1]
             latex += r"\," if all(map(_is_factor, sides, (True, False))) else ""
         elif kind == "name":
             latex += _name(token)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..json_values import from_json
+from ..loop_record import text_key
 from .document import Claim
 from .history import SIGNALS_FILE
 from .outline import claim_status
@@ -182,17 +182,13 @@ def drawings(page: Path) -> dict[str, str]:
     except OSError:
         return {}
     shapes = dict(_SHAPE.findall(text[text.rfind('<svg class="shapes"') :]))
-    letters = {name: _digest(drawn) for name, drawn in shapes.items()}  # words are made of them
-    shapes = {name: _digest(_with_shapes(drawn, letters)) for name, drawn in shapes.items()}
+    letters = {name: text_key(drawn) for name, drawn in shapes.items()}  # words are made of them
+    shapes = {name: text_key(_with_shapes(drawn, letters)) for name, drawn in shapes.items()}
     return {
-        anchor: _digest(_with_shapes(_WORDS.sub("", drawn), shapes).replace(f'"{anchor}-', '"'))
+        anchor: text_key(_with_shapes(_WORDS.sub("", drawn), shapes).replace(f'"{anchor}-', '"'))
         for anchor, drawn in _FIGURE.findall(text)
     }
 
 
 def _with_shapes(drawn: str, shapes: dict[str, str]) -> str:
     return _USED.sub(lambda match: f'"{shapes.get(match[1], "")}"', drawn)
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -95,9 +95,8 @@ def differing_numbers(
 ) -> list[Difference]:
     """Compare two reports as `compare_contents` does, given what is in their files."""
     _check_tolerance(rtol)
-    reports = (first, second)
-    both = set(reports[0]["sections"]) & set(reports[1]["sections"])
-    one, two = (_flat(report, both if common else set(report["sections"])) for report in reports)
+    both = set(first["sections"]) & set(second["sections"])
+    one, two = (_flat(r, both if common else set(r["sections"])) for r in (first, second))
     return [
         Difference(where=where, first=one.get(where, ABSENT), second=two.get(where, ABSENT))
         for where in dict.fromkeys([*one, *two])

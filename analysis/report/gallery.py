@@ -17,7 +17,7 @@ from .compare import read_report
 from .document import Claim, Figure, Headline
 from .outline import claim_status, summary
 from .page import check_gallery_folder, fill, write_files
-from .svg import shapes_svg, svg, svg_files
+from .svg import inline_drawings
 from .trends import Revision, Trend, trends
 
 
@@ -155,11 +155,7 @@ def _history(listed: Sequence[Entry], draw: Callable[[Trend], Figure] | None) ->
         if e.readable
     )
     pictures = [] if draw is None else [draw(trend) for trend in several]
-    shapes: dict[str, str] = {}
-    drawn = [
-        svg(figure, file, f"trend-{number}", shapes)
-        for number, (figure, file) in enumerate(
-            zip(pictures, svg_files([p.figure for p in pictures]), strict=True), 1
-        )
-    ]
-    return {"trends": several, "pictures": pictures, "drawn": drawn, "shapes": shapes_svg(shapes)}
+    keyed = {f"trend-{number}": figure for number, figure in enumerate(pictures, 1)}
+    drawings, shapes = inline_drawings(keyed)
+    drawn = list(drawings.values())
+    return {"trends": several, "pictures": pictures, "drawn": drawn, "shapes": shapes}

@@ -51,12 +51,15 @@ class NotMathError(ValueError):
 
 def mathml(equation: Equation) -> Markup:
     """Return a formula as MathML; one that cannot be read or trusted, as its LaTeX source."""
-    return _markup(equation.latex, "block")
+    return inline(equation.latex, "block")
 
 
-def inline(latex: str) -> Markup:
+def inline(latex: str, display: str = "inline") -> Markup:
     """Return a formula inside a line of text; else as `mathml`."""
-    return _markup(latex, "inline")
+    root = _tree(latex, display)
+    if root is None:
+        return Markup("<code>{}</code>").format(latex)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
 
 
 def spoken(latex: str) -> str:
@@ -86,13 +89,6 @@ def _letters(element: ElementTree.Element) -> str:
     spaced = element.tag == "mo" and text in _BINARY and element.get("form") != "prefix"
     row = f" {text} " if spaced else text + "".join(parts)
     return f"−{row[3:]}" if row.startswith(" − ") and parts else row  # the sign of the first term
-
-
-def _markup(latex: str, display: str) -> Markup:
-    root = _tree(latex, display)
-    if root is None:
-        return Markup("<code>{}</code>").format(latex)
-    return Markup(ElementTree.tostring(root, encoding="unicode"))
 
 
 def _tree(latex: str, display: str) -> ElementTree.Element | None:

@@ -88,9 +88,10 @@ def place_anchors(report: Report) -> list[Placed]:
     for section, heading in zip(report.sections, headings, strict=True):
         items = []
         for item in section.items:
-            drawn = isinstance(item, Figure | History | Live)
-            proposed = item.key if drawn else f"{heading}-{kind(item)}"
-            anchor = _anchor(proposed, taken, ("-title", "-desc")) if _has_anchor(item) else ""
+            anchor = ""
+            if isinstance(item, Table | Figure | History | Live):
+                key = f"{heading}-table" if isinstance(item, Table) else item.key
+                anchor = _anchor(key, taken, ("-title", "-desc"))
             items.append((anchor, kind(item), item))
         level = min(max(section.level, 2), 6)
         placed.append(Placed(anchor=heading, level=level, section=section, items=items))
@@ -106,10 +107,6 @@ def evidence_anchors(placed: Sequence[Placed]) -> Mapping[str, str]:
 def kind(item: Item) -> str:
     """Return what an item is, as the template and ``report.json`` call it."""
     return type(item).__name__.lower()
-
-
-def _has_anchor(item: Item) -> bool:
-    return isinstance(item, Table | Figure | History | Live)
 
 
 def _anchor(key: str, taken: set[str], endings: Sequence[str]) -> str:
@@ -131,8 +128,8 @@ def cells(table: Table) -> list[list[TableCell]]:
     badges = (table.status,) if isinstance(table.status, str) else table.status
     return [
         [
-            _link(value)
-            if table.links and title == table.links
+            TableCell(text=_shown(value), target=_shown(value))
+            if table.links and title == table.links  # it holds the key of a section or figure
             else _cell(value, bool(title) and title in badges)
             for title, value in zip_longest(titles, row, fillvalue="")
         ]
@@ -159,11 +156,6 @@ def _cell(value: object, is_status: bool) -> TableCell:
     if is_status:
         return TableCell(text=text, badge=light(text))
     return TableCell(text=text, value=sort_key(value))
-
-
-def _link(value: object) -> TableCell:
-    """Return a cell that holds the key of a section or figure."""
-    return TableCell(text=_shown(value), target=_shown(value))
 
 
 def is_long(text: str) -> bool:

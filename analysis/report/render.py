@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from nlctl.annotations import as_annotated
-from nlctl.attributes import described_record
+from nlctl.attributes import described_record, with_parameters_of
 from nlctl.errors import ParameterError
 
 from ..json_values import as_json
@@ -26,11 +26,15 @@ from .document import Figure, History, Item, Live, Report, Table
 from .history import SIGNALS_FILE, chart, signals_json
 from .outline import evidence_anchors, kind, meanings, place_anchors, summary
 from .page import check_report_folder, fill, to_bytes, write_files
-from .svg import NONE_DRAWN, Drawn, shapes_svg, svg, svg_files
+from .svg import NONE_DRAWN, Drawn, inline_drawings
 from .typography import plain_text
 
 RARE = ("ids", "links")
 DRAWN = ("figure", "time", "signals", "bands", "program")  # curves are on the page only
+_IN_FILE = (  # in this order
+    *("title", "question", "verdict", "author", "revision", "date", "lead", "claims", "sections"),
+    *("numbers", "command", "methods", "limits", "references", "provenance", "inputs", "files"),
+)
 _TITLES = {
     "methods": "Methods",
     "limits": "Limits of validity",
@@ -74,15 +78,11 @@ def render_html(
     items = {anchor: item for part in placed for anchor, _, item in part.items}
     figures = {} if report.lead is None else {"lead": report.lead}
     figures |= {anchor: item for anchor, item in items.items() if isinstance(item, Figure)}
-    files = svg_files([figure.figure for figure in figures.values()], pool, drawn)
-    shapes: dict[str, str] = {}
-    drawings = {
-        anchor: svg(figure, file, anchor, shapes)
-        for (anchor, figure), file in zip(figures.items(), files, strict=True)
-    }
+    drawings, shapes = inline_drawings(figures, pool, drawn)
     shown = items.items() if interactive else ()
     charts = {anchor: chart(item) for anchor, item in shown if isinstance(item, History)}
-    data_files = _own_files(report)
+    texts = _texts_of(report).items()
+    data_files = {name: hashlib.sha256(to_bytes(text)).hexdigest() for name, text in texts}
     return fill(
         "report.html",
         interactive=bool(charts),
@@ -92,7 +92,7 @@ def render_html(
         byline=_byline(report),
         placed=placed,
         drawings=drawings,
-        shapes=shapes_svg(shapes),
+        shapes=shapes,
         evidence=evidence_anchors(placed),
         extra={k: t for k, t in _TITLES.items() if getattr(report, k) or k == "provenance"},
         light=light,
@@ -109,14 +109,10 @@ def render_html(
     )
 
 
-def _own_files(report: Report) -> dict[str, str]:
-    """Return the files next to a page with their SHA-256."""
+def _texts_of(report: Report) -> dict[str, str]:
+    """Return the files next to a page."""
     texts = {"report.json": render_json(report), SIGNALS_FILE: signals_json(report)}
-    return {name: _digest(text) for name, text in texts.items() if text}
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(to_bytes(text)).hexdigest()
+    return {name: text for name, text in texts.items() if text}
 
 
 def _byline(report: Report) -> str:
@@ -154,13 +150,7 @@ def render_json(report: Report) -> str:
     >>> json.loads(render_json(report))["numbers"]
     {'e': 0.14, 'settling': 'inf'}
     """
-    content = {
-        "title": report.title,
-        "question": report.question,
-        "verdict": report.verdict,
-        "author": report.author,
-        "revision": report.revision,
-        "date": report.date,
+    content = {name: getattr(report, name) for name in _IN_FILE} | {
         "lead": None if report.lead is None else _plain(report.lead),
         "claims": [_said(vars(claim)) for claim in report.claims],
         "sections": {
@@ -170,14 +160,6 @@ def render_json(report: Report) -> str:
             }
             for part in place_anchors(report)
         },
-        "numbers": report.numbers,
-        "command": report.command,
-        "methods": report.methods,
-        "limits": report.limits,
-        "references": report.references,
-        "provenance": report.provenance,
-        "inputs": report.inputs,
-        "files": report.files,
     }
     if report.headline is not None:
         content["headline"] = vars(report.headline)
@@ -194,6 +176,7 @@ def _said(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @as_annotated
+@with_parameters_of(render_html)
 def write_report(
     report: Report,
     folder: str | os.PathLike[str],
@@ -209,18 +192,12 @@ def write_report(
 
     Parameters
     ----------
-    report : Report
-        What is written.
     folder : path
         Made where it does not exist.
     interactive : bool, optional
         As in `render_html`; ``report.json`` is the same either way.
     force : bool, optional
         Whether files of these names are replaced that no report has made.
-    pool : concurrent.futures.Executor, optional
-        As in `render_html`.
-    drawn : mapping, optional
-        As in `render_html`.
 
     Returns
     -------
@@ -252,10 +229,9 @@ def write_report(
     if not force:
         check_report_folder(folder)
     page = render_html(report, interactive=interactive, pool=pool, drawn=drawn)
-    signals = signals_json(report)
-    texts = {SIGNALS_FILE: signals} if signals else {}
-    write_files(folder, {"report.json": render_json(report), **texts, "index.html": page})
-    if not signals:
+    texts = _texts_of(report)
+    write_files(folder, texts | {"index.html": page})
+    if SIGNALS_FILE not in texts:
         (folder / SIGNALS_FILE).unlink(missing_ok=True)  # of a page that was here before
     return folder / "index.html"
 

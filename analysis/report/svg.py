@@ -50,6 +50,19 @@ Drawn = Mapping[MatplotlibFigure, bytes]  # figures and their SVG files
 NONE_DRAWN: Drawn = MappingProxyType({})
 
 
+def inline_drawings(
+    figures: Mapping[str, Figure], pool: Executor | None = None, drawn: Drawn = NONE_DRAWN
+) -> tuple[dict[str, Markup], Markup]:
+    """Return the figures of a page as inline SVG by their keys, and the shapes that they share."""
+    files = svg_files([figure.figure for figure in figures.values()], pool, drawn)
+    shapes: dict[str, str] = {}
+    drawings = {
+        key: svg(figure, file, key, shapes)
+        for (key, figure), file in zip(figures.items(), files, strict=True)
+    }
+    return drawings, shapes_svg(shapes)
+
+
 def svg_files(
     figures: Sequence[MatplotlibFigure], pool: Executor | None = None, drawn: Drawn = NONE_DRAWN
 ) -> list[bytes]:

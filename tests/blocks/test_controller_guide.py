@@ -59,12 +59,12 @@ def test_what_is_measured_and_what_it_costs(name):
     """Its inputs, its states and its parameters are counted on the controller itself."""
     guide, made = BY_NAME[name], system(name)
     assert tuple(made.input_labels) == guide.measured
-    assert made.nstates == guide.states
-    assert len(nlctl.parameters(made)) == guide.parameters
+    assert made.nstates == guide.costs.states
+    assert len(nlctl.parameters(made)) == guide.costs.parameters
 
 
 @pytest.mark.slow
-@each_row("name", [guide.name for guide in GUIDES if guide.time is not None])
+@each_row("name", [guide.name for guide in GUIDES if guide.costs.time is not None])
 def test_a_proof_is_one_that_certify_finds(name):
     """The kind that fits the loop of Example 1 with it, and none where none is named."""
     loop = nlctl.paper.example_1(controller=MADE[name])

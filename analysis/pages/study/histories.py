@@ -22,7 +22,7 @@ from ...studies.result import Result
 from ...studies.run import reopened
 from ...studies.sealed import RunFolderError, as_written
 
-_MOST = 4  # signals
+_MOST = 4  # signals that the spec looks at
 IN_UNIT = (  # metrics whose unit is that of their signal
     *(metrics.peak, metrics.rms, metrics.highest, metrics.spread, metrics.ultimate_bound),
     metrics.total_variation,
@@ -64,9 +64,10 @@ def histories(
     worst, margin = table.iloc[lowest].to_dict(), float(margins[lowest])
     if witness is not None and not witness[1] >= margin:
         worst, margin = nominal(space) | dict(witness[0]), float(witness[1])
-    count = min(most, len(table))
+    first = table.iloc[:most]
+    options = first[[choice.name for choice in space.choices]].astype(str)
     both = as_table(space, [nominal(space), {name: worst[name] for name in space.names}])
-    rows = pd.concat([both, table.loc[:, space.names].iloc[:count]], ignore_index=True)
+    rows = pd.concat([both, first[space.names]], ignore_index=True)
     signals, status = _kept(prepared, rows, threads)
     return Histories(
         time=np.asarray(prepared.experiment.timepts, dtype=float),
@@ -77,15 +78,8 @@ def histories(
         ended=int(np.sum(status[2:] != Status.OK.name)),
         limits=prepared.experiment.spec.limits,
         units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
-        groups=_groups(table.iloc[:count], [choice.name for choice in space.choices]),
+        groups=tuple(options.agg(", ".join, axis=1)) if space.choices else (),
     )
-
-
-def _groups(rows: pd.DataFrame, choices: Sequence[str]) -> tuple[str, ...]:
-    """Return the options of each row; nothing if there is nothing to choose."""
-    if not choices:
-        return ()
-    return tuple(rows[list(choices)].astype(str).agg(", ".join, axis=1))
 
 
 def _kept(
@@ -93,7 +87,7 @@ def _kept(
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Return signals and status of rows, which are numbered from 0."""
     study = prepared.experiment
-    names = _signals(study.spec.requirements)
+    names = list(dict.fromkeys(s for r in study.spec.requirements for s in r.signals))[:_MOST]
     kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
     status = np.full(len(rows), "", dtype=object)
     for loop, same in by_diagram(prepared, rows):
@@ -102,11 +96,6 @@ def _kept(
         for name in names:
             kept[name][same.index] = runs.signals[name]
     return kept, status
-
-
-def _signals(requirements: Sequence[Any]) -> list[str]:
-    """Return the signals that the spec looks at, each once."""
-    return list(dict.fromkeys(s for r in requirements for s in r.signals))[:_MOST]
 
 
 def loop_again(

@@ -9,7 +9,7 @@ from typing import Any
 from nlctl.response import input_output_response
 from nlctl.wording import counted
 
-from ...report.document import Report, Section
+from ...report.document import Report
 from ...robustness import Prepared, nominal
 from ...robustness.uncertainty.space import arguments_of_row
 from ...studies.result import Result
@@ -32,39 +32,30 @@ def with_study_live(
     space = experiment.space
     diagram: Any = loop_of(prepared).diagram
     given = arguments_of_row(space, nominal(space))
-    response = input_output_response(
+    response: Any = input_output_response(
         diagram, experiment.timepts, experiment.inputs, given["initial_state"],
         params=given["params"], rtol=experiment.rtol, atol=experiment.atol,
     )  # fmt: skip
     program = live_program(diagram, response, given["params"])
     boxes = [f"{q.name}={q.box[0]!r}:{q.box[1]!r}" for q in space.quantities if not q.is_integer]
+    watched = kept.signals if kept else {}  # by the spec; the page draws each in a row
     item = live_item(
         program, response, names or boxes, requirements=experiment.spec.requirements,
         histories=kept, command=_repeated(result, experiment, given), base=given["params"],
-        signals=_watched(kept, response),
+        signals=[name for name in watched if name in response.output_labels],
     )  # fmt: skip
-    runs = "" if kept is None else f" Shaded: 90 % of {counted(_runs(kept), 'run')} of the study."
-    item = replace(item, caption=item.caption + runs)
-    key = "study_fans" if kept is not None else report.sections[0].key
+    key = report.sections[0].key
+    if kept is not None:
+        key, runs = "study_fans", len(next(iter(kept.signals.values()), ()))
+        shaded = f" Shaded: 90 % of {counted(runs, 'run')} of the study."
+        item = replace(item, caption=item.caption + shaded)
+    sections = [
+        replace(section, items=[*section.items, *([item] if section.key == key else [])])
+        for section in report.sections
+    ]
     return replace(
-        report,
-        sections=[_with(section, item) if section.key == key else section
-                  for section in report.sections],
-        numbers={**report.numbers, "live": live_numbers(program)},
-    )  # fmt: skip
-
-
-def _with(section: Section, item: Any) -> Section:
-    return replace(section, items=[*section.items, item])
-
-
-def _runs(kept: Histories) -> int:
-    return len(next(iter(kept.signals.values()), ()))
-
-
-def _watched(kept: Histories | None, response: Any) -> list[str]:
-    """Return the outputs that the spec looks at, which the page draws in a row each."""
-    return [name for name in (kept.signals if kept else {}) if name in response.output_labels]
+        report, sections=sections, numbers={**report.numbers, "live": live_numbers(program)}
+    )
 
 
 def _repeated(result: Result, experiment: Any, given: dict[str, Any]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,38 +42,26 @@ def study_report(
     published: Published | None = None,
 ) -> Report:
     """Compose the report of a study."""
-    if any(":" in a.kind and a.definition.name != STAND_IN for a in result.study.analysis):
-        return _composed(
-            result, kept, command, loop, published
-        )  # their errors are reported as such
-    with as_written(f"'{result.folder}'"):
-        return _composed(result, kept, command, loop, published)
-
-
-def _composed(
-    result: Result,
-    kept: Histories | None,
-    command: str,
-    loop: StudyLoop | None,
-    published: Published | None,
-) -> Report:
-    paragraphs, sources = how.methods(result, published)
-    return Report(
-        title=result.study.study.title,
-        question=result.study.study.question,
-        verdict=without_assumptions(verdict(result)),
-        lead=_lead(result, kept),
-        claims=claims(result),
-        sections=study_sections(result, kept, loop, published, limits=False),
-        command=command,
-        provenance=_provenance(result),
-        numbers=numbers(result),
-        methods=paragraphs,
-        limits=[*how.limits(result), *result.notes],
-        references=sources,
-        inputs=_study_file(result.folder),
-        files=data_files(result.folder),
-    )
+    kinds = [a.definition for a in result.study.analysis if ":" in a.kind]
+    is_own = any(kind.name != STAND_IN for kind in kinds)  # their errors are reported as such
+    with nullcontext() if is_own else as_written(f"'{result.folder}'"):
+        paragraphs, sources = how.methods(result, published)
+        return Report(
+            title=result.study.study.title,
+            question=result.study.study.question,
+            verdict=without_assumptions(verdict(result)),
+            lead=_lead(result, kept),
+            claims=claims(result),
+            sections=study_sections(result, kept, loop, published, limits=False),
+            command=command,
+            provenance=_provenance(result),
+            numbers=numbers(result),
+            methods=paragraphs,
+            limits=[*how.limits(result), *result.notes],
+            references=sources,
+            inputs=_study_file(result.folder),
+            files=data_files(result.folder),
+        )
 
 
 def _provenance(result: Result) -> dict[str, str]:

@@ -17,7 +17,7 @@ from concurrent.futures import (
 )
 from dataclasses import replace
 from functools import lru_cache
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Any
 
 import cloudpickle
@@ -74,11 +74,8 @@ def computed_here(
     progress: Callable[[int], object] | None = None,
 ) -> Generator[Chunk, None, None]:
     """Yield chunk after chunk, until no more are wanted."""
-    for numbers in chunks:
-        if not wants_more():
-            return
-        results = chunk_table(prepared, design, numbers, threads=threads, progress=progress)
-        yield numbers, results
+    for numbers in takewhile(lambda _: wants_more(), chunks):
+        yield numbers, chunk_table(prepared, design, numbers, threads=threads, progress=progress)
 
 
 def computed_elsewhere(

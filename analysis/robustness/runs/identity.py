@@ -16,7 +16,7 @@ import pandas as pd
 
 from nlctl import errors
 
-from ...loop_record import array_text, loop_facts, short_key
+from ...loop_record import array_text, loop_facts, short_key, text_key
 from ...metrics import Metric
 from ..uncertainty.design import Design
 from ..uncertainty.quantity import Uncertain
@@ -52,7 +52,7 @@ def identity_of(
         },
         "study": dict(more or {}),
     }
-    return json.loads(json.dumps(content)) | {"sha256": _digest(json.dumps(content))}
+    return json.loads(json.dumps(content)) | {"sha256": text_key(json.dumps(content))}
 
 
 def experiment_facts(prepared: Prepared, space: Space | None = None) -> dict[str, Any]:
@@ -139,10 +139,6 @@ def _table(points: pd.DataFrame) -> str:
         is_number = values.dtype.kind in "iuf"
         digest.update(values.astype("<f8").tobytes() if is_number else repr(list(values)).encode())
     return f"{digest.hexdigest()[:16]} of shape {points.shape}"
-
-
-def _digest(content: str | bytes) -> str:
-    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 def differences_of(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

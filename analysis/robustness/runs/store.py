@@ -28,6 +28,7 @@ from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 from nlctl.wording import some_of
 
+from ...loop_record import text_key
 from .experiment import Columns, typed
 from .identity import differences_of
 from .parquet import parquet
@@ -158,7 +159,7 @@ def opened(folder: str | os.PathLike[str]) -> ChunkStore:
 
 
 def _key(content: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return text_key(json.dumps(content, sort_keys=True))
 
 
 def _write(store: ChunkStore, path: Path, content: bytes | memoryview) -> None:

@@ -304,7 +304,8 @@ class _Run:
             self.progress(self.tally.progress(unfinished))
 
     def consider(self) -> None:
-        """Ask whether the rows so far are enough."""
+        """Report the progress, and ask whether the rows so far are enough."""
+        self.report()
         if self.stop is not None and not self.decided:
             self.decided = self.stop(self.tally.progress()) or None
 
@@ -312,13 +313,11 @@ class _Run:
         self, chunks: Iterator[tuple[range, pd.DataFrame]], keep: Callable[[pd.DataFrame], object]
     ) -> list[str]:
         """Keep and count all chunks; return what went wrong."""
-        self.report()
         self.consider()
         try:
             for numbers, frame in chunks:
                 keep(frame)
                 self.tally.count(numbers, frame["spec"].to_numpy())
-                self.report()
                 self.consider()
         except LostChunkError as lost:
             return [str(lost)]

@@ -111,12 +111,8 @@ def confirm(
     table = as_table(study.space, [row])
     replays = []
     for experiment in (study, *(replace(tighter, method=method) for method in _OTHERS)):
-        row_result = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
-        replays.append(
-            _replay(
-                "native", experiment, row_result["status"], row_result["time"], row_result["spec"]
-            )
-        )
+        ended = evaluate(replace(prepared, experiment=experiment), table).iloc[0]
+        replays.append(_replay("native", experiment, *ended[["status", "time", "spec"]]))
     if python_control:
         replays.append(_in_python_control(prepared, tighter, row))
     table_of_replays = pd.DataFrame(replays)

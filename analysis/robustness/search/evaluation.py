@@ -17,6 +17,7 @@ from ..uncertainty.space import Space, moved, nominal
 # takes rows, returns a table with their index and a column ``spec``, > 0 holds; for a loop
 # ``functools.partial(evaluate, prepared)``
 Evaluate = Callable[[pd.DataFrame], pd.DataFrame]
+_Row = dict[str, Any]
 
 
 def evaluated(evaluate: Evaluate, table: pd.DataFrame) -> pd.DataFrame:
@@ -51,9 +52,14 @@ def as_table(space: Space, rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(list(rows), columns=space.names)
 
 
+def margins_at(evaluate: Evaluate, space: Space, rows: Iterable[Mapping[str, Any]]) -> np.ndarray:
+    """Evaluate rows given as ``{name: value}``, return their margins."""
+    return margins_of(evaluated(evaluate, as_table(space, rows)))
+
+
 def towards_nominal(
     space: Space, row: Mapping[str, Any], factor: float, names: Collection[str] | None = None
-) -> dict[str, Any]:
+) -> _Row:
     """Return the row with the deviations of numbers from nominal multiplied by `factor`."""
     middle = nominal(space)
 
@@ -64,6 +70,26 @@ def towards_nominal(
     return dict(row) | {
         q.name: nearer(q) for q in space.quantities if names is None or q.name in names
     }
+
+
+def nearest_violation(
+    margins: Callable[[list[_Row]], np.ndarray],
+    space: Space,
+    violation: tuple[_Row, float],
+    steps: int,
+    names: Collection[str] | None = None,
+) -> tuple[_Row, float]:
+    """Move numbers of a violation towards nominal as far as bisection keeps it one."""
+    (full, _), low, high = violation, 0.0, 1.0
+    for _ in range(steps):
+        middle = (low + high) / 2
+        nearer = towards_nominal(space, full, middle, names)
+        margin = margins([nearer])[0]
+        if margin > 0:
+            low = middle
+        else:
+            violation, high = (nearer, margin), middle
+    return violation
 
 
 def row_text(row: Mapping[str, Any]) -> str:

@@ -110,10 +110,8 @@ def failure_map(
     of_type(who, "space", space, Space)
     given = _given(space, (x, y), {} if at is None else of_type(who, "at", at, Mapping))
     cells = integer(who, "cells", cells, at_least=1)
-    levels = integer(who, "levels", levels, at_least=0)
+    levels = integer(who, "levels", levels, at_least=0, at_most=_FINEST)
     most = integer(who, "most", most, at_least=0)
-    if levels > _FINEST:
-        raise ParameterError(f"{who} needs levels <= {_FINEST}, got {levels}")
     affordable("the first grid of a failure map", (cells + 1) ** 2, len(space.names) + _WORK)
     plane = _Plane(evaluate, space, (x, y), given, cells << levels)
     side = 1 << levels

@@ -98,7 +98,7 @@ def _lowered(
     for _ in range(_REPEATS):
         moved = {name: y[name] + slopes[i] @ change for i, name in enumerate(names)}
         picked = _Picked(t=t, y=moved, names=names)
-        atoms = picked.lowering(requirement.formula, 0)
+        atoms = picked.atoms(requirement.formula, 0, raising=False)
         further, margin = _program(atoms, slopes, change, bounds)
         if not margin < least - _GAIN * max(1.0, abs(least) if np.isfinite(least) else 1.0):
             break
@@ -174,47 +174,33 @@ class _Picked:
         first = np.minimum(first, self.t.size - 1)
         return first, np.maximum(last, first + 1)
 
-    def lowering(self, formula: Any, k: int) -> _Atoms:
-        """Return numbers of which the largest is to go down."""
-        if isinstance(formula, Not):
-            return self.raising(formula.part, k).opposite
+    def atoms(self, formula: Any, k: int, *, raising: bool) -> _Atoms:
+        """Return numbers of which the largest is to go down, or the least is to go up."""
         if isinstance(formula, Band):
-            return self._band(formula, np.array([k]), every=False)
-        if isinstance(formula, And):
-            return self.lowering(min(formula.parts, key=lambda part: self.margins(part)[k]), k)
-        times = self._times(formula, k)
-        inner = self.margins(formula.part)[times]
-        if isinstance(formula, Always):
-            return self.lowering(formula.part, int(times[np.argmin(inner)]))
-        return self._all(formula.part, times[np.argsort(-inner)], self.lowering, every=False)
-
-    def raising(self, formula: Any, k: int) -> _Atoms:
-        """Return numbers of which the least is to go up."""
+            return self._band(formula, np.array([k]), every=raising)
         if isinstance(formula, Not):
-            return self.lowering(formula.part, k).opposite
-        if isinstance(formula, Band):
-            return self._band(formula, np.array([k]), every=True)
+            return self.atoms(formula.part, k, raising=not raising).opposite
         if isinstance(formula, And):
-            return _together([self.raising(part, k) for part in formula.parts])
-        times = self._times(formula, k)
-        inner = self.margins(formula.part)[times]
-        if isinstance(formula, Eventually):
-            return self.raising(formula.part, int(times[np.argmax(inner)]))
-        return self._all(formula.part, times[np.argsort(inner)], self.raising, every=True)
-
-    def _times(self, formula: Any, k: int) -> np.ndarray:
+            if raising:
+                return _together([self.atoms(part, k, raising=True) for part in formula.parts])
+            least = min(formula.parts, key=lambda part: self.margins(part)[k])
+            return self.atoms(least, k, raising=False)
         first, last = self._window(formula)
-        return np.arange(first[k], last[k])
+        times = np.arange(first[k], last[k])
+        inner = self.margins(formula.part)[times]
+        if isinstance(formula, Eventually) == raising:  # one time decides
+            best = np.argmax(inner) if raising else np.argmin(inner)
+            return self.atoms(formula.part, int(times[best]), raising=raising)
+        order = np.argsort(inner if raising else -inner)
+        return self._all(formula.part, times[order], raising=raising)
 
-    def _all(
-        self, part: Formula, times: np.ndarray, one: Callable[..., _Atoms], *, every: bool
-    ) -> _Atoms:
+    def _all(self, part: Formula, times: np.ndarray, *, raising: bool) -> _Atoms:
         """Return the numbers of a part at many times, the most important first."""
         if isinstance(part, Band):
-            return self._band(part, times, every=every)
+            return self._band(part, times, every=raising)
         if isinstance(part, Not) and isinstance(part.part, Band):
-            return self._band(part.part, times, every=not every).opposite
-        return _together([one(part, int(k)) for k in times[:_NESTED]])
+            return self._band(part.part, times, every=not raising).opposite
+        return _together([self.atoms(part, int(k), raising=raising) for k in times[:_NESTED]])
 
     def _band(self, band: Band, k: np.ndarray, *, every: bool) -> _Atoms:
         """Return the distances to the ends of a band: to both, or to the nearer one."""
@@ -230,10 +216,8 @@ class _Picked:
 
 
 def _together(parts: list[_Atoms]) -> _Atoms:
-    return _Atoms(*(
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("signal", "k", "factor", "value")
-    ))  # fmt: skip
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    return _Atoms(*map(np.concatenate, columns))
 
 
 @as_annotated
@@ -289,7 +273,10 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
     except AuditError:
         raise
     except (UsageError, DivergedError) as error:
-        return _none(prepared, str(error))
+        return FirstOrder(
+            t=np.empty(0), signals={}, derivatives={}, requirements=study.spec.requirements,
+            reason=str(error),
+        )  # fmt: skip
     low, high = ends(study.space).to_numpy()
     return FirstOrder(
         t=run.time,
@@ -301,10 +288,3 @@ def first_order(prepared: Prepared, row: Mapping[str, Any]) -> FirstOrder:
         requirements=study.spec.requirements,
         reason=run.message or "",
     )
-
-
-def _none(prepared: Prepared, reason: str) -> FirstOrder:
-    return FirstOrder(
-        t=np.empty(0), signals={}, derivatives={},
-        requirements=prepared.experiment.spec.requirements, reason=reason,
-    )  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -103,33 +102,7 @@ def _tries(
     space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
 ) -> Iterator[Callable[[float], str]]:
     """Yield for each corner what says for a factor why its block refuses it, or nothing."""
-    for part in _parts(space, systems, names):
-        for corner in _corners(space, list(part.fields)):
-            yield partial(part.refusal, space, corner)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Part:
-    """A block's record at the nominal values, and fields of it by the names of quantities."""
-
-    record: Any
-    path: str
-    fields: Mapping[str, str]
-
-    def refusal(self, space: Space, corner: Mapping[str, Any], factor: float) -> str:
-        """Return why the block refuses a corner moved by a factor from nominal, or nothing."""
-        row = towards_nominal(space, corner, factor, corner)
-        try:
-            with_overrides(self.record, {self.fields[name]: row[name] for name in row}, self.path)
-        except ParameterError as error:
-            return str(error)
-        return ""
-
-
-def _parts(
-    space: Space, systems: Iterable[ct.InputOutputSystem], names: Collection[str]
-) -> Iterator[_Part]:
-    """Yield every block with parameters that are uncertain; `names` may be scaled."""
+    # Blocks are those with parameters that are uncertain; of these `names` may be scaled.
     middle = nominal(space)
     for system in systems:
         blocks, fields = {}, {}
@@ -143,8 +116,25 @@ def _parts(
         for path, keys in fields.items():
             given = {key: middle[name] for name, key in keys.items()}
             record = with_overrides(blocks[path].current_spec, given, path)
-            scaled = {name: key for name, key in keys.items() if name in names}
-            yield _Part(record=record, path=path, fields=scaled)
+            for corner in _corners(space, [name for name in keys if name in names]):
+                yield partial(_refusal, space, record, path, keys, corner)
+
+
+def _refusal(
+    space: Space,
+    record: Any,
+    path: str,
+    keys: Mapping[str, str],
+    corner: Mapping[str, Any],
+    factor: float,
+) -> str:
+    """Return why a block refuses a corner moved by a factor from nominal, or nothing."""
+    row = towards_nominal(space, corner, factor, corner)
+    try:
+        with_overrides(record, {keys[name]: row[name] for name in row}, path)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def _corners(space: Space, names: Sequence[str]) -> Iterator[dict[str, Any]]:

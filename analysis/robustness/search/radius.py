@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,15 @@ from nlctl.errors import UsageError
 from ..statistics.guarantee import Violation, violation_probability
 from ..uncertainty.design import checked_entropy, independent
 from ..uncertainty.space import Space, combinations, nominal, scaled
-from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
+from .evaluation import (
+    Evaluate,
+    as_table,
+    evaluated,
+    margins_at,
+    margins_of,
+    nearest_violation,
+    row_text,
+)
 from .worst_case import worst_case
 
 # smallest size that is searched first, as a part of the largest; then twice that, and so on
@@ -223,15 +232,8 @@ class _Search:
 
     def along_ray(self, row: dict[str, Any], margin: float) -> None:
         """Move a violation towards nominal as far as bisection keeps it one."""
-        full, low, high = row, 0.0, 1.0
-        for _ in range(RAY):
-            middle = (low + high) / 2
-            nearer = towards_nominal(self.space, full, middle)
-            value = margins_of(evaluated(self.evaluate, as_table(self.space, [nearer])))[0]
-            if value > 0:
-                low = middle
-            else:
-                row, margin, high = nearer, value, middle
+        margins = partial(margins_at, self.evaluate, self.space)
+        row, margin = nearest_violation(margins, self.space, (row, margin), RAY)
         self.steps.append(("ray", size_of(self.space, row), margin, RAY))
         self._keep(row, margin)
 
@@ -243,18 +245,15 @@ class _Search:
 
 def _drawn(search: _Search, draws: int, confidence: float) -> tuple[Violation | None, str]:
     """Return a statement from draws at the size that was searched, or why there is none."""
-    if not draws:
-        return None, ""
-    if search.upper == 0:
+    if not draws or search.upper == 0:
         return None, ""
     if not search.searched:
         return None, "There is no statement: no size was searched without a violation"
     design = independent(scaled(search.space, search.searched), draws, search.entropy)
     try:
-        results = evaluated(search.evaluate, design.table)
+        margins = margins_of(evaluated(search.evaluate, design.table))
     except UsageError as error:
         return None, f"There is no statement: a draw was refused, {error}"
-    margins = margins_of(results)
     worst = int(np.argmin(margins))
     if not margins[worst] > 0:
         search.along_ray(design.table.iloc[worst].to_dict(), margins[worst])

@@ -16,7 +16,7 @@ from nlctl.errors import ParameterError
 from nlctl.wording import counted, some_of
 
 from ..uncertainty.space import Space, checked_row, nominal
-from .evaluation import Evaluate, as_table, evaluated, margins_of, row_text, towards_nominal
+from .evaluation import Evaluate, margins_at, nearest_violation, row_text
 
 _Row = dict[str, Any]
 _BITS = 60  # after as many bisections two numbers are neighbours
@@ -127,10 +127,8 @@ class _Task:
         self.runs = 0
 
     def margins(self, rows: Sequence[_Row]) -> np.ndarray:
-        if not rows:
-            return np.empty(0)
         self.runs += len(rows)
-        return margins_of(evaluated(self.evaluate, as_table(self.space, rows)))
+        return margins_at(self.evaluate, self.space, rows)
 
     def deviating(self, row: _Row) -> list[str]:
         return [name for name in self.space.names if row[name] != self.middle[name]]
@@ -169,12 +167,5 @@ def _fewest(task: _Task, row: _Row, size: int, most: int) -> tuple[_Row | None, 
 def _scaled(task: _Task, row: _Row, steps: int) -> _Row:
     """Move one number after the other towards nominal by bisection."""
     for name in [q.name for q in task.space.quantities if q.name in task.deviating(row)]:
-        full, low, high = row, 0.0, 1.0
-        for _ in range(steps):
-            middle = (low + high) / 2
-            nearer = towards_nominal(task.space, full, middle, [name])
-            if task.margins([nearer])[0] > 0:
-                low = middle
-            else:
-                row, high = nearer, middle
+        row, _ = nearest_violation(task.margins, task.space, (row, np.nan), steps, [name])
     return row

@@ -11,7 +11,7 @@ from scipy import stats
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, integer, of_type, one_of
-from nlctl.attributes import described_record
+from nlctl.attributes import described_record, with_parameters_of
 from nlctl.errors import ParameterError, UsageError
 from nlctl.wording import counted, some_of
 
@@ -226,6 +226,7 @@ def least_count(
 
 
 @as_annotated
+@with_parameters_of(clopper_pearson)
 def violation_probability(
     design: Design, margins: Margins, confidence: float = 0.99, side: Side = "upper"
 ) -> Violation:
@@ -238,10 +239,6 @@ def violation_probability(
     margins : sequence of length ``design.size``
         Margin of every row in order; a run violates the spec unless its margin is > 0, so NaN is a
         violation.  A Series goes by its index.
-    confidence : float, optional
-        That the bounds hold, between 0 and 1.
-    side : {"upper", "lower", "both"}, optional
-        The bound that is left out is 0 or 1.
 
     Raises
     ------

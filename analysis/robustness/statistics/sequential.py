@@ -10,7 +10,7 @@ from scipy import optimize, special
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction
-from nlctl.attributes import described_record
+from nlctl.attributes import described_record, with_parameters_of
 from nlctl.wording import counted
 
 from ..uncertainty.design import Design
@@ -167,6 +167,7 @@ def _statement(design: Design, k: int, n: int, confidence: float) -> Violation:
 
 
 @as_annotated
+@with_parameters_of(confidence_sequence)
 def decide(
     design: Design, margins: Margins, threshold: float, confidence: float = 0.99
 ) -> SequentialTest:
@@ -180,14 +181,8 @@ def decide(
 
     Parameters
     ----------
-    design : Design
-        Independent draws.
-    margins : array_like of shape (rows,)
-        Of the rows that are done, in their order.
     threshold : float
         Probability, between 0 and 1.
-    confidence : float, optional
-        Between 0 and 1.
 
     Raises
     ------

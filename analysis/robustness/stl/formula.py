@@ -17,11 +17,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text
+from nlctl.attributes import with_parameters_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -88,27 +90,31 @@ class And(Formula):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Eventually(Formula):
+class Temporal(Formula):
+    """A part at the times from t + start to t + end; how often, its kinds say."""
+
+    word: ClassVar[str]
+    part: Formula
+    start: float
+    end: float
+
+    def __str__(self) -> str:
+        when = f" from {self.start:g} s on" if self.start else ""
+        if np.isfinite(self.end):
+            when = f" in [{self.start:g}, {self.end:g}] s"
+        return f"{self.word}{when} {self.part}"
+
+
+class Eventually(Temporal):
     """Once between t + start and t + end."""
 
-    part: Formula
-    start: float
-    end: float
-
-    def __str__(self) -> str:
-        return f"eventually{_interval(self)} {self.part}"
+    word = "eventually"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Always(Formula):
+class Always(Temporal):
     """All the time from t + start to t + end."""
 
-    part: Formula
-    start: float
-    end: float
-
-    def __str__(self) -> str:
-        return f"always{_interval(self)} {self.part}"
+    word = "always"
 
 
 def _listed(parts: Sequence[Formula], word: str) -> str:
@@ -120,20 +126,17 @@ def _listed(parts: Sequence[Formula], word: str) -> str:
 
 def looks_ahead(formula: Formula) -> bool:
     """Whether a formula is of other times than the one at which it stands."""
-    return any(isinstance(part, Always | Eventually) for part in parts_of(formula))
+    return any(isinstance(part, Temporal) for part in parts_of(formula))
 
 
 def begins_window(formula: Formula) -> bool:
     """Whether the text of a formula begins with "always" or "eventually", or with "not" and one."""
     while isinstance(formula, Not) and not isinstance(formula.part, And):
         formula = formula.part
-    return isinstance(formula, Always | Eventually)
+    return isinstance(formula, Temporal)
 
 
-def _interval(window: Always | Eventually) -> str:
-    if np.isfinite(window.end):
-        return f" in [{window.start:g}, {window.end:g}] s"
-    return f" from {window.start:g} s on" if window.start else ""
+_T = TypeVar("_T", bound=Temporal)
 
 
 @as_annotated
@@ -225,20 +228,13 @@ def always(part: Formula, start: float = 0.0, end: float = np.inf) -> Always:
     >>> print(round((0.1 - np.exp(-3)) / 0.1, 6))
     0.502129
     """
-    _check_window("always", part, start, end)
-    return Always(part=part, start=float(start), end=float(end))
+    return _temporal(Always, part, start, end)
 
 
 @as_annotated
+@with_parameters_of(always)
 def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventually:
     """Require `part` once between start and end; arguments and errors as in `always`.
-
-    Parameters
-    ----------
-    part : Formula
-        What is required.
-    start, end : float, optional
-        Times from where the formula stands (s).
 
     Returns
     -------
@@ -259,27 +255,27 @@ def eventually(part: Formula, start: float = 0.0, end: float = np.inf) -> Eventu
     >>> margin(rises, times, {"y": np.minimum(times, 1.8)})  # (1.8 - 0.9) / 0.9
     1.0
     """
-    _check_window("eventually", part, start, end)
-    return Eventually(part=part, start=float(start), end=float(end))
+    return _temporal(Eventually, part, start, end)
 
 
-def _check_window(name: str, part: Formula, start: float, end: float) -> None:
-    of_type(f"'{name}'", "part", part, Formula, HOW)
-    number(f"'{name}'", "start", start, at_least=0)
+def _temporal(kind: type[_T], part: Formula, start: float, end: float) -> _T:
+    who = f"'{kind.word}'"
+    of_type(who, "part", part, Formula, HOW)
+    number(who, "start", start, at_least=0)
     if not (isinstance(end, float) and np.isinf(end)):
-        number(f"'{name}'", "end", end)
+        number(who, "end", end)
     if not (0 <= start <= end and np.isfinite(start)):
         raise ParameterError(
-            f"'{name}' needs 0 <= start <= end with a finite start, got [{start}, {end}] s"
+            f"{who} needs 0 <= start <= end with a finite start, got [{start}, {end}] s"
         )
+    return kind(part=part, start=float(start), end=float(end))
 
 
 def parts_of(formula: Formula) -> Iterator[Formula]:
     """Yield a formula and all its parts."""
     yield formula
-    for part in getattr(formula, "parts", None) or (
-        [formula.part] if isinstance(formula, Not | Always | Eventually) else []
-    ):
+    inner = [formula.part] if isinstance(formula, Not | Temporal) else ()
+    for part in formula.parts if isinstance(formula, And) else inner:
         yield from parts_of(part)
 
 
@@ -292,7 +288,7 @@ def signals_named(formula: Formula) -> tuple[str, ...]:
 @cache
 def horizon(formula: Formula) -> float:
     """Return how far (s) a formula looks ahead at least."""
-    if isinstance(formula, Always | Eventually):
+    if isinstance(formula, Temporal):
         far = formula.end if np.isfinite(formula.end) else formula.start
         return far + horizon(formula.part)
     inner = [horizon(part) for part in parts_of(formula) if part is not formula]

@@ -52,6 +52,8 @@ class Trace:
 
 
 _NONE = np.empty(0)
+_compiled = kept(nogil=True, error_model="numpy")
+_vertices, _path = _compiled(turning_points), _compiled(path)
 
 
 def with_vertices(
@@ -65,22 +67,6 @@ def with_vertices(
         return Trace(*_path(t, y, breaks, apart), jump=3 * apart)
     at, place, value = _vertices(t, y, _NONE)
     return Trace(np.insert(t, at, place), np.insert(y, at, value)) if at.size else Trace(t, y)
-
-
-@kept(nogil=True, error_model="numpy")
-def _vertices(
-    t: np.ndarray, y: np.ndarray, breaks: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the extremes between samples: before which sample each is, when, and its value."""
-    return turning_points(t, y, breaks)
-
-
-@kept(nogil=True, error_model="numpy")
-def _path(
-    t: np.ndarray, y: np.ndarray, breaks: np.ndarray, apart: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points of a path through samples, see `nlctl.analysis.metrics.curves`."""
-    return path(t, y, breaks, apart)
 
 
 def extremes(

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import number, of_type, text, tuple_of
-from nlctl.attributes import described_record
+from nlctl.attributes import described_record, with_parameters_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 from nlctl.params import as_numbers
@@ -328,6 +328,7 @@ def _samples(requirement: Requirement, t: Any, signals: Mapping[str, Any]) -> np
 
 
 @as_annotated
+@with_parameters_of(margin)
 def margins(
     spec: Spec, t: np.ndarray, signals: Mapping[str, np.ndarray], *, breaks: ArrayLike | None = None
 ) -> dict[str, float]:
@@ -339,12 +340,6 @@ def margins(
     ----------
     spec : Spec
         The requirements.
-    t : ndarray of shape (m,)
-        Increasing times (s).
-    signals : mapping
-        Samples of shape (m,) by name.
-    breaks : array_like of shape (k,), optional
-        As in `margin`.
 
     Returns
     -------

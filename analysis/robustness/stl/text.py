@@ -67,21 +67,22 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.words: list[tuple[str, str, int]] = []  # (kind, word, column)
+        self.words: list[tuple[str, str, int]] = []  # (kind, word, column), then the end
         self.next = 0
         for match in _TOKEN.finditer(text.rstrip()):
             kind = match.lastgroup or "other"
             word = match[match.lastgroup or 4]
+            kind = "word" if kind == "name" and word in _WORDS else kind
             self.words.append((kind, word, match.end() - len(word)))
+        self.words.append(("end", "", len(text)))
 
     @property
     def here(self) -> str:
-        return self.words[self.next][1] if self.next < len(self.words) else ""
+        return self.words[self.next][1]
 
     @property
     def kind(self) -> str:
-        kind = self.words[self.next][0] if self.next < len(self.words) else ""
-        return "word" if kind == "name" and self.here in _WORDS else kind
+        return self.words[self.next][0]
 
     def took(self, word: str) -> bool:
         """Step over `word` if it stands here."""
@@ -94,17 +95,17 @@ class _Reader:
             if not self.took(word):
                 raise self.error(f"'{word}'")
 
-    def number(self) -> float:
-        if self.kind != "number":
-            raise self.error("a number")
-        self.next += 1
-        return float(self.words[self.next - 1][1])
-
-    def signal(self) -> str:
-        if self.kind != "name":
-            raise self.error("the name of a signal")
+    def one(self, kind: str, what: str) -> str:
+        if self.kind != kind:
+            raise self.error(what)
         self.next += 1
         return self.words[self.next - 1][1]
+
+    def number(self) -> float:
+        return float(self.one("number", "a number"))
+
+    def signal(self) -> str:
+        return self.one("name", "the name of a signal")
 
     def is_bracketed(self, first: int) -> bool:
         """Whether what was read from a word on stands in one pair of brackets."""
@@ -116,11 +117,8 @@ class _Reader:
         return False
 
     def error(self, expected: str) -> ParameterError:
-        if self.next < len(self.words):
-            _, word, column = self.words[self.next]
-            here = f"'{word}' at character {column + 1}"
-        else:
-            here = "the end"
+        _, word, column = self.words[self.next]
+        here = f"'{word}' at character {column + 1}" if word else "the end"
         return ParameterError(
             f"formula '{self.text}' needs {expected}, found {here}; write it like '{EXAMPLE}'"
         )

@@ -68,9 +68,7 @@ def violation_time(
     until = min(requirement.until, float(t[-1]))
     is_short = until < requirement.until * (1 - 1e-12)
     first = _first(requirement.formula, SampledSignals(t, sampled, until, checked_breaks(breaks)))
-    if is_short:
-        return min(first, until)
-    if margin(requirement, t, sampled, breaks=breaks) > 0:
+    if not is_short and margin(requirement, t, sampled, breaks=breaks) > 0:
         return np.inf
     return min(first, until)
 

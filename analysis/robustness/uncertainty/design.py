@@ -12,11 +12,11 @@ from scipy.stats import qmc
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import flag, integer, of_type
-from nlctl.attributes import described_record
+from nlctl.attributes import described_record, with_parameters_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
-from .space import Space, from_quantiles
+from .space import Space, checked_rows, from_quantiles
 
 _MOST_ROWS = 10**9  # rows of a design at most: what is drawn row by row
 MOST_HELD = 10**8  # numbers that a design holds in memory at most, 800 MB: rows times columns
@@ -87,15 +87,9 @@ def row_seed(design: Design, row: int) -> np.random.SeedSequence:
 
 
 @as_annotated
+@with_parameters_of(row_seed)
 def seed_number(design: Design, row: int) -> int:
     """Return the row's seed as one number of 64 bits, for the table of results.
-
-    Parameters
-    ----------
-    design : Design
-        Rows and their seeds.
-    row : int
-        Number of the row.
 
     Returns
     -------
@@ -274,21 +268,10 @@ def from_table(
     missing = [name for name in space.names if name not in table.columns]
     if missing or not len(table):
         raise ParameterError(f"a table needs rows and all columns, it lacks {missing or 'rows'}")
-    columns: dict[str, Any] = {}
-    for q in space.quantities:
-        columns[q.name] = np.array(pd.to_numeric(table[q.name], errors="coerce"), dtype=float)
-        bad = np.nonzero(~np.isfinite(columns[q.name]))[0]
-        if bad.size:
-            raise ParameterError(
-                f"'{q.name}' needs finite numbers, row {bad[0]} of the table has "
-                f"{table[q.name].iloc[bad[0]]!r}"
-            )
-    for choice in space.choices:
-        columns[choice.name] = table[choice.name].astype(str).to_numpy()
-        for label in columns[choice.name]:
-            if label not in choice.options:
-                raise unknown("option", label, choice.options, f"of '{choice.name}'")
-    design = listed(space, "user's table", pd.DataFrame(columns), checked_entropy(entropy))
+    labels = {choice.name: table[choice.name].astype(str).to_numpy() for choice in space.choices}
+    numbers = checked_rows(space, table.assign(**labels).reset_index(drop=True))
+    points = pd.DataFrame(numbers | labels)
+    design = listed(space, "user's table", points, checked_entropy(entropy))
     return replace(design, is_iid=independently)
 
 
@@ -312,6 +295,7 @@ def listed(
 
 
 @as_annotated
+@with_parameters_of(independent)
 def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
     """Fill the space evenly with a scrambled Sobol' sequence: for means, maps and sensitivity.
 
@@ -319,12 +303,8 @@ def sobol(space: Space, size: int, entropy: int | None = None) -> Design:
 
     Parameters
     ----------
-    space : Space
-        Quantities with their laws, and choices.
     size : int
         Number of rows, a power of 2.
-    entropy : int, optional
-        Of the rows' seeds; drawn if left out.
 
     Returns
     -------
@@ -364,6 +344,7 @@ def sobol_points(dimension: int, size: int, entropy: int) -> np.ndarray:
 
 
 @as_annotated
+@with_parameters_of(independent)
 def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Design:
     """Fill the space so that each quantity has one value in each of `size` equally likely parts.
 
@@ -371,12 +352,8 @@ def latin_hypercube(space: Space, size: int, entropy: int | None = None) -> Desi
 
     Parameters
     ----------
-    space : Space
-        Quantities with their laws, and choices.
     size : int
         Number of rows.
-    entropy : int, optional
-        Of the rows' seeds; drawn if left out.
 
     Returns
     -------

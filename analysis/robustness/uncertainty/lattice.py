@@ -11,6 +11,7 @@ import pandas as pd
 
 from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
+from nlctl.attributes import with_parameters_of
 from nlctl.errors import ParameterError
 from nlctl.names import unknown
 
@@ -65,15 +66,9 @@ def grid(space: Space, levels: int | Mapping[str, int], entropy: int | None = No
 
 
 @as_annotated
+@with_parameters_of(grid)
 def corners(space: Space, entropy: int | None = None) -> Design:
     """Cross both ends of every box, and all options of every choice: 2^d rows for d quantities.
-
-    Parameters
-    ----------
-    space : Space
-        Quantities with their laws, and choices.
-    entropy : int, optional
-        Of the rows' seeds; drawn if left out.
 
     Returns
     -------

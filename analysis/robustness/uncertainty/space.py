@@ -152,11 +152,7 @@ def from_quantiles(space: Space, unit: np.ndarray) -> pd.DataFrame:
     # Uniform points become draws of the laws.
     # Shapes: `unit` (n, len(space.names).
     inner = np.clip(_checked(space, unit), 2.0**-54, 1 - 2.0**-53)
-
-    def drawn(quantity: Uncertain, u: np.ndarray) -> np.ndarray:
-        return quantity.law.ppf(u)
-
-    return _table(space, inner, drawn)
+    return _table(space, inner, lambda quantity, u: quantity.law.ppf(u))
 
 
 def from_unit_cube(space: Space, unit: np.ndarray) -> pd.DataFrame:
