@@ -13,7 +13,7 @@ from .constants import Constants
 from .inequalities import terms
 from .lines import Line
 from .loop.simulation import MemberRun
-from .nussbaum.energy import as_response_of, drift, drift_margin, safe_horizon
+from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
 from .premises import Premises, premises
@@ -42,9 +42,7 @@ def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
     if length < 6 * _WINDOW:
         return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return slow_drift(
-            as_response_of(run.signals.t, run.signals), run.parts.law.N, window=_WINDOW
-        )
+        return slow_drift(run.signals, run.parts.law.N, window=_WINDOW)
     except ParameterError as error:
         return str(error)
 
@@ -138,7 +136,7 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
     names = ("(c)", "(b)")
     if not (0 < low <= high < np.inf and np.isfinite(given.alpha_0)):
         return [Line(key=k, statement="bounds of k G", status="undecided") for k in names]
-    moved = drift(as_response_of(run.signals.t, run.signals), given.N)
+    moved = drift(run.signals, given.N)
     margin = drift_margin(moved, x.V[0], given.alpha_0, l_min=low, l_max=high, V=x.V)
     holds = margin.least >= -1e-6 * float(np.max(x.V))
     c = Line(

@@ -110,13 +110,6 @@ def minimax_weights(network: Network, largest: float | None = None) -> np.ndarra
     return result.x[:-1] / scale
 
 
-def least_squares_weights(network: Network) -> np.ndarray:
-    """Return the weights with the smallest sum of squared errors on the grid, columns scaled."""
-    scale = np.max(np.abs(network.psi), axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    return np.linalg.lstsq(network.psi / scale, network.g, rcond=None)[0] / scale
-
-
 @as_annotated
 def tightest_weights(network: Network, gains: Gains, delta_rest: float) -> np.ndarray:
     """Return the weights that make the final bound C_0 of (36) smallest, for Q = 0.
