@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -21,7 +20,7 @@ from nlctl.wording import counted
 
 from .agreement import one_number, several_numbers
 from .arithmetic import Ball, as_ball
-from .box import Box
+from .box import Box, face
 from .branch_and_bound import Proof, point_text, prove
 from .machine import Readable, readable
 from .paths import Undecided
@@ -190,10 +189,8 @@ def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Pro
     for i in sides:
         name = box.names[i]
         for end in box.cell[i]:
-            ends = (box.low, box.high)
-            low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in ends)
-            face = dataclasses.replace(box, low=low, high=high)
-            proof = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
+            above = float(np.nextafter(level, np.inf))
+            proof = prove(V, face(box, i, end), low=above, max_boxes=_FACE)
             if proof.holds is False:
                 raise ParameterError(
                     f"the box does not hold the level set: V = {proof.value:.6g} <= {level:g} at "

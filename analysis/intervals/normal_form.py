@@ -116,12 +116,8 @@ class Sum(NumPyFunctions):
         """Its terms, to be compared: of sums themselves no comparison has an answer."""
         return frozenset(self.terms.items())
 
-    def _refused(self, *_: Any) -> bool:
+    def _compared(self, other: Any, order: str) -> Any:
         raise Undecided("a comparison of symbols has no answer for all values")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __bool__ = _refused  # type: ignore[assignment]
-    __eq__ = __ne__ = _refused  # type: ignore[assignment]
-    __hash__ = None  # type: ignore[assignment]
 
     def coefficient(self, product: Product) -> Fraction:
         """Return the coefficient of a product; 0 where it does not occur."""
@@ -163,17 +159,10 @@ class Sum(NumPyFunctions):
             return self * (1 / constant)
         return self * other._function("inverse")
 
-    def __pow__(self, n: Any) -> Sum:
-        if isinstance(n, NumPyFunctions) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self ** (-n)
+    def _whole_power(self, n: int) -> Sum:
         if n > LARGEST_POWER:
             raise Undecided(f"a power of {n}")
-        result = as_sum(1)
-        for _ in range(int(n)):
-            result = result * self
-        return result
+        return super()._whole_power(n)
 
     def __abs__(self) -> Sum:
         return self._function("absolute")

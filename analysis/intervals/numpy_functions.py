@@ -19,7 +19,7 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .pairs import FUNCTIONS_OF_TWO
+from .pairs import FUNCTIONS_OF_TWO, hull
 
 _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row.count == 1}
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
@@ -41,13 +41,17 @@ def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
     return method
 
 
-def of_lifted(operator: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+def _comparison(order: str) -> Callable[[Any, Any], Any]:
+    return lambda self, other: self._compared(other, order)
+
+
+def of_lifted(operator: Callable[..., Any]) -> Callable[..., Any]:
     """Return an operator that sees its second operand as one of the kind of the first."""
 
     @functools.wraps(operator)
-    def method(self: Any, other: object) -> Any:
+    def method(self: Any, other: object, *more: Any) -> Any:
         lifted = self.lifted(other)
-        return lifted if lifted is NotImplemented else operator(self, lifted)
+        return lifted if lifted is NotImplemented else operator(self, lifted, *more)
 
     return method
 
@@ -84,6 +88,21 @@ class NumPyFunctions:
     @of_lifted
     def __rtruediv__(self, other: Any) -> Any:
         return other / self
+
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, NumPyFunctions) or n != int(n):
+            return self.pair("power", n)
+        return 1 / self**-n if n < 0 else self._whole_power(int(n))
+
+    def _whole_power(self, n: int) -> Any:
+        result = self.lifted(1)
+        for _ in range(n):
+            result = result * self
+        return result
+
+    def _compared(self, other: Any, order: str) -> Any:
+        """Whether ``self < other`` for the order "lt", and so on."""
+        raise NotImplementedError
 
     def __bool__(self) -> bool:
         return self != 0
@@ -147,6 +166,8 @@ for _name in _SINGLE:
     setattr(NumPyFunctions, _name, _function(_name))
 for _name in FUNCTIONS_OF_TWO:
     setattr(NumPyFunctions, _name, _function_of_two(_name))
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(NumPyFunctions, f"__{_name}__", _comparison(_name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:
@@ -240,12 +261,7 @@ def enclosed_table(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> tupl
         if low <= x1 and high >= x0
     ]
     slopes += [arb(0)] if low <= xp[0] or high >= xp[-1] else []
-    value, slope = values[0], slopes[0]
-    for other in values:
-        value = value.union(other)
-    for other in slopes:
-        slope = slope.union(other)
-    return value, slope
+    return hull(values), hull(slopes)
 
 
 def _at(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> arb:

@@ -84,7 +84,7 @@ def undecided() -> Iterator[None]:
         _DECISIONS.reset(token)
 
 
-def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], what: str) -> bool:
+def decided(possible: set[int], holds: set[int], key: tuple[Any, Any], what: str) -> bool:
     """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:

@@ -61,16 +61,6 @@ class Slope(NumPyFunctions):
         quotient = (self.quotient - base * other.quotient) / other.here
         return Slope(self.here / other.here, base, quotient)
 
-    def __pow__(self, n: Any) -> Any:
-        if isinstance(n, NumPyFunctions) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self**-n
-        result = self.lifted(1)
-        for _ in range(int(n)):
-            result = result * self
-        return result
-
     def __abs__(self) -> Slope:
         return self if self >= 0 else -self
 

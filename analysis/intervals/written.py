@@ -115,10 +115,8 @@ class Written(NumPyFunctions):
         """Refuse a table: it is none of the operations."""
         raise Undecided("a table cannot be written")
 
-    def _refused(self, _: Any = None) -> bool:
+    def _compared(self, other: Any, order: str) -> Any:
         raise Undecided("a comparison cannot be written: use np.minimum, np.maximum or abs")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused  # type: ignore[assignment]
 
 
 def operations(names: tuple[str, ...], function: Any) -> list[list[Any]]:

@@ -17,7 +17,7 @@ from nlctl.attributes import described_record
 
 from ..intervals.box import Box, visited_box
 from .bounds.decomposition import Decomposition, decompose
-from .constants import Constants, constants
+from .constants import Constants, constants_of
 from .loop.integral import sharpest
 from .loop.roles import read_parts
 from .loop.simulation import (
@@ -123,25 +123,17 @@ def examine(
     if len(members) == 1:
         fixed = dict(members[0].start), dict(members[0].params)
     parts = read_parts(loop, *fixed)
-    split = _split(parts.actuator, k)
-    runs = _Runs(loop=loop, members=members, split=split, max_steps=max_steps)
+    split = decompose(parts.actuator, k=k, u_max=U_MAX)
+    runs = _Runs(loop=loop, members=members, split=sharpest(split), max_steps=max_steps)
     box = _visited(runs) if box is None else box
-    sides = [name for name in box.names if name != "u"]
-    weights = None if isinstance(W, str) and W == "tightest" else W
-    proved = constants(
-        loop, box.only(*sides).times("u", -U_MAX, U_MAX), W=weights, k=k, start=fixed[0],
-        params=fixed[1],
-    )  # fmt: skip
+    proved = constants_of(parts, split, box, None if isinstance(W, str) else W)
     return Examination(loop=loop, runs=runs, constants=proved)
 
 
 def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
-    native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
-
-
-def _split(actuator: Any, k: tuple[float, float] | None = None) -> Decomposition:
-    return sharpest(decompose(actuator, k=k, u_max=U_MAX))
+    split = sharpest(decompose(read_parts(loop).actuator, u_max=U_MAX))
+    native.compile_ahead(observed_loop(loop, split))
 
 
 def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from .bounds.decomposition import Decomposition, decompose
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
+from .certificate.gains import GainCandidate, tradeoff
 from .constants import disturbance
 from .examination import U_MAX, Examination, examine
 from .loop.instrumented import observed
@@ -42,17 +43,6 @@ _TOLERANCE = 1e-2  # of the branch and bounds in the search
 OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrialBound:
-    """One set of gains that the search tried."""
-
-    gains: dict[str, float]  # values by qualified name
-    # bounds of the proof with the tightest W on the set that the run visits, eps* on a grid
-    C_0: float
-    ultimate: float
-    u: float  # max |u| along the run; infinite if it diverged
-
-
 @described_record(made_by="tighten")
 class Tightened:
     """The gains that were found, and the constants of the proof for them."""
@@ -66,7 +56,9 @@ class Tightened:
     u: float  # max |u| along the run, its limit, and the length of the runs (s).
     u_limit: float
     horizon: float
-    trials: tuple[TrialBound, ...]  # All gains that the search tried, in order.
+    # All gains that the search tried, in order: with bounds of the proof with the tightest W on the
+    # set that the run visits, eps* on a grid.
+    trials: tuple[GainCandidate, ...]
 
     @as_annotated
     def table(self, bound: str = "C_0") -> pd.DataFrame:
@@ -84,12 +76,8 @@ class Tightened:
         """
         import pandas as pd
 
-        front: list[TrialBound] = []
-        for trial in sorted(self.trials, key=lambda trial: (trial.u, getattr(trial, bound))):
-            value = getattr(trial, bound)
-            if np.isfinite(trial.u + value) and (not front or value < getattr(front[-1], bound)):
-                front.append(trial)
-        rows = [{"u": t.u, "C_0": t.C_0, "ultimate": t.ultimate, **t.gains} for t in front]
+        best = tradeoff(self.trials, bound)
+        rows = [{"u": t.u, "C_0": t.C_0, "ultimate": t.ultimate, **t.gains} for t in best]
         return pd.DataFrame(rows)
 
 
@@ -170,7 +158,7 @@ def tighten(
         times=np.linspace(0.0, horizon, round(horizon / SAMPLING_INTERVAL) + 1),
         max_steps=max_steps,
     )
-    trials: list[TrialBound] = []
+    trials: list[GainCandidate] = []
 
     def cost(point: np.ndarray) -> float:
         trial = _trial(search, _gains(parts, point))
@@ -188,7 +176,7 @@ def tighten(
 
 
 def _best(
-    search: _Search, trials: list[TrialBound], bound: str, u_limit: float, k: Any
+    search: _Search, trials: list[GainCandidate], bound: str, u_limit: float, k: Any
 ) -> Tightened:
     """Examine the best trial that keeps the limit."""
     allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
@@ -231,7 +219,7 @@ def _gains(parts: Parts, point: np.ndarray) -> dict[str, float]:
     return dict(zip(names, values, strict=False))
 
 
-def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
+def _trial(search: _Search, gains: dict[str, float]) -> GainCandidate:
     """Run a set of gains, and bound r on the set that the run visits."""
     named = {name.rpartition(".")[2]: value for name, value in gains.items()}
     changed = dataclasses.replace(search.parts.gains, **named)
@@ -241,11 +229,11 @@ def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
             search.compiled, search.times, params=params, max_steps=search.max_steps
         )
     except DivergedError:
-        return TrialBound(gains=gains, C_0=np.inf, ultimate=np.inf, u=np.inf)
+        return GainCandidate(gains=gains, C_0=np.inf, ultimate=np.inf, u=np.inf)
     signals = signals_of(response)
     Q = float(np.max(signals["I"]))
     C_0, ultimate = _bounds(search, changed, visited_box(response), Q)
-    return TrialBound(gains=gains, C_0=C_0, ultimate=ultimate, u=peak(signals.t, signals["u"]))
+    return GainCandidate(gains=gains, C_0=C_0, ultimate=ultimate, u=peak(signals.t, signals["u"]))
 
 
 def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, float]:

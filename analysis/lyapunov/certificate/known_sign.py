@@ -33,9 +33,8 @@ from nlctl.references import SumOfSines
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import decompose
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..loop.checked import disturbed, read_checked
+from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
 from ..proofs.filtered import (
     Demand,
@@ -45,6 +44,7 @@ from ..proofs.filtered import (
     between,
     demand,
     feedforward,
+    subject_of,
 )
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
 from ..proofs.result import FROM_STARTS, Row, per_second
@@ -132,14 +132,9 @@ class _BoundOfR:
     doubt: str = field(default="")
 
 
-def read_known_sign(
-    loop: Any,
-    params: Mapping[str, Any] | None = None,
-    inputs: Mapping[str, float] | None = None,
-    starts: Any = None,
-) -> KnownSignLoop:
+def read_known_sign(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.controllers.KnownSignLaw`."""
-    read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
+    read = read_checked(loop, PIECES, _PROVED_FOR, given)
     parts = loop_parts(read.given, read.roles)
     return KnownSignLoop(
         **as_filtered(read),
@@ -150,12 +145,7 @@ def read_known_sign(
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_known_sign(loop, options.params, options.inputs, options.starts)
-    actuator, u_max, tol = read.parts.actuator, options.u_max, options.tol
-    split = disturbed(decompose(actuator, k=options.k, u_max=u_max, tol=tol), read.disturbance)
-    return Subject(
-        loop=read, start=abs(read.r_0), actuator=actuator, split=split, u_max=u_max, tol=tol
-    )
+    return subject_of(read_known_sign(loop, options), options, options.u_max)
 
 
 def _region(subject: Subject, level: arb) -> Demand:

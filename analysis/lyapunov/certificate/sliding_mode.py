@@ -24,9 +24,8 @@ from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import decompose
 from ..bounds.error_bounds import error_bounds
-from ..loop.checked import disturbed, read_checked
+from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law
 from ..proofs.filtered import (
     Demand,
@@ -35,6 +34,7 @@ from ..proofs.filtered import (
     as_filtered,
     demand,
     feedforward,
+    subject_of,
 )
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
 from ..proofs.result import FROM_STARTS, Row, per_second
@@ -110,13 +110,9 @@ class _Layer:
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_checked(loop, _PIECES, _PROVED_FOR, options.params, options.inputs, options.starts)
+    read = read_checked(loop, _PIECES, _PROVED_FOR, options)
     filtered = FilteredLoop(**as_filtered(read))
-    actuator, K, tol = read.roles.spec("actuator"), filtered.law.K, options.tol
-    split = disturbed(decompose(actuator, k=options.k, u_max=K, tol=tol), read.disturbance)
-    return Subject(
-        loop=filtered, start=abs(filtered.r_0), actuator=actuator, split=split, u_max=K, tol=tol
-    )
+    return subject_of(filtered, options, filtered.law.K)
 
 
 def _region(subject: Subject, level: arb) -> Demand:

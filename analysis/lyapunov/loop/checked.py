@@ -62,6 +62,18 @@ def disturbed(split: Decomposition, bound: float) -> Decomposition:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Supposed:
+    """What a proof supposes of a loop besides what the loop itself says; see `certify`."""
+
+    params: Mapping[str, Any] | None = None
+    inputs: Mapping[str, float] | None = None
+    starts: Any = None
+
+
+NOTHING_SUPPOSED = Supposed()
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckedLoop:
     """What a loop is made of, after every check that does not depend on the proof."""
 
@@ -88,25 +100,23 @@ def read_checked(
     loop: Any,
     pieces: Pieces,
     kinds: Mapping[str, tuple[type, ...]],
-    params: Mapping[str, Any] | None,
-    inputs: Mapping[str, float] | None,
-    starts: Any = None,
+    given: Supposed,
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
     """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
-    content = UNREAD_CONTENT
+    content, params = UNREAD_CONTENT, given.params
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         content = loop_content(loop, params)
         loop = overridden(loop, params)
     roles = read_roles(loop, pieces, content.functions)
-    disturbance = bound_of_inputs(roles, inputs or {}, loop)
+    disturbance = bound_of_inputs(roles, given.inputs or {}, loop)
     for part, records in kinds.items():
         if part in roles.places:  # a network may be left out
             check_kind(roles.places[part], records)
     check_chain(roles.places["plant"])
     begins = read_starts(
         loop,
-        starts,
+        given.starts,
         free=tuple(name for part in free for name in _states(loop, roles, part)),
         kept=_states(loop, roles, "actuator"),
     )

@@ -47,7 +47,7 @@ _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it 
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_model_reference(loop, options.params, options.inputs, options.starts)
+    read = read_model_reference(loop, options)
     split = disturbed(_split(read, options), read.disturbance)
     match = matching(read, split, _checked_weights(options.W, len(read.start("weights"))))
     if not outside_ball(match):

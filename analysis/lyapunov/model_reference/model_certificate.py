@@ -123,7 +123,10 @@ class ModelReferenceCertificate(Certificate):
         return f"|W| + |W_hat - W|{ball}"
 
     def _attempts(self) -> Iterator[Content]:
-        return model_attempts(self.matching, self.split, self.C)
+        premises = _premises(self.matching, self.split)
+        for raised in _RAISED:
+            proof = _proof(self.matching, self.split, self.C * (1 + raised))
+            yield {"premises": premises, "proof": proof}
 
     def _bound(self) -> str:
         return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end,"
@@ -132,13 +135,6 @@ class ModelReferenceCertificate(Certificate):
 _RAISED = (0.0, 0.01, 0.05, 0.2, 0.5)  # relative: how far C is above the one that closed
 _WIDER, _FINE = 1e-3, 1e-3  # relative: room of bounds of the rest, and how sharply it is bounded
 _STAGES, _LESS = 40, 0.99  # of the bound in the end: each is to be less by that
-
-
-def model_attempts(match: Matching, split: Decomposition, C: float) -> Iterator[Content]:
-    """Yield premises and proof of a loop with a reference model, with more and more room."""
-    premises = _premises(match, split)
-    for raised in _RAISED:
-        yield {"premises": premises, "proof": _proof(match, split, C * (1 + raised))}
 
 
 def _premises(match: Matching, split: Decomposition) -> Content:

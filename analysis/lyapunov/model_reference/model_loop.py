@@ -32,7 +32,7 @@ from ...intervals.branch_and_bound import enclose
 from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
 from ..bounds.starts import Sides
-from ..loop.checked import CheckedLoop, read_checked
+from ..loop.checked import NOTHING_SUPPOSED, CheckedLoop, Supposed, read_checked
 from ..loop.plant_form import Acceleration, acceleration, on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
@@ -91,14 +91,9 @@ def is_model_reference(loop: Any) -> bool:
     )
 
 
-def read_model_reference(
-    loop: Any,
-    params: Mapping[str, Any] | None = None,
-    inputs: Mapping[str, float] | None = None,
-    starts: Any = None,
-) -> ModelReferenceLoop:
+def read_model_reference(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> ModelReferenceLoop:
     """Read a loop such as `nlctl.mrac` makes with a plant and an actuator."""
-    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs, starts, _OF_V)
+    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, given, _OF_V)
     roles, order = read.roles, _checked_orders(read.roles)
     model, error = roles.spec("model"), roles.spec("error")
     own_P = np.atleast_2d(error.lyapunov_matrix).copy()

@@ -22,12 +22,13 @@ from ...intervals.branch_and_bound import enclose, upper
 from ...intervals.machine import Readable
 from ...intervals.normal_form import exact
 from ...intervals.written import operations
-from ..bounds.decomposition import Decomposition
+from ..bounds.decomposition import Decomposition, decompose
 from ..bounds.error_bounds import error_bounds, filter_poles, reference_bounds
 from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_function, range_of_quotient
-from ..loop.checked import ADDED, CheckedLoop
+from ..loop.checked import ADDED, CheckedLoop, disturbed
 from ..loop.plant_form import Acceleration, acceleration
+from .kind import ProofOptions, Subject
 from .result import Certificate, Row, per_second, rows_of_split
 from .saved import Content, split_content, starts_content, texts
 
@@ -78,6 +79,15 @@ def _initial_errors(read: CheckedLoop) -> tuple[arb, ...]:
     # the radius covers what double precision has lost in yd(0)
     ends = zip(read.start("plant"), yd, strict=False)
     return tuple(between(*x) - arb(float(y), 1e-12) for x, y in ends)
+
+
+def subject_of(loop: FilteredLoop, options: ProofOptions, u_max: float) -> Subject:
+    """Return what a proof of a bound of |r| begins with; `u_max` is that of the split."""
+    actuator, tol = loop.spec("actuator"), options.tol
+    split = disturbed(decompose(actuator, k=options.k, u_max=u_max, tol=tol), loop.disturbance)
+    return Subject(
+        loop=loop, start=abs(loop.r_0), actuator=actuator, split=split, u_max=u_max, tol=tol
+    )
 
 
 def between(low: float, high: float) -> arb:

@@ -18,16 +18,14 @@ from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, only_declared
+from ..loop.checked import Supposed
 from .result import Certificate, ProofResult
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProofOptions:
+class ProofOptions(Supposed):
     """What `certify` is asked; see there."""
 
-    params: Mapping[str, Any] | None
-    inputs: Mapping[str, float] | None
-    starts: Any
     k: tuple[float, float] | None
     W: Sequence[float] | None
     u_max: float
