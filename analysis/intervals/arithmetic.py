@@ -6,8 +6,8 @@ result encloses every value that the equation takes for numbers inside the balls
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
@@ -18,7 +18,7 @@ from nlctl.expressions.functions import FUNCTIONS
 
 from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO, real_power
-from .paths import Undecided, decided
+from .paths import Undecided, decided, meanwhile
 
 __all__ = ["Ball", "NumPyFunctions", "as_ball", "common", "power"]
 
@@ -33,14 +33,9 @@ _SINC_SLOPE = 1.3707  # above the largest slope of sin(pi x)/(pi x)
 _QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> AbstractContextManager[Any]:
     """While a user's function runs its balls have no text: it would be another one of floats."""
-    token = _QUIET.set(True)
-    try:
-        yield
-    finally:
-        _QUIET.reset(token)
+    return meanwhile(_QUIET, True)
 
 
 class Ball(NumPyFunctions):
@@ -318,7 +313,7 @@ class Ball(NumPyFunctions):
         """
         return as_ball(number)
 
-    def _compared(self, other: Any, order: str) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         given, other, holds = other, as_ball(other), _ORDERS[order]
         if other is NotImplemented:
             return other

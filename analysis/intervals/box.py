@@ -186,7 +186,7 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
     return dataclasses.replace(Box.of(**sides), provenance="sampled", how=how)
 
 
-def face(box: Box, i: int, end: float) -> Box:
+def face_of_box(box: Box, i: int, end: float) -> Box:
     """Return the face of a box on which side i has one of its ends."""
     low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in (box.low, box.high))
     return dataclasses.replace(box, low=low, high=high)

@@ -218,7 +218,7 @@ def _proved_by_code(
     function: Readable, box: Box, ends: tuple[float, float], max_boxes: int
 ) -> Proof | None:
     """Return what machine code finds, if there is any; balls confirm a point that refutes."""
-    boxes = 0
+    boxes, undecided, where, value, holds = 0, 0, None, np.nan, True
     claims = [(s, e) for s, e in zip((-1, 1), (-ends[0], ends[1]), strict=True) if e < np.inf]
     if max_boxes <= TOO_FEW or not claims:
         return None
@@ -230,16 +230,14 @@ def _proved_by_code(
         boxes += verdict.boxes
         if verdict.holds:
             continue
-        value = _at(function, verdict.point, box)
-        if verdict.holds is False and not (value.upper() < ends[0] or value.lower() > ends[1]):
+        there = _at(function, verdict.point, box)
+        if verdict.holds is False and not (there.upper() < ends[0] or there.lower() > ends[1]):
             return None
-        return Proof(
-            holds=verdict.holds, boxes=boxes, undecided=verdict.undecided,
-            where=dict(zip(box.names, map(float, verdict.point), strict=True)),
-            value=float(value.mid()), seconds=0.0, arithmetic="floats",
-        )  # fmt: skip
+        holds, undecided, value = verdict.holds, verdict.undecided, float(there.mid())
+        where = dict(zip(box.names, map(float, verdict.point), strict=True))
+        break
     return Proof(
-        holds=True, boxes=boxes, undecided=0, where=None, value=np.nan, seconds=0.0,
+        holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=0.0,
         arithmetic="floats",
     )  # fmt: skip
 

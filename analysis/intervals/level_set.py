@@ -20,7 +20,7 @@ from nlctl.wording import counted
 
 from .agreement import one_number, several_numbers
 from .arithmetic import Ball, as_ball
-from .box import Box, face
+from .box import Box, face_of_box
 from .branch_and_bound import Proof, point_text, prove
 from .machine import Readable, readable
 from .paths import Undecided
@@ -190,7 +190,7 @@ def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Pro
         name = box.names[i]
         for end in box.cell[i]:
             above = float(np.nextafter(level, np.inf))
-            proof = prove(V, face(box, i, end), low=above, max_boxes=_FACE)
+            proof = prove(V, face_of_box(box, i, end), low=above, max_boxes=_FACE)
             if proof.holds is False:
                 raise ParameterError(
                     f"the box does not hold the level set: V = {proof.value:.6g} <= {level:g} at "

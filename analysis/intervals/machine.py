@@ -8,8 +8,8 @@ them at points of the box, and where a claim is refuted they have the last word.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
@@ -28,7 +28,7 @@ from nlctl.upstream.numba_internals import is_jit_disabled
 
 from .arithmetic import Ball, as_ball
 from .box import Box
-from .paths import Undecided
+from .paths import Undecided, meanwhile
 
 TOO_FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls
@@ -40,14 +40,9 @@ _ROUNDING = 1e-9  # relative
 _ONLY_BALLS: ContextVar[bool] = ContextVar("only_balls", default=False)
 
 
-@contextmanager
-def only_balls() -> Iterator[None]:
+def only_balls() -> AbstractContextManager[Any]:
     """Prove by balls alone what is proved meanwhile, whatever machine code there is."""
-    token = _ONLY_BALLS.set(True)
-    try:
-        yield
-    finally:
-        _ONLY_BALLS.reset(token)
+    return meanwhile(_ONLY_BALLS, True)
 
 
 @dataclass(frozen=True, kw_only=True)

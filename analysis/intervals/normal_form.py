@@ -116,7 +116,7 @@ class Sum(NumPyFunctions):
         """Its terms, to be compared: of sums themselves no comparison has an answer."""
         return frozenset(self.terms.items())
 
-    def _compared(self, other: Any, order: str) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         raise Undecided("a comparison of symbols has no answer for all values")
 
     def coefficient(self, product: Product) -> Fraction:

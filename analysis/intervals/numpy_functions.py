@@ -19,39 +19,24 @@ from flint import arb
 
 from nlctl.expressions.functions import FUNCTIONS
 
-from .pairs import FUNCTIONS_OF_TWO, hull
+from .pairs import FUNCTIONS_OF_TWO
 
 _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row.count == 1}
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 
 
-def _function(name: str) -> Callable[[Any], Any]:
-    def method(self: Any) -> Any:
-        return self.apply(name)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x)."
-    return method
+def _calling(method: str, name: str) -> Callable[..., Any]:
+    """Return what calls a method of a number with a name: NumPy looks for ``x.sin()``, say."""
+    return lambda self, *others: getattr(self, method)(name, *others)
 
 
-def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
-    def method(self: Any, other: object) -> Any:
-        return self.pair(name, other)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x, y)."
-    return method
-
-
-def _comparison(order: str) -> Callable[[Any, Any], Any]:
-    return lambda self, other: self._compared(other, order)
-
-
-def of_lifted(operator: Callable[..., Any]) -> Callable[..., Any]:
+def of_lifted(operator: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     """Return an operator that sees its second operand as one of the kind of the first."""
 
     @functools.wraps(operator)
-    def method(self: Any, other: object, *more: Any) -> Any:
+    def method(self: Any, other: object) -> Any:
         lifted = self.lifted(other)
-        return lifted if lifted is NotImplemented else operator(self, lifted, *more)
+        return lifted if lifted is NotImplemented else operator(self, lifted)
 
     return method
 
@@ -100,7 +85,7 @@ class NumPyFunctions:
             result = result * self
         return result
 
-    def _compared(self, other: Any, order: str) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         """Whether ``self < other`` for the order "lt", and so on."""
         raise NotImplementedError
 
@@ -163,11 +148,11 @@ class NumPyFunctions:
 
 
 for _name in _SINGLE:
-    setattr(NumPyFunctions, _name, _function(_name))
+    setattr(NumPyFunctions, _name, _calling("apply", _name))
 for _name in FUNCTIONS_OF_TWO:
-    setattr(NumPyFunctions, _name, _function_of_two(_name))
+    setattr(NumPyFunctions, _name, _calling("pair", _name))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    setattr(NumPyFunctions, f"__{_name}__", _comparison(_name))
+    setattr(NumPyFunctions, f"__{_name}__", _calling("_compared", _name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:
@@ -261,7 +246,12 @@ def enclosed_table(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> tupl
         if low <= x1 and high >= x0
     ]
     slopes += [arb(0)] if low <= xp[0] or high >= xp[-1] else []
-    return hull(values), hull(slopes)
+    value, slope = values[0], slopes[0]
+    for other in values:
+        value = value.union(other)
+    for other in slopes:
+        slope = slope.union(other)
+    return value, slope
 
 
 def _at(x: arb, xp: tuple[float, ...], fp: tuple[float, ...]) -> arb:

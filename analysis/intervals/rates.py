@@ -109,8 +109,10 @@ class Rate(NumPyFunctions):
 
     lifted = staticmethod(as_rate)  # type: ignore[assignment]
 
-    @of_lifted
-    def _compared(self, other: Any, order: str) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         """A choice between formulas may jump: only what the whole box decides is followed."""
+        other = as_rate(other)
+        if other is NotImplemented:
+            return other
         with undecided():
-            return self.here._compared(other.here, order)
+            return self.here._compared(order, other.here)

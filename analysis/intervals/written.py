@@ -115,7 +115,7 @@ class Written(NumPyFunctions):
         """Refuse a table: it is none of the operations."""
         raise Undecided("a table cannot be written")
 
-    def _compared(self, other: Any, order: str) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         raise Undecided("a comparison cannot be written: use np.minimum, np.maximum or abs")
 
 

@@ -20,13 +20,12 @@ from flint import arb
 from scipy.optimize import minimize_scalar
 
 from nlctl.errors import ParameterError
-from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 
 from ..intervals.box import Box
 from .bounds.decomposition import Decomposition
-from .bounds.error_bounds import error_bounds, reference_bounds
+from .bounds.error_bounds import error_bounds, initial_errors, reference_bounds
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import plant_terms
 from .bounds.weights import network_on_grid
@@ -146,9 +145,8 @@ def _reach(run: MemberRun, given: Premises) -> StateReach | None:
     if not isinstance(spec, SumOfSines):
         return None
     s, names = run.signals, coordinate_names(len(given.lambdas) + 1)
-    yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
-    e0 = [arb(float(s[x][0])) - arb(float(y), 1e-12) for x, y in zip(names, yd, strict=False)]
-    return StateReach(lambdas=given.lambdas, e0=tuple(e0), reference=spec)
+    e0 = initial_errors(spec, [arb(float(s[x][0])) for x in names], float(s.t[0]))
+    return StateReach(lambdas=given.lambdas, e0=e0, reference=spec)
 
 
 def closed_set(constants: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:

@@ -22,7 +22,7 @@ from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.wording import counted
 
-from ...intervals.box import Box, face
+from ...intervals.box import Box, face_of_box
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
 from .everywhere import inequality_of, safe_everywhere
@@ -307,7 +307,7 @@ def _problem(
         speed, sign = (lambda x, i=i: motion.at(x)[:, i]), 1 if end else -1
         outwards = op("add", rates[i] if end else op("neg", rates[i]), margin)
         claims.append(_Claim(
-            code=code(below, outwards), box=face(box, i, box.cell[i][end]), kind="unsafe",
+            code=code(below, outwards), box=face_of_box(box, i, box.cell[i][end]), kind="unsafe",
             what=f"B > 0 where {motion.names[i]} leaves the box",
             matters=lambda x, speed=speed, sign=sign: sign * speed(x),
         ))  # fmt: skip

@@ -22,7 +22,7 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Sides, Starts, read_starts
 from .content import UNREAD_CONTENT, LoopContent, loop_content
-from .plant_form import check_chain
+from .plant_form import Acceleration, acceleration, check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
 from .same_loop import check_same, points_around
 
@@ -80,6 +80,8 @@ class CheckedLoop:
     roles: Roles  # places of the blocks, with the parameters of the run
     disturbance: float  # bound of what external inputs add to the plant's v
     starts: Starts  # initial states that the proof shall be about
+    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
+    acceleration: Acceleration
     content: LoopContent = field(repr=False)  # what the loop consists of
     # a copy of the loop, with the parameters of the run
     given: ct.InterconnectedSystem = field(repr=False)
@@ -125,7 +127,7 @@ def read_checked(
     check_same(loop, understood, _compared_at(loop, begins), params, content=content)
     return CheckedLoop(
         roles=roles, disturbance=disturbance, starts=begins, content=content, given=loop,
-        understood=understood,
+        acceleration=acceleration(roles.places["plant"]), understood=understood,
     )  # fmt: skip
 
 
