@@ -46,6 +46,10 @@ class NumPyFunctions:
 
     __slots__ = ()
     __hash__ = None  # type: ignore[assignment]  # equality may be undecided
+    __lt__: Any  # and the others: see `_compared`
+    __le__: Any
+    __gt__: Any
+    __ge__: Any
 
     def lifted(self, number: Any) -> Any:
         """Return a number as one of this kind; NotImplemented for what is not a number."""

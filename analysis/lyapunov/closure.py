@@ -9,7 +9,6 @@ that what they say of all boxes is right.  A box that does close is found with t
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -28,7 +27,7 @@ from .bounds.decomposition import Decomposition
 from .bounds.error_bounds import error_bounds, initial_errors, reference_bounds
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import plant_terms
-from .bounds.weights import network_on_grid
+from .bounds.weights import Network, network_on_grid
 from .constants import Constants, constants_of
 from .inequalities import terms
 from .lines import Line
@@ -214,9 +213,11 @@ def least_bound(
     # psi\| <= \|W\| \|psi\| the error at a point is at least \|g\| - \|psi\| \|W\|; the least value
     # of a convex function of \|W\| is left.
     # Shapes: `W` (l,).
-    g, psi, points = _at_points(parts, sides)
+    network = _at_points(parts, sides)
     f, d = plant_terms(parts.plant)
-    corners = [x for x in points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))]
+    corners = [
+        x for x in network.points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))
+    ]
     d_star = max(abs(float(d(x, t))) for x in corners for t in _TIMES)
     gain = max((float(f(x, b)) - float(f(x, 0.0))) / b for x in corners for b in _some(v))
     rest = total_error(gain, split.eps_star, d_star, 0.0)
@@ -228,13 +229,12 @@ def least_bound(
         return float(final_bound(alpha_0(gains, delta, norm**2), alpha_1(gains), V_0, 0.0))
 
     if W is not None or not start.size:
-        error = float(np.max(np.abs(g - psi @ weights))) if weights.size else float(np.max(abs(g)))
-        apart = float(np.linalg.norm(weights - start)) if weights.size else 0.0
-        return bound(float(np.linalg.norm(weights)), error, apart)
-    size, from_0 = np.linalg.norm(psi, axis=1), float(np.linalg.norm(start))
+        apart = float(np.linalg.norm(weights - start))
+        return bound(float(np.linalg.norm(weights)), network.error(weights), apart)
+    size, from_0 = np.linalg.norm(network.psi, axis=1), float(np.linalg.norm(start))
 
     def of_norm(w: float) -> float:
-        error = max(float(np.max(np.abs(g) - size * w)), 0.0)
+        error = max(float(np.max(np.abs(network.g) - size * w)), 0.0)
         return bound(w, error, max(w - from_0, 0.0))
 
     far = of_norm(0.0) * np.sqrt(alpha_1(gains) / gains.sigma_1)  # |W| alone makes it larger beyond
@@ -244,17 +244,11 @@ def least_bound(
     return min(float(minimum.fun), of_norm(0.0)) * (1 - 1e-6)
 
 
-def _at_points(parts: Parts, sides: Sequence[float]) -> tuple[np.ndarray, np.ndarray, Any]:
+def _at_points(parts: Parts, sides: Sequence[float]) -> Network:
     """Return g and psi at points of a box, its corners and centre among them."""
     names, ends = coordinate_names(len(sides)), tuple(sides)
     box = Box(names=names, low=tuple(-a for a in ends), high=ends)
-    count = {1: 41, 2: 9}.get(len(ends), 5)
-    if parts.gains.W_hat_0:
-        network = network_on_grid(parts.plant, parts.basis, box, count)
-        return network.g, network.psi, network.points
-    f, _ = plant_terms(parts.plant)
-    points = list(itertools.product(*(np.linspace(-a, a, count) for a in ends)))
-    return np.array([float(f(x, 0.0)) for x in points]), np.zeros((len(points), 0)), points
+    return network_on_grid(parts.plant, parts.basis, box, {1: 41, 2: 9}.get(len(ends), 5))
 
 
 def _some(v: tuple[float, float]) -> list[float]:
