@@ -35,7 +35,7 @@ class GainCandidate:
 
     gains: dict[str, float]  # values by qualified name
     C_0: float  # bound of |r|; infinite if there is none
-    ultimate: float = np.nan  # bound of limsup |r|, where it is looked at
+    ultimate: float = np.nan  # bound of limsup |r|; NaN of a search that does not need it
     u: float  # max |u| along the run (sampled): infinite if it diverged, NaN if none was made
 
 
