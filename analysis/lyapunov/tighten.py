@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 _BOUNDS = ("C_0", "ultimate")
 _TOLERANCE = 1e-2  # of the branch and bounds in the search
+# gains by part; the last two are those of a network
+_SEARCHED = (("law", "beta"), ("robust", "tau"), ("robust", "gamma"), ("robust", "sigma_2"),
+             ("weights", "Gamma"), ("weights", "sigma_1"))  # fmt: skip
 OVER = 10.0  # weight of log(|u| / limit) in the cost
 
 
@@ -201,10 +204,8 @@ def _best(
 
 
 def _point(parts: Parts) -> np.ndarray:
-    g = parts.gains
-    values = [g.beta, g.tau, g.gamma, g.sigma_2]
-    if g.W_hat_0:
-        values += [g.Gamma, g.sigma_1]
+    searched = _SEARCHED if parts.gains.W_hat_0 else _SEARCHED[:4]
+    values = [getattr(parts.gains, name) for _, name in searched]
     if not min(values) > 0:
         raise ParameterError(f"tighten starts from gains > 0, got {values}: choose other gains")
     return np.log(values)
@@ -212,11 +213,8 @@ def _point(parts: Parts) -> np.ndarray:
 
 def _gains(parts: Parts, point: np.ndarray) -> dict[str, float]:
     """Return the gains of a point of the search by qualified name."""
-    values, paths = list(map(float, np.exp(point))), parts.paths
-    names = [f"{paths['law']}.beta"]
-    names += [f"{paths['robust']}.{name}" for name in ("tau", "gamma", "sigma_2")]
-    names += [f"{paths['weights']}.{name}" for name in ("Gamma", "sigma_1")]
-    return dict(zip(names, values, strict=False))
+    values = zip(_SEARCHED, map(float, np.exp(point)), strict=False)
+    return {f"{parts.paths[part]}.{name}": value for (part, name), value in values}
 
 
 def _trial(search: _Search, gains: dict[str, float]) -> GainCandidate:
