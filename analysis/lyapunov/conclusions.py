@@ -30,21 +30,15 @@ NO_BOUND = (
 )
 
 
-def slow_drift_of(run: MemberRun) -> SlowDrift | None:
-    """Return where the slow drift of zeta leads; None if the run does not show it."""
-    drift_or_reason = _slow_drift_or_reason(run)
-    return None if isinstance(drift_or_reason, str) else drift_or_reason
-
-
-def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
-    """Return where the slow drift leads, or why that is unknown."""
+def slow_drift_of(run: MemberRun) -> tuple[SlowDrift | None, str]:
+    """Return where the slow drift of zeta leads; None and why, if the run does not show it."""
     length = run.signals.t[-1] - run.signals.t[0]
     if length < 6 * _WINDOW:
-        return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
+        return None, f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return slow_drift(run.signals, run.parts.law.N, window=_WINDOW)
+        return slow_drift(run.signals, run.parts.law.N, window=_WINDOW), ""
     except ParameterError as error:
-        return str(error)
+        return None, str(error)
 
 
 def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants) -> list[Line]:
@@ -172,9 +166,9 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
 
 def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    slow = _slow_drift_or_reason(run)
-    if isinstance(slow, str):
-        return Line(key="slow drift", statement=statement, status="undecided", evidence=slow)
+    slow, reason = slow_drift_of(run)
+    if slow is None:
+        return Line(key="slow drift", statement=statement, status="undecided", evidence=reason)
     calm = slow.verdict in ("settles", "reversed")
     soon = f"; budget spent by {slow.burst:.4g} s or so, then max |r| = {slow.peak:.4g}"
     return Line(
