@@ -25,6 +25,7 @@ from nlctl.native.enclosures.boxes import BoxCode, enclosed, numbers_at, side_le
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.native.enclosures.scalars import UnroundedGraph
 from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.wording import counted
 
 from .arithmetic import Ball, as_ball
 from .box import Box
@@ -68,7 +69,7 @@ def readable(of_balls: Callable[..., Any], function: Callable[..., Any]) -> Read
     def number(graph: Graph, sides: tuple[Tracer, ...]) -> list[Expr]:
         numbers = numbers_at(graph, function, sides)
         if len(numbers) != 1:
-            raise Untraceable(f"it gives {len(numbers)} numbers, where one is needed")
+            raise Untraceable(f"it gives {counted(len(numbers), 'number')}, where one is needed")
         return numbers
 
     return Readable(of_balls=of_balls, expressions=number)
