@@ -76,6 +76,18 @@ def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
     return total
 
 
+def as_sum(x: Any) -> Any:
+    """Return a number as a sum; NotImplemented for what is not a number."""
+    if isinstance(x, Sum):
+        return x
+    if isinstance(x, Fraction):
+        return Sum({_ONE: x})
+    ball = as_ball(x)
+    if ball is NotImplemented or isinstance(x, Ball | arb):
+        return NotImplemented
+    return Sum({_ONE: exact(x)})
+
+
 class Sum(NumPyFunctions):
     """A sum of products of atoms, as equations compute with it.
 
@@ -102,6 +114,8 @@ class Sum(NumPyFunctions):
         # atoms without a value somewhere, or with a jump, which took part even if they have
         # cancelled: the sum is what the equation is only where they have a value
         self.partial = partial
+
+    lifted = staticmethod(as_sum)
 
     def __repr__(self) -> str:
         return f"Sum({self.terms})"
@@ -188,11 +202,6 @@ class Sum(NumPyFunctions):
         """Return the linear interpolation of a table, as an atom."""
         return self._function("table", data=(xp, fp))
 
-    @staticmethod
-    def lifted(number: Any) -> Any:
-        """Return a number as a sum."""
-        return as_sum(number)
-
     def _function(self, name: str, *others: Sum, data: tuple[Any, ...] = ()) -> Sum:
         atom = Atom(name, tuple(argument.key() for argument in (self, *others)), data)
         undefined = frozenset([] if name in EVERYWHERE else [atom])
@@ -210,18 +219,6 @@ def exact(number: Any) -> Fraction:
     1/2
     """
     return number if isinstance(number, Fraction) else Fraction(float(number))
-
-
-def as_sum(x: Any) -> Any:
-    """Return a number as a sum; NotImplemented for what is not a number."""
-    if isinstance(x, Sum):
-        return x
-    if isinstance(x, Fraction):
-        return Sum({_ONE: x})
-    ball = as_ball(x)
-    if ball is NotImplemented or isinstance(x, Ball | arb):
-        return NotImplemented
-    return Sum({_ONE: exact(x)})
 
 
 def indeterminate(name: str) -> Sum:

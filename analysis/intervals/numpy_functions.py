@@ -46,17 +46,16 @@ class NumPyFunctions:
 
     __slots__ = ()
     __hash__ = None  # type: ignore[assignment]  # equality may be undecided
-    __lt__: Any  # and the others: see `_compared`
+    __neg__: Any  # what each kind has itself
+    lifted: Any  # ``lifted(number)``: of this kind; NotImplemented for what is not a number
+    apply: Any
+    pair: Any
+    table: Any
+    _compared: Any  # ``_compared("lt", other)`` is ``self < other``, and so on
+    __lt__: Any
     __le__: Any
     __gt__: Any
     __ge__: Any
-
-    def lifted(self, number: Any) -> Any:
-        """Return a number as one of this kind; NotImplemented for what is not a number."""
-        raise NotImplementedError
-
-    def __neg__(self) -> Any:
-        raise NotImplementedError
 
     def __pos__(self) -> Any:
         return self
@@ -89,10 +88,6 @@ class NumPyFunctions:
             result = result * self
         return result
 
-    def _compared(self, order: str, other: Any) -> Any:
-        """Whether ``self < other`` for the order "lt", and so on."""
-        raise NotImplementedError
-
     def __bool__(self) -> bool:
         return self != 0
 
@@ -103,18 +98,6 @@ class NumPyFunctions:
         if function in _ARRAY_FUNCTIONS:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
-
-    def pair(self, name: str, other: object) -> Any:
-        """Return a function of two arguments, of this and another number."""
-        raise NotImplementedError
-
-    def apply(self, name: str) -> Any:
-        """Return a function of one argument."""
-        raise NotImplementedError
-
-    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Any:
-        """Return the linear interpolation of a table."""
-        raise NotImplementedError
 
     def __mod__(self, other: object) -> Any:
         return self.pair("remainder", other)

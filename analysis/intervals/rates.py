@@ -107,7 +107,7 @@ class Rate(NumPyFunctions):
         _, slope = enclosed_table(self.here.value, xp, fp)
         return Rate(self.here.table(xp, fp), of_unknown_slope(slope, self.here) * self.rate)
 
-    lifted = staticmethod(as_rate)  # type: ignore[assignment]
+    lifted = staticmethod(as_rate)
 
     def _compared(self, order: str, other: Any) -> Any:
         """A choice between formulas may jump: only what the whole box decides is followed."""
