@@ -6,8 +6,8 @@ result encloses every value that the equation takes for numbers inside the balls
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
@@ -18,12 +18,14 @@ from nlctl.expressions.functions import FUNCTIONS
 
 from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO, real_power
-from .paths import Undecided, decided
+from .paths import Undecided, decided, meanwhile
 
 __all__ = ["Ball", "NumPyFunctions", "as_ball", "common", "power"]
 
 
 _ANY = arb(0, "inf")
+# signs of a - b that a comparison of a and b allows
+_ORDERS = {"lt": {-1}, "le": {-1, 0}, "gt": {1}, "ge": {0, 1}, "eq": {0}, "ne": {-1, 1}}
 _NOT_NEGATIVE = ("sqrt", "exp", "cosh")
 _ODD_AND_RISING = ("sinh", "tanh", "arctan", "arcsinh", "expm1", "log1p", "cbrt", "sign", "floor",
                    "ceil", "trunc", "rint")  # fmt: skip  # or of the sign of what they are of
@@ -31,14 +33,9 @@ _SINC_SLOPE = 1.3707  # above the largest slope of sin(pi x)/(pi x)
 _QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> AbstractContextManager[Any]:
     """While a user's function runs its balls have no text: it would be another one of floats."""
-    token = _QUIET.set(True)
-    try:
-        yield
-    finally:
-        _QUIET.reset(token)
+    return meanwhile(_QUIET, True)
 
 
 class Ball(NumPyFunctions):
@@ -155,13 +152,10 @@ class Ball(NumPyFunctions):
         return result.known_not_negative(self.not_negative and other.not_negative)
 
     def __pow__(self, n: Any) -> Any:
-        if isinstance(n, Ball):
-            n = float(n.value) if n.value.is_exact() and not n.gradient else n
-        if isinstance(n, Ball) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self ** (-n)
-        n = int(n)
+        is_exact = isinstance(n, Ball) and n.value.is_exact() and not n.gradient
+        return super().__pow__(float(n.value) if is_exact else n)
+
+    def _whole_power(self, n: int) -> Ball:
         result = self.chain(power(self.value, n), n * power(self.value, max(n - 1, 0)))
         return result.known_not_negative(n % 2 == 0 or self.not_negative)
 
@@ -319,9 +313,8 @@ class Ball(NumPyFunctions):
         """
         return as_ball(number)
 
-    def _compare(self, other: Any, holds: frozenset[int], what: str) -> Any:
-        """Return whether the order of self and other is one of those; see `decided`."""
-        given, other = other, as_ball(other)
+    def _compared(self, order: str, other: Any) -> Any:
+        given, other, holds = other, as_ball(other), _ORDERS[order]
         if other is NotImplemented:
             return other
         a, b = self.value, other.value
@@ -333,25 +326,7 @@ class Ball(NumPyFunctions):
             return 0 in holds
         possible = {k for k, no in ((-1, a >= b), (0, a != b), (1, a <= b)) if not no}
         key = (self, given if given is other else b)
-        return decided(possible, holds, key, f"{what}({a}, {b})")
-
-    def __lt__(self, other: object) -> bool:
-        return self._compare(other, frozenset({-1}), "lt")
-
-    def __le__(self, other: object) -> bool:
-        return self._compare(other, frozenset({-1, 0}), "le")
-
-    def __gt__(self, other: object) -> bool:
-        return self._compare(other, frozenset({1}), "gt")
-
-    def __ge__(self, other: object) -> bool:
-        return self._compare(other, frozenset({0, 1}), "ge")
-
-    def __eq__(self, other: object) -> bool:
-        return self._compare(other, frozenset({0}), "eq")
-
-    def __ne__(self, other: object) -> bool:
-        return self._compare(other, frozenset({-1, 1}), "ne")
+        return decided(possible, holds, key, f"{order}({a}, {b})")
 
 
 def common(a: arb, b: arb) -> arb:

@@ -186,5 +186,11 @@ def visited_box(*responses: ct.TimeResponseData, margin: float = 0.1) -> Box:
     return dataclasses.replace(Box.of(**sides), provenance="sampled", how=how)
 
 
+def face_of_box(box: Box, i: int, end: float) -> Box:
+    """Return the face of a box on which side i has one of its ends."""
+    low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in (box.low, box.high))
+    return dataclasses.replace(box, low=low, high=high)
+
+
 def _is_state(name: str) -> bool:
     return name[:1] == "x" and name[1:].isdigit()

@@ -17,7 +17,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -28,12 +28,13 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import a_function, integer, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
+from nlctl.native.enclosures.divide import Supremum, enclose_supremum
 from nlctl.wording import counted
 
 from .agreement import one_number
 from .arithmetic import Ball, as_ball, common
 from .box import Box, Cell
-from .machine import TOO_FEW, Readable, code_for, decided_by_code, supremum_by_code
+from .machine import TOO_FEW, Readable, code_for, decided_by_code, readable
 from .paths import Undecided, every_way
 from .type_questions import is_of_library
 
@@ -92,7 +93,7 @@ class Proof:
             return ""
         what = counted(self.undecided, "box is", "boxes are")
         return (
-            f"{what} undecided after {self.boxes}, one around {_point(self.where)}: raise "
+            f"{what} undecided after {self.boxes}, one around {point_text(self.where)}: raise "
             "max_boxes, or leave the claim a margin there"
         )
 
@@ -101,10 +102,11 @@ class Proof:
             return f"undecided: {self.missing}"
         if self.holds:
             return f"proved on {counted(self.boxes, 'box', 'boxes')}"
-        return f"refuted at {_point(self.where)}: {self.value:.6g}"
+        return f"refuted at {point_text(self.where)}: {self.value:.6g}"
 
 
-def _point(where: dict[str, float] | None) -> str:
+def point_text(where: Mapping[str, float] | None) -> str:
+    """Return the coordinates of a point in words."""
     return ", ".join(f"{name} = {value:.6g}" for name, value in (where or {}).items())
 
 
@@ -144,17 +146,16 @@ def enclose(function: _Function, box: Box, *, tol: float = 1e-3, max_boxes: int 
     if not tol > 0:  # infinite: the first box will do
         raise ParameterError(f"enclose needs tol > 0, got {tol}")
     integer("enclose", "max_boxes", max_boxes, at_least=1)
-    as_given, function = function, _also_of_floats("enclose", function)
-    start = time.perf_counter()
-    high, greatest, n, lost, by_code = _end(as_given, function, box, 1, tol, max_boxes)
-    low, least, m, missed, also = _end(as_given, function, box, -1, tol, max_boxes)
+    start, read = time.perf_counter(), _as_readable("enclose", function)
+    high, by_code = _end(read, box, 1, tol, max_boxes)
+    low, also = _end(read, box, -1, tol, max_boxes)
     return Range(
-        low=-low,
-        high=high,
-        least=-least,
-        greatest=greatest,
-        boxes=n + m,
-        undecided=lost + missed,
+        low=-low.high,
+        high=high.high,
+        least=-low.attained,
+        greatest=high.attained,
+        boxes=high.boxes + low.boxes,
+        undecided=high.unbounded + low.unbounded,
         seconds=time.perf_counter() - start,
         arithmetic="floats" if by_code and also else "balls",
     )
@@ -207,39 +208,36 @@ def prove(
     integer("prove", "max_boxes", max_boxes, at_least=1)
     if not low <= high:  # refuses NaN, too
         raise ParameterError(f"prove needs low <= high, got {low} and {high}")
-    as_given, function = function, _also_of_floats("prove", function)
-    start = time.perf_counter()
-    proof = _proved_by_code(as_given, function, box, (low, high), max_boxes)
-    proof = proof or _proved_by_balls(function, box, (low, high), max_boxes)
+    start, read = time.perf_counter(), _as_readable("prove", function)
+    proof = _proved_by_code(read, box, (low, high), max_boxes)
+    proof = proof or _proved_by_balls(read, box, (low, high), max_boxes)
     return replace(proof, seconds=time.perf_counter() - start)
 
 
 def _proved_by_code(
-    as_given: Any, function: _Function, box: Box, ends: tuple[float, float], max_boxes: int
+    function: Readable, box: Box, ends: tuple[float, float], max_boxes: int
 ) -> Proof | None:
     """Return what machine code finds, if there is any; balls confirm a point that refutes."""
-    boxes = 0
+    boxes, undecided, where, value, holds = 0, 0, None, np.nan, True
     claims = [(s, e) for s, e in zip((-1, 1), (-ends[0], ends[1]), strict=True) if e < np.inf]
     if max_boxes <= TOO_FEW or not claims:
         return None
     for sign, bound in claims:
-        code = code_for(as_given, function, box, sign, bound)
+        code = code_for(function, box, sign)
         if code is None:
             return None
-        verdict = decided_by_code(code, box, max(max_boxes - boxes, 1))
+        verdict = decided_by_code(code, box, bound, max(max_boxes - boxes, 1))
         boxes += verdict.boxes
         if verdict.holds:
             continue
-        value = _at(function, verdict.point, box)
-        if verdict.holds is False and not (value.upper() < ends[0] or value.lower() > ends[1]):
+        there = _at(function, verdict.point, box)
+        if verdict.holds is False and not (there.upper() < ends[0] or there.lower() > ends[1]):
             return None
-        return Proof(
-            holds=verdict.holds, boxes=boxes, undecided=verdict.undecided,
-            where=dict(zip(box.names, map(float, verdict.point), strict=True)),
-            value=float(value.mid()), seconds=0.0, arithmetic="floats",
-        )  # fmt: skip
+        holds, undecided, value = verdict.holds, verdict.undecided, float(there.mid())
+        where = dict(zip(box.names, map(float, verdict.point), strict=True))
+        break
     return Proof(
-        holds=True, boxes=boxes, undecided=0, where=None, value=np.nan, seconds=0.0,
+        holds=holds, boxes=boxes, undecided=undecided, where=where, value=value, seconds=0.0,
         arithmetic="floats",
     )  # fmt: skip
 
@@ -280,31 +278,30 @@ def _proved_by_balls(
 
 
 def _end(
-    as_given: Any, function: _Function, box: Box, sign: int, tol: float, max_boxes: int
-) -> tuple[float, float, int, int, bool]:
-    """Return what `_supremum` does of sign f, and whether machine code has found it."""
-    code = code_for(as_given, function, box, sign) if max_boxes > TOO_FEW else None
+    function: Readable, box: Box, sign: int, tol: float, max_boxes: int
+) -> tuple[Supremum, bool]:
+    """Return the supremum of sign f, and whether machine code has found it."""
+    code = code_for(function, box, sign) if max_boxes > TOO_FEW else None
     if code is None:
         mirrored = function if sign > 0 else lambda x: -as_ball(function(x))
-        return *_supremum(mirrored, box, tol, max_boxes), False
-    supremum = supremum_by_code(code, box, tol, max_boxes, HOPELESS)
-    return supremum.high, supremum.attained, supremum.boxes, supremum.unbounded, True
+        return _supremum(mirrored, box, tol, max_boxes), False
+    low, high = np.array([box.low, box.high], dtype=float)
+    by_code = enclose_supremum(code, low, high, tol=tol, max_boxes=max_boxes, hopeless=HOPELESS)
+    return by_code, True
 
 
-def _also_of_floats(who: str, function: _Function) -> _Function:
-    """Return a user's function, to be compared with itself on floats."""
-    if isinstance(function, Readable) or is_of_library(function):  # compared on its own
+def _as_readable(who: str, function: _Function) -> Readable:
+    """Return a function with its expression; a user's is compared with itself on floats."""
+    if isinstance(function, Readable):
         return function
-    return one_number(
-        function,
-        lambda why: ParameterError(f"{who} needs a function of numbers, of which it holds: {why}"),
-    )
+    if is_of_library(function):  # compared on its own
+        return readable(function, function)
+    what = f"{who} needs a function of numbers, of which it holds: "
+    return readable(one_number(function, lambda why: ParameterError(what + why)), function)
 
 
-def _supremum(
-    function: _Function, box: Box, tol: float, max_boxes: int
-) -> tuple[float, float, int, int]:
-    """Return a proved upper bound, the largest value met, boxes used and boxes undecided."""
+def _supremum(function: _Function, box: Box, tol: float, max_boxes: int) -> Supremum:
+    """Return a proved upper bound with the largest value met, by balls."""
     order, boxes, best = itertools.count(), 0, -np.inf
     heap: list[tuple[float, int, Cell, Any]] = []
     done: list[float] = []
@@ -327,7 +324,8 @@ def _supremum(
             if not heap:
                 break
     bounds = [*done, *(-h[0] for h in heap)]
-    return max(bounds), best, boxes, sum(b == np.inf for b in bounds)
+    lost = sum(b == np.inf for b in bounds)
+    return Supremum(high=max(bounds), attained=best, boxes=boxes, unbounded=lost)
 
 
 def upper(ball: Any) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -21,9 +20,9 @@ from nlctl.wording import counted
 
 from .agreement import one_number, several_numbers
 from .arithmetic import Ball, as_ball
-from .box import Box
-from .branch_and_bound import Proof, prove
-from .machine import Readable
+from .box import Box, face_of_box
+from .branch_and_bound import Proof, point_text, prove
+from .machine import Readable, readable
 from .paths import Undecided
 from .rates import Rate, as_rate
 
@@ -103,7 +102,7 @@ def prove_decrease(
     _check_continuous(V, box)
     fixed = _parameters(V, rhs, box)
     open_face = _check_faces(
-        Readable(of_balls=V, expressions=partial(_value, plain[0])),
+        readable(V, plain[0]),
         box,
         high,
         [i for i in range(len(fixed)) if not fixed[i]],
@@ -125,10 +124,6 @@ def prove_decrease(
     if given is None:
         claim = Readable(of_balls=least, expressions=partial(_conditions, *plain, low, high))
     return prove(claim, box, high=0.0, max_boxes=max_boxes)
-
-
-def _value(V: Scalar, graph: Graph, sides: tuple[Any, ...]) -> list[Expr]:
-    return numbers_at(graph, V, sides)
 
 
 def _conditions(
@@ -194,15 +189,13 @@ def _check_faces(V: Scalar, box: Box, level: float, sides: Sequence[int]) -> Pro
     for i in sides:
         name = box.names[i]
         for end in box.cell[i]:
-            ends = (box.low, box.high)
-            low, high = (tuple(end if j == i else a for j, a in enumerate(s)) for s in ends)
-            face = dataclasses.replace(box, low=low, high=high)
-            proof = prove(V, face, low=float(np.nextafter(level, np.inf)), max_boxes=_FACE)
+            above = float(np.nextafter(level, np.inf))
+            proof = prove(V, face_of_box(box, i, end), low=above, max_boxes=_FACE)
             if proof.holds is False:
-                at = ", ".join(f"{k} = {v:.6g}" for k, v in (proof.where or {}).items())
                 raise ParameterError(
                     f"the box does not hold the level set: V = {proof.value:.6g} <= {level:g} at "
-                    f"{at}, on its face {name} = {end:g}: take a larger box, or a lower level"
+                    f"{point_text(proof.where)}, on its face {name} = {end:g}: take a larger box, "
+                    "or a lower level"
                 )
             if proof.holds is None:
                 return proof
@@ -223,9 +216,8 @@ def _check_gradient(V: Scalar, gradient: Vector, x: tuple[Any, ...], box: Box) -
         if one.is_finite() and other.is_finite():
             room = _SAME * (1 + float(abs(one).upper()))
             if not (one + arb(0, room)).overlaps(other):
-                at = ", ".join(
-                    f"{k} = {float(v.mid()):.6g}" for k, v in zip(box.names, values, strict=True)
-                )
+                middle = (float(v.mid()) for v in values)
+                at = point_text(dict(zip(box.names, middle, strict=True)))
                 raise ParameterError(
                     f"gradient gives dV/d{name} = {other} around {at}, the derivative of V is {one}"
                 )

@@ -8,8 +8,8 @@ them at points of the box, and where a claim is refuted they have the last word.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,14 +21,15 @@ from nlctl.errors import CompileError
 from nlctl.expressions.arrays import Tracer
 from nlctl.expressions.continuity import is_an_extreme
 from nlctl.expressions.graph import Expr, Graph, Untraceable
-from nlctl.native.enclosures.boxes import BoxCode, enclosed, expressions_of, side_leaves
-from nlctl.native.enclosures.divide import BoxVerdict, Supremum, decide_claim, enclose_supremum
+from nlctl.native.enclosures.boxes import BoxCode, enclosed, numbers_at, side_leaves
+from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.native.enclosures.scalars import UnroundedGraph
 from nlctl.upstream.numba_internals import is_jit_disabled
+from nlctl.wording import counted
 
 from .arithmetic import Ball, as_ball
 from .box import Box
-from .paths import Undecided
+from .paths import Undecided, meanwhile
 
 TOO_FEW = 16  # boxes, for which code does not pay
 _POINTS = 8  # at which code is compared with balls
@@ -40,14 +41,9 @@ _ROUNDING = 1e-9  # relative
 _ONLY_BALLS: ContextVar[bool] = ContextVar("only_balls", default=False)
 
 
-@contextmanager
-def only_balls() -> Iterator[None]:
+def only_balls() -> AbstractContextManager[Any]:
     """Prove by balls alone what is proved meanwhile, whatever machine code there is."""
-    token = _ONLY_BALLS.set(True)
-    try:
-        yield
-    finally:
-        _ONLY_BALLS.reset(token)
+    return meanwhile(_ONLY_BALLS, True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,50 +63,42 @@ class Readable:
         return self.of_balls(*given)
 
 
-@dataclass(frozen=True, kw_only=True)
-class CodedClaim:
-    """What a claim excludes: that all these numbers are positive at a point of the box."""
+def readable(of_balls: Callable[..., Any], function: Callable[..., Any]) -> Readable:
+    """Return a function of a tuple of numbers, with what it does to balls and as an expression."""
 
-    code: BoxCode
-    bound: float  # what their least is compared with
+    def number(graph: Graph, sides: tuple[Tracer, ...]) -> list[Expr]:
+        numbers = numbers_at(graph, function, sides)
+        if len(numbers) != 1:
+            raise Untraceable(f"it gives {counted(len(numbers), 'number')}, where one is needed")
+        return numbers
+
+    return Readable(of_balls=of_balls, expressions=number)
 
 
-def code_for(
-    function: Any, on_balls: Callable[..., Any], box: Box, sign: int, bound: float = 0.0
-) -> CodedClaim | None:
-    """Return code for sign f <= bound; None for a function that has none, or on no such machine."""
+def code_for(function: Readable, box: Box, sign: int) -> BoxCode | None:
+    """Return code for the claim sign f <= 0; None where there is none, or on no such machine."""
     if is_jit_disabled() or not box.names or _ONLY_BALLS.get():
         return None
-    codes = function.codes if isinstance(function, Readable) else {}
     key = (len(box.names), sign)
-    if key not in codes:
+    if key not in function.codes:
         code = _generated(function, *key)
-        codes[key] = code if code is not None and _agrees(code, on_balls, box, sign) else None
-    code = codes[key]
-    return None if code is None else CodedClaim(code=code, bound=bound)
+        function.codes[key] = code if code and _agrees(code, function, box, sign) else None
+    return function.codes[key]
 
 
-def _generated(function: Any, sides: int, sign: int) -> BoxCode | None:
+def _generated(function: Readable, sides: int, sign: int) -> BoxCode | None:
     """Return the code of sign f, None if it has none."""
     try:
-        graph, results = _expressions(function, sides)
-        if isinstance(function, Readable) and len(results) > 1:
-            return enclosed(results, sides)
-        if len(results) != 1:
-            return None
-        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
-    except (Untraceable, CompileError):  # the latter where the C library lacks a function
-        return None
-
-
-def _expressions(function: Any, sides: int) -> tuple[Graph, Sequence[Expr]]:
-    if isinstance(function, Readable):
         if sides not in function.read:
             graph = UnroundedGraph({"x": sides})
             expressions = function.expressions(graph, side_leaves(graph, sides))
             function.read[sides] = graph, expressions
-        return function.read[sides]
-    return expressions_of(function, sides)
+        graph, results = function.read[sides]
+        if len(results) > 1:
+            return enclosed(results, sides)
+        return enclosed(_apart(graph, graph.number(results[0]), sign), sides)
+    except (Untraceable, CompileError):  # the latter where the C library lacks a function
+        return None
 
 
 def _apart(graph: Graph, expr: Expr, sign: int) -> list[Expr]:
@@ -125,7 +113,7 @@ def _apart(graph: Graph, expr: Expr, sign: int) -> list[Expr]:
     return [expr if sign > 0 else graph.op("neg", expr)]
 
 
-def _agrees(code: BoxCode, function: Any, box: Box, sign: int) -> bool:
+def _agrees(code: BoxCode, function: Readable, box: Box, sign: int) -> bool:
     """Whether code and balls meet at points of the box."""
     points = np.array([_point(box, k) for k in range(_POINTS)])
     low, high = (v.min(axis=1) for v in code.values(points, points))
@@ -152,20 +140,8 @@ def _point(box: Box, k: int) -> list[float]:
     return point
 
 
-def _ends(box: Box) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(box.low, dtype=float), np.array(box.high, dtype=float)
-
-
-def decided_by_code(claim: CodedClaim, box: Box, max_boxes: int) -> BoxVerdict:
+def decided_by_code(code: BoxCode, box: Box, bound: float, max_boxes: int) -> BoxVerdict:
     """Return the verdict on a claim; the same whatever the number of processors."""
-    low, high = _ends(box)
+    low, high = np.array([box.low, box.high], dtype=float)
     threads = os.cpu_count() or 1
-    return decide_claim(claim.code, low, high, claim.bound, max_boxes=max_boxes, threads=threads)
-
-
-def supremum_by_code(
-    claim: CodedClaim, box: Box, tol: float, max_boxes: int, hopeless: int
-) -> Supremum:
-    """Return the supremum of the least of the numbers."""
-    low, high = _ends(box)
-    return enclose_supremum(claim.code, low, high, tol=tol, max_boxes=max_boxes, hopeless=hopeless)
+    return decide_claim(code, low, high, bound, max_boxes=max_boxes, threads=threads)

@@ -76,6 +76,18 @@ def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
     return total
 
 
+def as_sum(x: Any) -> Any:
+    """Return a number as a sum; NotImplemented for what is not a number."""
+    if isinstance(x, Sum):
+        return x
+    if isinstance(x, Fraction):
+        return Sum({_ONE: x})
+    ball = as_ball(x)
+    if ball is NotImplemented or isinstance(x, Ball | arb):
+        return NotImplemented
+    return Sum({_ONE: exact(x)})
+
+
 class Sum(NumPyFunctions):
     """A sum of products of atoms, as equations compute with it.
 
@@ -103,6 +115,8 @@ class Sum(NumPyFunctions):
         # cancelled: the sum is what the equation is only where they have a value
         self.partial = partial
 
+    lifted = staticmethod(as_sum)
+
     def __repr__(self) -> str:
         return f"Sum({self.terms})"
 
@@ -116,12 +130,8 @@ class Sum(NumPyFunctions):
         """Its terms, to be compared: of sums themselves no comparison has an answer."""
         return frozenset(self.terms.items())
 
-    def _refused(self, *_: Any) -> bool:
+    def _compared(self, order: str, other: Any) -> Any:
         raise Undecided("a comparison of symbols has no answer for all values")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __bool__ = _refused  # type: ignore[assignment]
-    __eq__ = __ne__ = _refused  # type: ignore[assignment]
-    __hash__ = None  # type: ignore[assignment]
 
     def coefficient(self, product: Product) -> Fraction:
         """Return the coefficient of a product; 0 where it does not occur."""
@@ -163,17 +173,10 @@ class Sum(NumPyFunctions):
             return self * (1 / constant)
         return self * other._function("inverse")
 
-    def __pow__(self, n: Any) -> Sum:
-        if isinstance(n, NumPyFunctions) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self ** (-n)
+    def _whole_power(self, n: int) -> Sum:
         if n > LARGEST_POWER:
             raise Undecided(f"a power of {n}")
-        result = as_sum(1)
-        for _ in range(int(n)):
-            result = result * self
-        return result
+        return super()._whole_power(n)
 
     def __abs__(self) -> Sum:
         return self._function("absolute")
@@ -199,11 +202,6 @@ class Sum(NumPyFunctions):
         """Return the linear interpolation of a table, as an atom."""
         return self._function("table", data=(xp, fp))
 
-    @staticmethod
-    def lifted(number: Any) -> Any:
-        """Return a number as a sum."""
-        return as_sum(number)
-
     def _function(self, name: str, *others: Sum, data: tuple[Any, ...] = ()) -> Sum:
         atom = Atom(name, tuple(argument.key() for argument in (self, *others)), data)
         undefined = frozenset([] if name in EVERYWHERE else [atom])
@@ -221,18 +219,6 @@ def exact(number: Any) -> Fraction:
     1/2
     """
     return number if isinstance(number, Fraction) else Fraction(float(number))
-
-
-def as_sum(x: Any) -> Any:
-    """Return a number as a sum; NotImplemented for what is not a number."""
-    if isinstance(x, Sum):
-        return x
-    if isinstance(x, Fraction):
-        return Sum({_ONE: x})
-    ball = as_ball(x)
-    if ball is NotImplemented or isinstance(x, Ball | arb):
-        return NotImplemented
-    return Sum({_ONE: exact(x)})
 
 
 def indeterminate(name: str) -> Sum:

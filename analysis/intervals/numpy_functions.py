@@ -25,20 +25,9 @@ _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 
 
-def _function(name: str) -> Callable[[Any], Any]:
-    def method(self: Any) -> Any:
-        return self.apply(name)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x)."
-    return method
-
-
-def _function_of_two(name: str) -> Callable[[Any, Any], Any]:
-    def method(self: Any, other: object) -> Any:
-        return self.pair(name, other)
-
-    method.__doc__ = f"NumPy calls this for np.{name}(x, y)."
-    return method
+def _calling(method: str, name: str) -> Callable[..., Any]:
+    """Return what calls a method of a number with a name: NumPy looks for ``x.sin()``, say."""
+    return lambda self, *others: getattr(self, method)(name, *others)
 
 
 def of_lifted(operator: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -57,13 +46,16 @@ class NumPyFunctions:
 
     __slots__ = ()
     __hash__ = None  # type: ignore[assignment]  # equality may be undecided
-
-    def lifted(self, number: Any) -> Any:
-        """Return a number as one of this kind; NotImplemented for what is not a number."""
-        raise NotImplementedError
-
-    def __neg__(self) -> Any:
-        raise NotImplementedError
+    __neg__: Any  # what each kind has itself
+    lifted: Any  # ``lifted(number)``: of this kind; NotImplemented for what is not a number
+    apply: Any
+    pair: Any
+    table: Any
+    _compared: Any  # ``_compared("lt", other)`` is ``self < other``, and so on
+    __lt__: Any
+    __le__: Any
+    __gt__: Any
+    __ge__: Any
 
     def __pos__(self) -> Any:
         return self
@@ -85,6 +77,17 @@ class NumPyFunctions:
     def __rtruediv__(self, other: Any) -> Any:
         return other / self
 
+    def __pow__(self, n: Any) -> Any:
+        if isinstance(n, NumPyFunctions) or n != int(n):
+            return self.pair("power", n)
+        return 1 / self**-n if n < 0 else self._whole_power(int(n))
+
+    def _whole_power(self, n: int) -> Any:
+        result = self.lifted(1)
+        for _ in range(n):
+            result = result * self
+        return result
+
     def __bool__(self) -> bool:
         return self != 0
 
@@ -95,18 +98,6 @@ class NumPyFunctions:
         if function in _ARRAY_FUNCTIONS:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
-
-    def pair(self, name: str, other: object) -> Any:
-        """Return a function of two arguments, of this and another number."""
-        raise NotImplementedError
-
-    def apply(self, name: str) -> Any:
-        """Return a function of one argument."""
-        raise NotImplementedError
-
-    def table(self, xp: tuple[float, ...], fp: tuple[float, ...]) -> Any:
-        """Return the linear interpolation of a table."""
-        raise NotImplementedError
 
     def __mod__(self, other: object) -> Any:
         return self.pair("remainder", other)
@@ -144,9 +135,11 @@ class NumPyFunctions:
 
 
 for _name in _SINGLE:
-    setattr(NumPyFunctions, _name, _function(_name))
+    setattr(NumPyFunctions, _name, _calling("apply", _name))
 for _name in FUNCTIONS_OF_TWO:
-    setattr(NumPyFunctions, _name, _function_of_two(_name))
+    setattr(NumPyFunctions, _name, _calling("pair", _name))
+for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(NumPyFunctions, f"__{_name}__", _calling("_compared", _name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:

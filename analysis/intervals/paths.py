@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from flint import arb
 
+_T = TypeVar("_T")
 BRANCHES = 64  # paths through an equation on one box, beyond which the box is split first
 
 
@@ -65,26 +66,21 @@ _DECISIONS: ContextVar[Decisions | None] = ContextVar("decisions", default=None)
 
 
 @contextmanager
-def take(decisions: Decisions) -> Iterator[Decisions]:
-    """Answer undecided comparisons by `decisions`, for one who follows every branch in turn."""
-    token = _DECISIONS.set(decisions)
+def meanwhile(variable: ContextVar[_T], value: _T) -> Iterator[_T]:
+    """Give a variable of the context a value while something runs."""
+    token = variable.set(value)
     try:
-        yield decisions
+        yield value
     finally:
-        _DECISIONS.reset(token)
+        variable.reset(token)
 
 
-@contextmanager
-def undecided() -> Iterator[None]:
+def undecided() -> AbstractContextManager[Any]:
     """Answer nothing: a comparison that balls cannot decide raises, whatever branch is followed."""
-    token = _DECISIONS.set(None)
-    try:
-        yield
-    finally:
-        _DECISIONS.reset(token)
+    return meanwhile(_DECISIONS, None)
 
 
-def decided(possible: set[int], holds: frozenset[int], key: tuple[Any, Any], what: str) -> bool:
+def decided(possible: set[int], holds: set[int], key: tuple[Any, Any], what: str) -> bool:
     """Return whether the order of two quantities is one of `holds`; or see `Undecided`."""
     decisions = _DECISIONS.get()
     if decisions is not None:
@@ -116,7 +112,8 @@ def every_way(call: Callable[[], Any]) -> Iterator[Any]:
     while scripts:
         given = scripts.pop()
         count += 1
-        with take(Decisions(given=given)) as decisions:
+        decisions = Decisions(given=given)
+        with meanwhile(_DECISIONS, decisions):
             value = call()
         yield value
         taken = decisions.taken

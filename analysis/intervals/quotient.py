@@ -18,6 +18,8 @@ from .numpy_functions import JUMPS, NumPyFunctions, enclosed_table, of_lifted
 from .pairs import FUNCTIONS_OF_TWO
 from .paths import Undecided
 
+_NOT = {"gt": "le", "ge": "lt", "ne": "eq"}  # what does not hold where these do
+
 
 class Slope(NumPyFunctions):
     """A quantity q of an equation: q(v), q(0) and (q(v) - q(0)) / v, each a `Ball`."""
@@ -60,16 +62,6 @@ class Slope(NumPyFunctions):
         base = self.base / other.base
         quotient = (self.quotient - base * other.quotient) / other.here
         return Slope(self.here / other.here, base, quotient)
-
-    def __pow__(self, n: Any) -> Any:
-        if isinstance(n, NumPyFunctions) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self**-n
-        result = self.lifted(1)
-        for _ in range(int(n)):
-            result = result * self
-        return result
 
     def __abs__(self) -> Slope:
         return self if self >= 0 else -self
@@ -120,31 +112,19 @@ class Slope(NumPyFunctions):
         secant = _secant(name, self.here, self.base, here, base)
         return Slope(here, base, secant * self.quotient)
 
-    def _agree(self, at_v: bool, at_zero: bool) -> bool:
+    def _compared(self, order: str, other: Any) -> Any:
         """A quotient exists within one branch only."""
-        if at_v != at_zero:
+        other = self.lifted(other)
+        if other is NotImplemented:
+            return other
+        if order in _NOT:
+            return not self._compared(_NOT[order], other)
+        if order == "eq":
+            return self._compared("le", other) and self._compared("ge", other)
+        at_v = self.here._compared(order, other.here)
+        if at_v != self.base._compared(order, other.base):
             raise Undecided("v and 0 lie on different branches of the equation")
         return at_v
-
-    @of_lifted
-    def __lt__(self, other: Any) -> bool:
-        return self._agree(self.here < other.here, self.base < other.base)
-
-    @of_lifted
-    def __le__(self, other: Any) -> bool:
-        return self._agree(self.here <= other.here, self.base <= other.base)
-
-    def __gt__(self, other: object) -> bool:
-        return not self <= other
-
-    def __ge__(self, other: object) -> bool:
-        return not self < other
-
-    def __eq__(self, other: object) -> bool:
-        return self <= other and self >= other
-
-    def __ne__(self, other: object) -> bool:
-        return not self == other
 
 
 def _secant(name: str, a: Ball, b: Ball, at_a: Ball, at_b: Ball) -> Ball:

@@ -19,6 +19,14 @@ from .pairs import FUNCTIONS_OF_TWO
 from .paths import undecided
 
 
+def as_rate(x: Any) -> Any:
+    """Return a number as a quantity that does not change; NotImplemented for what is none."""
+    if isinstance(x, Rate):
+        return x
+    ball = as_ball(x)
+    return ball if ball is NotImplemented else Rate(ball, Ball(arb(0)))
+
+
 class Rate(NumPyFunctions):
     """A quantity and its rate."""
 
@@ -47,12 +55,8 @@ class Rate(NumPyFunctions):
         value = self.here / other.here
         return Rate(value, (self.rate - value * other.rate) / other.here)
 
-    def __pow__(self, n: Any) -> Any:
-        if isinstance(n, NumPyFunctions) or n != int(n):
-            return self.pair("power", n)
-        if n < 0:
-            return 1 / self**-n
-        slope = int(n) * self.here ** max(int(n) - 1, 0)
+    def _whole_power(self, n: int) -> Rate:
+        slope = n * self.here ** max(n - 1, 0)
         return Rate(self.here**n, slope * self.rate)
 
     def __abs__(self) -> Rate:
@@ -103,41 +107,12 @@ class Rate(NumPyFunctions):
         _, slope = enclosed_table(self.here.value, xp, fp)
         return Rate(self.here.table(xp, fp), of_unknown_slope(slope, self.here) * self.rate)
 
-    @staticmethod
-    def lifted(number: Any) -> Any:
-        """Return a number as a quantity that does not change."""
-        return as_rate(number)
+    lifted = staticmethod(as_rate)
 
-    def _decided(self, compare: str, other: Any) -> Any:
+    def _compared(self, order: str, other: Any) -> Any:
         """A choice between formulas may jump: only what the whole box decides is followed."""
         other = as_rate(other)
         if other is NotImplemented:
             return other
         with undecided():
-            return getattr(self.here, compare)(other.here)
-
-    def __lt__(self, other: object) -> bool:
-        return self._decided("__lt__", other)
-
-    def __le__(self, other: object) -> bool:
-        return self._decided("__le__", other)
-
-    def __gt__(self, other: object) -> bool:
-        return self._decided("__gt__", other)
-
-    def __ge__(self, other: object) -> bool:
-        return self._decided("__ge__", other)
-
-    def __eq__(self, other: object) -> bool:
-        return self._decided("__eq__", other)
-
-    def __ne__(self, other: object) -> bool:
-        return self._decided("__ne__", other)
-
-
-def as_rate(x: Any) -> Any:
-    """Return a number as a quantity that does not change; NotImplemented for what is none."""
-    if isinstance(x, Rate):
-        return x
-    ball = as_ball(x)
-    return ball if ball is NotImplemented else Rate(ball, Ball(arb(0)))
+            return self.here._compared(order, other.here)

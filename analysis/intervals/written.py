@@ -7,8 +7,6 @@ that are not in the list of `OPERATIONS`, cannot be written.
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
 from typing import Any
 
 from .arithmetic import as_ball
@@ -117,10 +115,8 @@ class Written(NumPyFunctions):
         """Refuse a table: it is none of the operations."""
         raise Undecided("a table cannot be written")
 
-    def _refused(self, _: Any = None) -> bool:
+    def _compared(self, order: str, other: Any) -> Any:
         raise Undecided("a comparison cannot be written: use np.minimum, np.maximum or abs")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused  # type: ignore[assignment]
 
 
 def operations(names: tuple[str, ...], function: Any) -> list[list[Any]]:
@@ -133,10 +129,3 @@ def operations(names: tuple[str, ...], function: Any) -> list[list[Any]]:
     if value.place != len(nodes) - 1:
         nodes.append(["power", value.place, 1])
     return nodes
-
-
-def text_of(number: Any) -> str:
-    """Return a finite float, fraction or integer as an exact text."""
-    if not isinstance(number, Fraction) and not math.isfinite(number):
-        raise Undecided(f"{number} is not a finite number")
-    return str(exact(number))

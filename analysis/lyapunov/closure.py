@@ -9,7 +9,6 @@ that what they say of all boxes is right.  A box that does close is found with t
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -20,16 +19,15 @@ from flint import arb
 from scipy.optimize import minimize_scalar
 
 from nlctl.errors import ParameterError
-from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 
 from ..intervals.box import Box
 from .bounds.decomposition import Decomposition
-from .bounds.error_bounds import error_bounds, reference_bounds
+from .bounds.error_bounds import error_bounds, initial_errors, reference_bounds
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import plant_terms
-from .bounds.weights import network_on_grid
+from .bounds.weights import Network, network_on_grid
 from .constants import Constants, constants_of
 from .inequalities import terms
 from .lines import Line
@@ -146,9 +144,8 @@ def _reach(run: MemberRun, given: Premises) -> StateReach | None:
     if not isinstance(spec, SumOfSines):
         return None
     s, names = run.signals, coordinate_names(len(given.lambdas) + 1)
-    yd = spec.output(float(s.t[0]), (), (), equation_arguments(spec))
-    e0 = [arb(float(s[x][0])) - arb(float(y), 1e-12) for x, y in zip(names, yd, strict=False)]
-    return StateReach(lambdas=given.lambdas, e0=tuple(e0), reference=spec)
+    e0 = initial_errors(spec, [arb(float(s[x][0])) for x in names], float(s.t[0]))
+    return StateReach(lambdas=given.lambdas, e0=e0, reference=spec)
 
 
 def closed_set(constants: Constants, gains: Gains, reach: StateReach, *, Q: float = 0.0) -> Closure:
@@ -216,9 +213,11 @@ def least_bound(
     # psi\| <= \|W\| \|psi\| the error at a point is at least \|g\| - \|psi\| \|W\|; the least value
     # of a convex function of \|W\| is left.
     # Shapes: `W` (l,).
-    g, psi, points = _at_points(parts, sides)
+    network = _at_points(parts, sides)
     f, d = plant_terms(parts.plant)
-    corners = [x for x in points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))]
+    corners = [
+        x for x in network.points if all(abs(a) in (0.0, b) for a, b in zip(x, sides, strict=True))
+    ]
     d_star = max(abs(float(d(x, t))) for x in corners for t in _TIMES)
     gain = max((float(f(x, b)) - float(f(x, 0.0))) / b for x in corners for b in _some(v))
     rest = total_error(gain, split.eps_star, d_star, 0.0)
@@ -230,13 +229,12 @@ def least_bound(
         return float(final_bound(alpha_0(gains, delta, norm**2), alpha_1(gains), V_0, 0.0))
 
     if W is not None or not start.size:
-        error = float(np.max(np.abs(g - psi @ weights))) if weights.size else float(np.max(abs(g)))
-        apart = float(np.linalg.norm(weights - start)) if weights.size else 0.0
-        return bound(float(np.linalg.norm(weights)), error, apart)
-    size, from_0 = np.linalg.norm(psi, axis=1), float(np.linalg.norm(start))
+        apart = float(np.linalg.norm(weights - start))
+        return bound(float(np.linalg.norm(weights)), network.error(weights), apart)
+    size, from_0 = np.linalg.norm(network.psi, axis=1), float(np.linalg.norm(start))
 
     def of_norm(w: float) -> float:
-        error = max(float(np.max(np.abs(g) - size * w)), 0.0)
+        error = max(float(np.max(np.abs(network.g) - size * w)), 0.0)
         return bound(w, error, max(w - from_0, 0.0))
 
     far = of_norm(0.0) * np.sqrt(alpha_1(gains) / gains.sigma_1)  # |W| alone makes it larger beyond
@@ -246,17 +244,11 @@ def least_bound(
     return min(float(minimum.fun), of_norm(0.0)) * (1 - 1e-6)
 
 
-def _at_points(parts: Parts, sides: Sequence[float]) -> tuple[np.ndarray, np.ndarray, Any]:
+def _at_points(parts: Parts, sides: Sequence[float]) -> Network:
     """Return g and psi at points of a box, its corners and centre among them."""
     names, ends = coordinate_names(len(sides)), tuple(sides)
     box = Box(names=names, low=tuple(-a for a in ends), high=ends)
-    count = {1: 41, 2: 9}.get(len(ends), 5)
-    if parts.gains.W_hat_0:
-        network = network_on_grid(parts.plant, parts.basis, box, count)
-        return network.g, network.psi, network.points
-    f, _ = plant_terms(parts.plant)
-    points = list(itertools.product(*(np.linspace(-a, a, count) for a in ends)))
-    return np.array([float(f(x, 0.0)) for x in points]), np.zeros((len(points), 0)), points
+    return network_on_grid(parts.plant, parts.basis, box, {1: 41, 2: 9}.get(len(ends), 5))
 
 
 def _some(v: tuple[float, float]) -> list[float]:

@@ -13,7 +13,7 @@ from .constants import Constants
 from .inequalities import terms
 from .lines import Line
 from .loop.simulation import MemberRun
-from .nussbaum.energy import as_response_of, drift, drift_margin, safe_horizon
+from .nussbaum.energy import drift, drift_margin, safe_horizon
 from .nussbaum.property import antiderivative, lobe_around, nussbaum_property
 from .nussbaum.slow_drift import SlowDrift, slow_drift
 from .premises import Premises, premises
@@ -30,23 +30,15 @@ NO_BOUND = (
 )
 
 
-def slow_drift_of(run: MemberRun) -> SlowDrift | None:
-    """Return where the slow drift of zeta leads; None if the run does not show it."""
-    drift_or_reason = _slow_drift_or_reason(run)
-    return None if isinstance(drift_or_reason, str) else drift_or_reason
-
-
-def _slow_drift_or_reason(run: MemberRun) -> SlowDrift | str:
-    """Return where the slow drift leads, or why that is unknown."""
+def slow_drift_of(run: MemberRun) -> tuple[SlowDrift | None, str]:
+    """Return where the slow drift of zeta leads; None and why, if the run does not show it."""
     length = run.signals.t[-1] - run.signals.t[0]
     if length < 6 * _WINDOW:
-        return f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
+        return None, f"{length:g} s show nothing of it: run {np.ceil(6 * _WINDOW):g} s at least"
     try:
-        return slow_drift(
-            as_response_of(run.signals.t, run.signals), run.parts.law.N, window=_WINDOW
-        )
+        return slow_drift(run.signals, run.parts.law.N, window=_WINDOW), ""
     except ParameterError as error:
-        return str(error)
+        return None, str(error)
 
 
 def conclusions(loop: ct.InterconnectedSystem, run: MemberRun, constants: Constants) -> list[Line]:
@@ -138,7 +130,7 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
     names = ("(c)", "(b)")
     if not (0 < low <= high < np.inf and np.isfinite(given.alpha_0)):
         return [Line(key=k, statement="bounds of k G", status="undecided") for k in names]
-    moved = drift(as_response_of(run.signals.t, run.signals), given.N)
+    moved = drift(run.signals, given.N)
     margin = drift_margin(moved, x.V[0], given.alpha_0, l_min=low, l_max=high, V=x.V)
     holds = margin.least >= -1e-6 * float(np.max(x.V))
     c = Line(
@@ -174,9 +166,9 @@ def _remains(run: MemberRun, given: Premises, constants: Constants) -> list[Line
 
 def _slow_drift_line(run: MemberRun) -> Line:
     statement = "the drift of zeta ends before N changes its sign"
-    slow = _slow_drift_or_reason(run)
-    if isinstance(slow, str):
-        return Line(key="slow drift", statement=statement, status="undecided", evidence=slow)
+    slow, reason = slow_drift_of(run)
+    if slow is None:
+        return Line(key="slow drift", statement=statement, status="undecided", evidence=reason)
     calm = slow.verdict in ("settles", "reversed")
     soon = f"; budget spent by {slow.burst:.4g} s or so, then max |r| = {slow.peak:.4g}"
     return Line(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -187,11 +188,7 @@ def _shares(given: Premises, r_0: float, Q: float) -> tuple[Share, ...]:
         ("r(0) in V(0)", "r(0)^2 / 2", r_0**2 / 2),
         ("Q", "sup I(t)", Q),
     )  # fmt: skip
-    whole = sum(value for _, _, value in rows)
-    return tuple(
-        Share(term=term, formula=formula, value=float(v), share=float(v / whole))
-        for term, formula, v in rows
-    )
+    return _shares_of(rows, sum(value for _, _, value in rows))
 
 
 def _delta_shares(given: Premises, constants: Constants) -> tuple[Share, ...]:
@@ -200,8 +197,12 @@ def _delta_shares(given: Premises, constants: Constants) -> tuple[Share, ...]:
         ("disturbance in delta*", "d*", given.d),
         ("network in delta*", "eps*", given.eps),
     )
+    return _shares_of(rows, constants["delta*"])
+
+
+def _shares_of(rows: Iterable[tuple[str, str, Any]], whole: Any) -> tuple[Share, ...]:
     return tuple(
-        Share(term=term, formula=formula, value=v, share=v / constants["delta*"])
+        Share(term=term, formula=formula, value=float(v), share=float(v / whole))
         for term, formula, v in rows
     )
 

@@ -17,17 +17,10 @@ from nlctl.attributes import described_record
 
 from ..intervals.box import Box, visited_box
 from .bounds.decomposition import Decomposition, decompose
-from .constants import Constants, constants
+from .constants import Constants, constants_of
+from .loop import simulation
 from .loop.integral import sharpest
 from .loop.roles import read_parts
-from .loop.simulation import (
-    SAMPLING_INTERVAL,
-    Member,
-    MemberRun,
-    members_of,
-    observe,
-    observed_loop,
-)
 
 U_MAX = 60.0  # a split that is proved and not computed holds for |u| <= 2 U_MAX
 
@@ -37,19 +30,19 @@ class _Runs:
     """Runs of the members; more than one are repeated at each iteration, one after the other."""
 
     loop: ct.InterconnectedSystem
-    members: Sequence[Member] = field(repr=False)
+    members: Sequence[simulation.Member] = field(repr=False)
     split: Decomposition  # of the actuator
     max_steps: int = 2_000_000  # steps after which a run counts as lost
 
-    def __iter__(self) -> Iterator[MemberRun]:
+    def __iter__(self) -> Iterator[simulation.MemberRun]:
         if len(self.members) == 1:
             return iter([self.first])
-        return observe(self.loop, self.members, self.split, self.max_steps)
+        return simulation.observe(self.loop, self.members, self.split, self.max_steps)
 
     @cached_property
-    def first(self) -> MemberRun:
+    def first(self) -> simulation.MemberRun:
         """The first run."""
-        return next(observe(self.loop, self.members[:1], self.split, self.max_steps))
+        return next(simulation.observe(self.loop, self.members[:1], self.split, self.max_steps))
 
 
 @described_record(made_by="ledger")
@@ -71,7 +64,7 @@ def examine(
     k: tuple[float, float] | None = None,
     start: Mapping[str, Any] | None = None,
     params: Mapping[str, Any] | None = None,
-    step: float = SAMPLING_INTERVAL,
+    step: float = simulation.SAMPLING_INTERVAL,
     max_steps: int = 2_000_000,
 ) -> Examination:
     """Run a loop, observed, and find the constants of the proof.
@@ -118,30 +111,22 @@ def examine(
     max_steps = integer("examine", "max_steps", max_steps, at_least=1)
     if isinstance(W, str):
         one_of("examine", "W", W, ["tightest"])
-    members = members_of(loop, run, step, start, params)
+    members = simulation.members_of(loop, run, step, start, params)
     fixed = _numbers(start), _numbers(params)
     if len(members) == 1:
         fixed = dict(members[0].start), dict(members[0].params)
     parts = read_parts(loop, *fixed)
-    split = _split(parts.actuator, k)
-    runs = _Runs(loop=loop, members=members, split=split, max_steps=max_steps)
+    split = decompose(parts.actuator, k=k, u_max=U_MAX)
+    runs = _Runs(loop=loop, members=members, split=sharpest(split), max_steps=max_steps)
     box = _visited(runs) if box is None else box
-    sides = [name for name in box.names if name != "u"]
-    weights = None if isinstance(W, str) and W == "tightest" else W
-    proved = constants(
-        loop, box.only(*sides).times("u", -U_MAX, U_MAX), W=weights, k=k, start=fixed[0],
-        params=fixed[1],
-    )  # fmt: skip
+    proved = constants_of(parts, split, box, None if isinstance(W, str) else W)
     return Examination(loop=loop, runs=runs, constants=proved)
 
 
 def compile_examination_ahead(loop: ct.InterconnectedSystem) -> None:
     """Compile the diagram that `examine` runs, which otherwise happens with the first run."""
-    native.compile_ahead(observed_loop(loop, _split(read_parts(loop).actuator)))
-
-
-def _split(actuator: Any, k: tuple[float, float] | None = None) -> Decomposition:
-    return sharpest(decompose(actuator, k=k, u_max=U_MAX))
+    split = sharpest(decompose(read_parts(loop).actuator, u_max=U_MAX))
+    native.compile_ahead(simulation.observed_loop(loop, split))
 
 
 def _numbers(values: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -213,7 +213,7 @@ def _assembled(study: Examination) -> Ledger:
         members=count,
         Q=Q,
         max_r=max_r,
-        slow_drift=slow_drift_of(study.runs.first),
+        slow_drift=slow_drift_of(study.runs.first)[0],
     )
 
 

@@ -195,7 +195,7 @@ def _literal_lines(run: MemberRun, constants: Constants, given: Premises) -> lis
     printed = literal(given, constants, run.parts.plant)
     if printed is None:
         return []
-    premised = [*assumptions(run.signals, printed, constants.box, np.inf)]
+    premised = assumptions(run.signals, printed, constants.box, np.inf)
     lines = []
     for margin in (*premised, *inequalities(run.signals, printed)):
         if margin.equation not in LITERAL:

@@ -26,6 +26,7 @@ from .bounds.decomposition import Decomposition, decompose
 from .bounds.final_bound import Gains, alpha_0, alpha_1, final_bound, initial_V, total_error
 from .bounds.sector import sector
 from .bounds.weights import approximation_error, network_on_grid, tightest_weights
+from .certificate.gains import GainCandidate, tradeoff
 from .constants import disturbance
 from .examination import U_MAX, Examination, examine
 from .loop.instrumented import observed
@@ -39,18 +40,10 @@ if TYPE_CHECKING:
 
 _BOUNDS = ("C_0", "ultimate")
 _TOLERANCE = 1e-2  # of the branch and bounds in the search
+# gains by part; the last two are those of a network
+_SEARCHED = (("law", "beta"), ("robust", "tau"), ("robust", "gamma"), ("robust", "sigma_2"),
+             ("weights", "Gamma"), ("weights", "sigma_1"))  # fmt: skip
 OVER = 10.0  # weight of log(|u| / limit) in the cost
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrialBound:
-    """One set of gains that the search tried."""
-
-    gains: dict[str, float]  # values by qualified name
-    # bounds of the proof with the tightest W on the set that the run visits, eps* on a grid
-    C_0: float
-    ultimate: float
-    u: float  # max |u| along the run; infinite if it diverged
 
 
 @described_record(made_by="tighten")
@@ -66,7 +59,9 @@ class Tightened:
     u: float  # max |u| along the run, its limit, and the length of the runs (s).
     u_limit: float
     horizon: float
-    trials: tuple[TrialBound, ...]  # All gains that the search tried, in order.
+    # All gains that the search tried, in order: with bounds of the proof with the tightest W on the
+    # set that the run visits, eps* on a grid.
+    trials: tuple[GainCandidate, ...]
 
     @as_annotated
     def table(self, bound: str = "C_0") -> pd.DataFrame:
@@ -84,12 +79,8 @@ class Tightened:
         """
         import pandas as pd
 
-        front: list[TrialBound] = []
-        for trial in sorted(self.trials, key=lambda trial: (trial.u, getattr(trial, bound))):
-            value = getattr(trial, bound)
-            if np.isfinite(trial.u + value) and (not front or value < getattr(front[-1], bound)):
-                front.append(trial)
-        rows = [{"u": t.u, "C_0": t.C_0, "ultimate": t.ultimate, **t.gains} for t in front]
+        best = tradeoff(self.trials, bound)
+        rows = [{"u": t.u, "C_0": t.C_0, "ultimate": t.ultimate, **t.gains} for t in best]
         return pd.DataFrame(rows)
 
 
@@ -170,7 +161,7 @@ def tighten(
         times=np.linspace(0.0, horizon, round(horizon / SAMPLING_INTERVAL) + 1),
         max_steps=max_steps,
     )
-    trials: list[TrialBound] = []
+    trials: list[GainCandidate] = []
 
     def cost(point: np.ndarray) -> float:
         trial = _trial(search, _gains(parts, point))
@@ -188,7 +179,7 @@ def tighten(
 
 
 def _best(
-    search: _Search, trials: list[TrialBound], bound: str, u_limit: float, k: Any
+    search: _Search, trials: list[GainCandidate], bound: str, u_limit: float, k: Any
 ) -> Tightened:
     """Examine the best trial that keeps the limit."""
     allowed = [t for t in trials if t.u <= u_limit and np.isfinite(getattr(t, bound))]
@@ -213,10 +204,8 @@ def _best(
 
 
 def _point(parts: Parts) -> np.ndarray:
-    g = parts.gains
-    values = [g.beta, g.tau, g.gamma, g.sigma_2]
-    if g.W_hat_0:
-        values += [g.Gamma, g.sigma_1]
+    searched = _SEARCHED if parts.gains.W_hat_0 else _SEARCHED[:4]
+    values = [getattr(parts.gains, name) for _, name in searched]
     if not min(values) > 0:
         raise ParameterError(f"tighten starts from gains > 0, got {values}: choose other gains")
     return np.log(values)
@@ -224,14 +213,11 @@ def _point(parts: Parts) -> np.ndarray:
 
 def _gains(parts: Parts, point: np.ndarray) -> dict[str, float]:
     """Return the gains of a point of the search by qualified name."""
-    values, paths = list(map(float, np.exp(point))), parts.paths
-    names = [f"{paths['law']}.beta"]
-    names += [f"{paths['robust']}.{name}" for name in ("tau", "gamma", "sigma_2")]
-    names += [f"{paths['weights']}.{name}" for name in ("Gamma", "sigma_1")]
-    return dict(zip(names, values, strict=False))
+    values = zip(_SEARCHED, map(float, np.exp(point)), strict=False)
+    return {f"{parts.paths[part]}.{name}": value for (part, name), value in values}
 
 
-def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
+def _trial(search: _Search, gains: dict[str, float]) -> GainCandidate:
     """Run a set of gains, and bound r on the set that the run visits."""
     named = {name.rpartition(".")[2]: value for name, value in gains.items()}
     changed = dataclasses.replace(search.parts.gains, **named)
@@ -241,11 +227,11 @@ def _trial(search: _Search, gains: dict[str, float]) -> TrialBound:
             search.compiled, search.times, params=params, max_steps=search.max_steps
         )
     except DivergedError:
-        return TrialBound(gains=gains, C_0=np.inf, ultimate=np.inf, u=np.inf)
+        return GainCandidate(gains=gains, C_0=np.inf, ultimate=np.inf, u=np.inf)
     signals = signals_of(response)
     Q = float(np.max(signals["I"]))
     C_0, ultimate = _bounds(search, changed, visited_box(response), Q)
-    return TrialBound(gains=gains, C_0=C_0, ultimate=ultimate, u=peak(signals.t, signals["u"]))
+    return GainCandidate(gains=gains, C_0=C_0, ultimate=ultimate, u=peak(signals.t, signals["u"]))
 
 
 def _bounds(search: _Search, gains: Gains, box: Box, Q: float) -> tuple[float, float]:

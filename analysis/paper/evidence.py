@@ -25,8 +25,8 @@ from ..lyapunov.examination import examine
 from ..lyapunov.inequalities import inequalities, terms
 from ..lyapunov.ledger import Ledger, ledger
 from ..lyapunov.lines import assumptions
-from ..lyapunov.loop.signals import Margin
-from ..lyapunov.nussbaum.energy import signal
+from ..lyapunov.loop.signals import Margin, signals_of
+from ..lyapunov.nussbaum.energy import finite_signal
 from ..lyapunov.nussbaum.long_run import LOOKS, LongRun, long_run
 from ..lyapunov.nussbaum.slow_drift import SlowDrift
 from ..lyapunov.premises import premises
@@ -98,7 +98,7 @@ def compile_evidence_ahead(loop: ct.InterconnectedSystem) -> None:
 
 def _max_r(loop: ct.InterconnectedSystem, times: np.ndarray) -> float:
     response = input_output_response(compiled(loop), times)
-    return peak(times, signal(response, "r"))
+    return peak(times, finite_signal(signals_of(response), "r"))
 
 
 def known_sign(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:

@@ -22,7 +22,7 @@ from nlctl.native.enclosures.boxes import BoxCode, enclosed
 from nlctl.native.enclosures.divide import BoxVerdict, decide_claim
 from nlctl.wording import counted
 
-from ...intervals.box import Box
+from ...intervals.box import Box, face_of_box
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
 from .everywhere import inequality_of, safe_everywhere
@@ -307,7 +307,7 @@ def _problem(
         speed, sign = (lambda x, i=i: motion.at(x)[:, i]), 1 if end else -1
         outwards = op("add", rates[i] if end else op("neg", rates[i]), margin)
         claims.append(_Claim(
-            code=code(below, outwards), box=_face(box, i, end), kind="unsafe",
+            code=code(below, outwards), box=face_of_box(box, i, box.cell[i][end]), kind="unsafe",
             what=f"B > 0 where {motion.names[i]} leaves the box",
             matters=lambda x, speed=speed, sign=sign: sign * speed(x),
         ))  # fmt: skip
@@ -335,13 +335,6 @@ def _polynomial(
         B = op("add", B, product)
     (rate,) = tangents(graph, [B], lambda e: rates[e.data[1]] if e.data[1] < n else None)
     return B, graph.const(0.0) if rate is None else rate
-
-
-def _face(box: Box, i: int, end: int) -> Box:
-    value = box.cell[i][end]
-    ends = (tuple(value if j == i else a for j, a in enumerate(s)) for s in (box.low, box.high))
-    low, high = ends
-    return Box(names=box.names, low=low, high=high)
 
 
 def _first_samples(problem: _Problem) -> None:

@@ -123,15 +123,6 @@ def largest_level(V: Quadratic, box: Box, tol: float, max_boxes: int) -> ProvedL
     )
 
 
-def _sides(V: Quadratic, level: float, floor: float, box: Box) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smallest box around a level set, with the level and the floor."""
-    reach = np.sqrt(level * np.diag(np.linalg.inv(V.P))) * (1 + 1e-6)
-    ends = np.array([level, floor])
-    low = np.maximum(V.at - reach, box.low)
-    high = np.minimum(V.at + reach, box.high)
-    return np.append(low, ends), np.append(high, ends)
-
-
 def _fall(V: Quadratic, level: float, floor: float, box: Box, max_boxes: int) -> BoxVerdict:
     """Return whether V' < 0 between two levels, on the box: it holds the level set."""
     low, high = np.append(box.low, [level, floor]), np.append(box.high, [level, floor])
@@ -155,7 +146,8 @@ def _floor(V: Quadratic, fits: float, box: Box) -> float:
     # is negative definite for all of them.
     level = fits * 0.25
     while level > fits * _SMALLEST:
-        low, high = (side[:-2] for side in _sides(V, level, 0.0, box))
+        reach = np.sqrt(level * np.diag(np.linalg.inv(V.P))) * (1 + 1e-6)  # of the level set
+        low, high = np.maximum(V.at - reach, box.low), np.minimum(V.at + reach, box.high)
         ends = V.motion.slopes.values(low[None], high[None])
         if np.all(np.isfinite(ends)) and _is_negative(V.P, *(e[0] for e in ends)):
             return level

@@ -16,6 +16,7 @@ from nlctl.errors import ParameterError
 from nlctl.wording import counted
 
 from ...intervals.box import Box
+from ...intervals.branch_and_bound import point_text
 from ..convex import at_least, at_most, minimizer, symmetric_basis
 from ..proofs.kind import ProofKind
 from ..proofs.result import ProofResult
@@ -66,8 +67,8 @@ class AttractionRegion(ProofResult):
         return float(z @ self.P @ z)
 
     def __str__(self) -> str:
-        where = ", ".join(f"{n} = {v:.6g}" for n, v in (self.refuted or {}).items())
-        end = f"; {self.above:.6g} is not: {self.reason}" + (f", {where}" if where else "")
+        where = f", {point_text(self.refuted)}" if self.refuted else ""
+        end = f"; {self.above:.6g} is not: {self.reason}{where}"
         how = counted(self.boxes, "box", "boxes")
         if self.holds:
             return f"V <= {self.level:.6g} proved on {how}{end}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
@@ -102,14 +102,6 @@ class Decomposition:
         return np.where(u == 0, self.k_1, k)
 
 
-class Decomposable(Protocol):
-    """An actuator record that knows its own split."""
-
-    def decomposition(self, u_max: float) -> Decomposition:
-        """Return the split for inputs |u| <= u_max."""
-        ...
-
-
 def check_gain(who: str, k: Any) -> None:
     """Refuse bounds of k that are no pair with 0 < k_1 <= k_2; None is none."""
     bounds = None if k is None else vector(who, "k = (k_1, k_2)", k)
@@ -129,7 +121,8 @@ def decompose(
         A `nlctl.DeadZone` (by default split as in textbooks: k is the slope factor, and 1 inside
         the dead zone), a memoryless actuator with one input and one output, an actuator with
         memory and an equation ``band(t, u, p)`` of the least and greatest output that it can have
-        at input u, or a record with a method ``decomposition(u_max)``, see `Decomposable`.
+        at input u, or a record with a method ``decomposition(u_max)`` that returns its split for
+        inputs of |u| <= u_max.
     k : (k_1, k_2), optional
         Bounds that k shall have, by default the ``gains`` of the record where it has them.  The
         split is then `clipped_split`, and eps_u is bounded by branch and bound.

@@ -41,6 +41,13 @@ def filter_poles(lambdas: Sequence[float]) -> tuple[arb, ...]:
     return tuple(sorted(poles, key=float))
 
 
+def initial_errors(reference: SumOfSines, x0: Sequence[arb], t: float = 0.0) -> tuple[arb, ...]:
+    """Return e_1, ..., e_n where the plant has the states x0."""
+    yd = reference.output(t, (), (), equation_arguments(reference))
+    # the radius covers what double precision has lost in yd
+    return tuple(x - arb(float(y), 1e-12) for x, y in zip(x0, yd, strict=False))
+
+
 def error_bounds(lambdas: Sequence[float], e0: Sequence[arb | float], C: arb) -> tuple[arb, ...]:
     """Bound |e_1|, ..., |e_n| for all time by |r| <= C and the initial error."""
     # With z_0 = r and z_k' = -p_k z_k + z_{k-1}, e_1 = z_{n-1}: |z_k| <= max(|z_k(0)|,
@@ -89,7 +96,8 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     turning = [Fraction(f) for f in reference.frequencies if f > 0]  # exact
     if not turning:
         return tuple(largest[: n + 1])
-    slowest = functools.reduce(_common_divisor, turning)
+    common = math.lcm(*(f.denominator for f in turning))
+    slowest = Fraction(math.gcd(*(int(f * common) for f in turning)), common)
     beats = max(turning) / slowest
     if beats > 100:
         return tuple(largest[: n + 1])
@@ -101,11 +109,4 @@ def reference_bounds(reference: SumOfSines, *, samples: int = 4000) -> tuple[flo
     return tuple(
         min(float(between[k]) + largest[k + 2] * h * h / 8 + _ROUNDING, largest[k])
         for k in range(n + 1)
-    )
-
-
-def _common_divisor(a: Fraction, b: Fraction) -> Fraction:
-    return Fraction(
-        math.gcd(a.numerator * b.denominator, b.numerator * a.denominator),
-        a.denominator * b.denominator,
     )

@@ -42,15 +42,16 @@ class Network:
 
 
 def network_on_grid(plant: Any, basis: Any, box: Box, per_side: int | None = None) -> Network:
-    """Evaluate the basis and g on a full grid over a box."""
+    """Evaluate the basis, if there is one, and g on a full grid over a box."""
     n = len(box.names)
     per_side = max(3, round(3500 ** (1 / n)) + 2 * (n == 2)) if per_side is None else per_side
     axes = [np.linspace(a, b, per_side) for a, b in box.cell]
     points = np.array(list(itertools.product(*axes)))
     f, _ = plant_terms(plant)
-    p = equation_arguments(basis)
-    inputs = len(basis.inputs)
-    psi = np.array([basis.output(0.0, (), x[:inputs], p) for x in points])
+    psi = np.zeros((len(points), 0))
+    if basis is not None:
+        p, inputs = equation_arguments(basis), len(basis.inputs)
+        psi = np.array([basis.output(0.0, (), x[:inputs], p) for x in points])
     return Network(psi=psi, g=np.array([f(tuple(x), 0.0) for x in points]), points=points)
 
 
@@ -108,13 +109,6 @@ def minimax_weights(network: Network, largest: float | None = None) -> np.ndarra
     if result.x is None:
         raise ParameterError(f"minimax_weights found no weights: {result.message}")
     return result.x[:-1] / scale
-
-
-def least_squares_weights(network: Network) -> np.ndarray:
-    """Return the weights with the smallest sum of squared errors on the grid, columns scaled."""
-    scale = np.max(np.abs(network.psi), axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    return np.linalg.lstsq(network.psi / scale, network.g, rcond=None)[0] / scale
 
 
 @as_annotated

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,7 @@ from nlctl.response import input_output_response
 
 from ...metrics import peak
 from ..bounds.decomposition import decompose
+from ..loop.signals import signals_of
 from ..proofs.filtered import Demand, demand
 from ..proofs.result import Certificate
 from .certify import certify
@@ -29,11 +31,22 @@ _BOUNDS = np.geomspace(0.02, 20, 40)  # of |r|, for which delta* is tabulated
 
 @dataclass(frozen=True, kw_only=True)
 class GainCandidate:
-    """One set of gains that the search tried."""
+    """One set of gains that a search tried, with the bounds that it is judged by."""
 
     gains: dict[str, float]  # values by qualified name
-    C_0: float  # bound of |r|, from a table of delta* over C: close to what `certify` proves
-    u: float  # max |u| along the simulation (sampled); NaN where C_0 is infinite and none was made
+    C_0: float  # bound of |r|; infinite if there is none
+    ultimate: float = np.nan  # bound of limsup |r|; NaN of a search that does not need it
+    u: float  # max |u| along the run (sampled): infinite if it diverged, NaN if none was made
+
+
+def tradeoff(trials: Iterable[GainCandidate], bound: str = "C_0") -> list[GainCandidate]:
+    """Return trials than which no other has a smaller bound and a smaller max |u|, by max |u|."""
+    front: list[GainCandidate] = []
+    closed = [trial for trial in trials if np.isfinite(trial.u + getattr(trial, bound))]
+    for trial in sorted(closed, key=lambda trial: (trial.u, getattr(trial, bound))):
+        if not front or getattr(trial, bound) < getattr(front[-1], bound):
+            front.append(trial)
+    return front
 
 
 @described_record(made_by="design")
@@ -45,17 +58,14 @@ class GainDesign:
     u: float  # max |u| along the simulation; sampled, not proved.
     u_limit: float  # The limit that was asked for, and the length of the simulation (s).
     horizon: float
-    trials: tuple[GainCandidate, ...]  # All gains that the search tried, in order.
+    # All gains that the search tried, in order; C_0 from a table of delta* over C, close to what
+    # `certify` proves.
+    trials: tuple[GainCandidate, ...]
 
     @property
     def tradeoff(self) -> tuple[GainCandidate, ...]:
         """The trials than which no other has a smaller bound and a smaller max |u|, by max |u|."""
-        front: list[GainCandidate] = []
-        closed = [trial for trial in self.trials if np.isfinite(trial.C_0 + trial.u)]
-        for trial in sorted(closed, key=lambda trial: (trial.u, trial.C_0)):
-            if not front or trial.C_0 < front[-1].C_0:
-                front.append(trial)
-        return tuple(front)
+        return tuple(tradeoff(self.trials))
 
     def __str__(self) -> str:
         gains = ", ".join(f"{name} = {value:.5g}" for name, value in self.gains.items())
@@ -203,7 +213,8 @@ def _largest_input(compiled: Any, gains: dict[str, float], horizon: float, max_s
         )
     except DivergedError:  # or too stiff to be worth a look
         return np.inf
-    return peak(run.time, np.asarray(run.outputs)[list(run.output_labels or ()).index("u")])
+    signals = signals_of(run)
+    return peak(signals.t, signals["u"])
 
 
 def _proved(

@@ -20,50 +20,34 @@ from typing import Any
 
 from flint import arb
 
+from nlctl import controllers
 from nlctl.attributes import described_record
-from nlctl.controllers import (
-    AdaptiveWeights,
-    FilteredError,
-    GaussianBasis,
-    KnownSignLaw,
-    RobustTerm,
-    Zero,
-)
 from nlctl.references import SumOfSines
 
 from ...intervals.arithmetic import Ball
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import decompose
 from ..bounds.final_bound import alpha_0, alpha_1, initial_V
-from ..loop.checked import disturbed, read_checked
+from ..loop.checked import NOTHING_SUPPOSED, Supposed, read_checked
 from ..loop.roles import PIECES, Parts, has_law, loop_parts
-from ..proofs.filtered import (
-    Demand,
-    FilteredCertificate,
-    FilteredLoop,
-    as_filtered,
-    between,
-    demand,
-    feedforward,
-)
+from ..proofs import filtered
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
 
 _PROVED_FOR = {
     "reference": (SumOfSines,),
-    "filtered_error": (FilteredError,),
-    "basis": (GaussianBasis,),
-    "weights": (AdaptiveWeights, Zero),
-    "robust": (RobustTerm,),
-    "law": (KnownSignLaw,),
+    "filtered_error": (controllers.FilteredError,),
+    "basis": (controllers.GaussianBasis,),
+    "weights": (controllers.AdaptiveWeights, controllers.Zero),
+    "robust": (controllers.RobustTerm,),
+    "law": (controllers.KnownSignLaw,),
 }
 _OUTWARD = 1 + arb("1e-14")  # covers what the products of float gains round off
 _LIMIT = 1e4  # a bound of |r| beyond which the iteration counts as without end
 
 
 @dataclass(frozen=True, kw_only=True)
-class KnownSignLoop(FilteredLoop):
+class KnownSignLoop(filtered.FilteredLoop):
     """The records of a loop with `nlctl.controllers.KnownSignLaw`, and where it starts."""
 
     parts: Parts  # records of the blocks, and the gains
@@ -71,7 +55,7 @@ class KnownSignLoop(FilteredLoop):
     W_hat_0: tuple[arb, ...]  # initial estimates, of all starts
 
     @property
-    def law(self) -> KnownSignLaw:
+    def law(self) -> controllers.KnownSignLaw:
         """The control law."""
         return self.parts.law
 
@@ -82,7 +66,7 @@ class KnownSignLoop(FilteredLoop):
 
 
 @described_record(made_by="certify")
-class KnownSignCertificate(FilteredCertificate):
+class KnownSignCertificate(filtered.FilteredCertificate):
     """What `certify` proved with `nlctl.controllers.KnownSignLaw`: |r| <= C_0 for all time."""
 
     alpha_0: float  # The constants of V' <= -alpha_1 V + alpha_0, and V(0).
@@ -132,35 +116,26 @@ class _BoundOfR:
     doubt: str = field(default="")
 
 
-def read_known_sign(
-    loop: Any,
-    params: Mapping[str, Any] | None = None,
-    inputs: Mapping[str, float] | None = None,
-    starts: Any = None,
-) -> KnownSignLoop:
+def read_known_sign(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> KnownSignLoop:
     """Read a loop that is made of the paper's blocks and `nlctl.controllers.KnownSignLaw`."""
-    read = read_checked(loop, PIECES, _PROVED_FOR, params, inputs, starts)
+    read = read_checked(loop, PIECES, _PROVED_FOR, given)
     parts = loop_parts(read.given, read.roles)
+    weights = read.start("weights") if parts.weights else ()
     return KnownSignLoop(
-        **as_filtered(read),
+        **filtered.as_filtered(read),
         parts=parts,
-        delta_hat_0=between(*read.start("robust")[0]),
-        W_hat_0=tuple(between(*ends) for ends in read.start("weights")) if parts.weights else (),
+        delta_hat_0=filtered.between(*read.start("robust")[0]),
+        W_hat_0=tuple(filtered.between(*ends) for ends in weights),
     )
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_known_sign(loop, options.params, options.inputs, options.starts)
-    actuator, u_max, tol = read.parts.actuator, options.u_max, options.tol
-    split = disturbed(decompose(actuator, k=options.k, u_max=u_max, tol=tol), read.disturbance)
-    return Subject(
-        loop=read, start=abs(read.r_0), actuator=actuator, split=split, u_max=u_max, tol=tol
-    )
+    return filtered.subject_of(read_known_sign(loop, options), options, options.u_max)
 
 
-def _region(subject: Subject, level: arb) -> Demand:
+def _region(subject: Subject, level: arb) -> filtered.Demand:
     C = wider(upper(level), subject.tol)
-    return demand(subject.loop, subject.split, C, tol=subject.tol)
+    return filtered.demand(subject.loop, subject.split, C, tol=subject.tol)
 
 
 def bound_of_r(loop: KnownSignLoop, delta_star: float) -> _BoundOfR:
@@ -175,7 +150,7 @@ def bound_of_r(loop: KnownSignLoop, delta_star: float) -> _BoundOfR:
     return _BoundOfR(level=level, drive=drive, rate=rate, V_0=V_0)
 
 
-def _bound(subject: Subject, need: Demand) -> _BoundOfR:
+def _bound(subject: Subject, need: filtered.Demand) -> _BoundOfR:
     bound = bound_of_r(subject.loop, need.delta_star)
     least, N_0 = subject.split.k_1 * need.G_min, subject.loop.law.N_0
     if not upper(bound.level) < _LIMIT or arb(N_0) * subject.split.k_1 * need.G_min >= 1:
@@ -186,14 +161,14 @@ def _bound(subject: Subject, need: Demand) -> _BoundOfR:
     return dataclasses.replace(bound, doubt=doubt)
 
 
-def _endless(need: Demand, iterations: Sequence[float]) -> str:
+def _endless(need: filtered.Demand, iterations: Sequence[float]) -> str:
     return "" if iterations[-1] < _LIMIT else without_end("C_0(C)", iterations)
 
 
-def _largest_input(subject: Subject, need: Demand, bound: _BoundOfR) -> float:
+def _largest_input(subject: Subject, need: filtered.Demand, bound: _BoundOfR) -> float:
     """Bound |u| <= N_0 (beta |r| + |W_hat^T psi| + |delta_hat| + |Y_d|) from V <= C_0^2 / 2."""
     loop, C_0, gains = subject.loop, bound.level, subject.loop.parts.gains
-    s = feedforward(loop, need) + arb(need.delta_star) + C_0 * arb(gains.gamma).sqrt()
+    s = filtered.feedforward(loop, need) + arb(need.delta_star) + C_0 * arb(gains.gamma).sqrt()
     s = s + C_0 * (arb(gains.Gamma) * loop.nodes).sqrt()
     return upper(loop.law.N_0 * (loop.law.beta * C_0 + s))
 
@@ -215,7 +190,7 @@ KNOWN_SIGN = ProofKind(
     name="known sign",
     about="a KnownSignLaw",
     result=KnownSignCertificate,
-    fits=lambda loop: has_law(loop, KnownSignLaw),
+    fits=lambda loop: has_law(loop, controllers.KnownSignLaw),
     bounded="|r|",
     begin=_begin,
     region=_region,

@@ -24,18 +24,10 @@ from nlctl.controllers import FilteredError, SlidingModeLaw
 from nlctl.references import SumOfSines
 
 from ...intervals.branch_and_bound import upper
-from ..bounds.decomposition import decompose
 from ..bounds.error_bounds import error_bounds
-from ..loop.checked import disturbed, read_checked
+from ..loop.checked import read_checked
 from ..loop.roles import Pieces, has_law
-from ..proofs.filtered import (
-    Demand,
-    FilteredCertificate,
-    FilteredLoop,
-    as_filtered,
-    demand,
-    feedforward,
-)
+from ..proofs import filtered
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider
 from ..proofs.result import FROM_STARTS, Row, per_second
 from ..proofs.saved import Content
@@ -55,7 +47,7 @@ _PROVED_FOR = {
 
 
 @described_record
-class SlidingModeCertificate(FilteredCertificate):
+class SlidingModeCertificate(filtered.FilteredCertificate):
     """What `certify` proved of sliding mode with a boundary layer: |r| <= C_0, in the end less.
 
     Examples
@@ -110,24 +102,20 @@ class _Layer:
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_checked(loop, _PIECES, _PROVED_FOR, options.params, options.inputs, options.starts)
-    filtered = FilteredLoop(**as_filtered(read))
-    actuator, K, tol = read.roles.spec("actuator"), filtered.law.K, options.tol
-    split = disturbed(decompose(actuator, k=options.k, u_max=K, tol=tol), read.disturbance)
-    return Subject(
-        loop=filtered, start=abs(filtered.r_0), actuator=actuator, split=split, u_max=K, tol=tol
-    )
+    read = read_checked(loop, _PIECES, _PROVED_FOR, options)
+    with_r = filtered.FilteredLoop(**filtered.as_filtered(read))
+    return filtered.subject_of(with_r, options, with_r.law.K)
 
 
-def _region(subject: Subject, level: arb) -> Demand:
+def _region(subject: Subject, level: arb) -> filtered.Demand:
     tol = subject.tol
-    return demand(subject.loop, subject.split, upper(wider(level, tol)), tol=tol)
+    return filtered.demand(subject.loop, subject.split, upper(wider(level, tol)), tol=tol)
 
 
-def _layer(subject: Subject, need: Demand) -> _Layer:
+def _layer(subject: Subject, need: filtered.Demand) -> _Layer:
     """Compare what K does with what it has to dominate."""
     law, start = subject.loop.law, subject.start
-    M = arb(need.delta_star) + feedforward(subject.loop, need)
+    M = arb(need.delta_star) + filtered.feedforward(subject.loop, need)
     least = arb(law.K) * subject.split.k_1 * need.G_min
     if not bool(least > M):
         endless = arb("inf")

@@ -22,7 +22,7 @@ from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Sides, Starts, read_starts
 from .content import UNREAD_CONTENT, LoopContent, loop_content
-from .plant_form import check_chain
+from .plant_form import Acceleration, acceleration, check_chain
 from .roles import Pieces, Roles, check_kind, joined_again, read_roles
 from .same_loop import check_same, points_around
 
@@ -62,12 +62,26 @@ def disturbed(split: Decomposition, bound: float) -> Decomposition:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Supposed:
+    """What a proof supposes of a loop besides what the loop itself says; see `certify`."""
+
+    params: Mapping[str, Any] | None = None
+    inputs: Mapping[str, float] | None = None
+    starts: Any = None
+
+
+NOTHING_SUPPOSED = Supposed()
+
+
+@dataclass(frozen=True, kw_only=True)
 class CheckedLoop:
     """What a loop is made of, after every check that does not depend on the proof."""
 
     roles: Roles  # places of the blocks, with the parameters of the run
     disturbance: float  # bound of what external inputs add to the plant's v
     starts: Starts  # initial states that the proof shall be about
+    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
+    acceleration: Acceleration
     content: LoopContent = field(repr=False)  # what the loop consists of
     # a copy of the loop, with the parameters of the run
     given: ct.InterconnectedSystem = field(repr=False)
@@ -88,25 +102,23 @@ def read_checked(
     loop: Any,
     pieces: Pieces,
     kinds: Mapping[str, tuple[type, ...]],
-    params: Mapping[str, Any] | None,
-    inputs: Mapping[str, float] | None,
-    starts: Any = None,
+    given: Supposed,
     free: tuple[str, ...] = (),
 ) -> CheckedLoop:
     """Read a loop by its wiring, in a copy whose blocks have the parameters of the run."""
-    content = UNREAD_CONTENT
+    content, params = UNREAD_CONTENT, given.params
     if isinstance(loop, ct.InterconnectedSystem):  # else it is refused
         content = loop_content(loop, params)
         loop = overridden(loop, params)
     roles = read_roles(loop, pieces, content.functions)
-    disturbance = bound_of_inputs(roles, inputs or {}, loop)
+    disturbance = bound_of_inputs(roles, given.inputs or {}, loop)
     for part, records in kinds.items():
         if part in roles.places:  # a network may be left out
             check_kind(roles.places[part], records)
     check_chain(roles.places["plant"])
     begins = read_starts(
         loop,
-        starts,
+        given.starts,
         free=tuple(name for part in free for name in _states(loop, roles, part)),
         kept=_states(loop, roles, "actuator"),
     )
@@ -115,7 +127,7 @@ def read_checked(
     check_same(loop, understood, _compared_at(loop, begins), params, content=content)
     return CheckedLoop(
         roles=roles, disturbance=disturbance, starts=begins, content=content, given=loop,
-        understood=understood,
+        acceleration=acceleration(roles.places["plant"]), understood=understood,
     )  # fmt: skip
 
 

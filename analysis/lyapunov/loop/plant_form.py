@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from flint import arb
@@ -28,21 +28,9 @@ from ...intervals.arithmetic import Ball, as_ball
 from ...intervals.paths import Undecided, every_way
 
 
-class Acceleration(Protocol):
-    """x_n' of a plant."""
-
-    def __call__(self, t: Any, x: Any, v: Any) -> Any:
-        """Return it of balls or numbers."""
-        ...
-
-    def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
-        """Return it of symbols, as an expression of the graph."""
-        ...
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Acceleration:
-    """The last rate of a plant's own update; two of the same content are equal."""
+class Acceleration:
+    """x_n', the last rate of a plant's own update; two of the same content are equal."""
 
     plant: Place = field(compare=False)
     update: Callable[..., Any] = field(compare=False)
@@ -50,10 +38,11 @@ class _Acceleration:
     content: object
 
     def __call__(self, t: Any, x: Any, v: Any) -> Any:
+        """Return it of balls or numbers."""
         return self.update(t, _objects(x), _objects((v,)), self.p)[-1]
 
     def expression(self, graph: Graph, t: Tracer, x: Sequence[Tracer], v: Any) -> Expr:
-        """Return it of symbols; Untraceable if there is none."""
+        """Return it of symbols, as an expression of the graph; Untraceable if there is none."""
         system = self.plant.system
         try:
             check_functions(self.plant.path, system)
@@ -82,7 +71,7 @@ def acceleration(plant: Place) -> Acceleration:
     p = current_parameters(plant.system)
     update = on_intervals(plant.path, plant.system.updfcn)  # with arrays of floats, as a run
     key, unseen = content_of(plant.system.updfcn, p)
-    return _Acceleration(plant=plant, update=update, p=p, content=object() if unseen else key)
+    return Acceleration(plant=plant, update=update, p=p, content=object() if unseen else key)
 
 
 def check_chain(plant: Place) -> None:

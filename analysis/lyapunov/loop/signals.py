@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Literal
@@ -80,6 +81,8 @@ def signals_of(response: Any) -> Signals:
     >>> float(signals_of(response)["zeta"][0])
     1.0
     """
+    if isinstance(response, Signals):
+        return response
     if not hasattr(response, "output_labels"):
         raise ParameterError(
             f"signals_of needs a response with named outputs, got {type(response).__name__}"
@@ -131,20 +134,24 @@ class Margin:
         return float(self.t[int(np.argmin(self.margin))])
 
     @property
+    def _broken(self) -> np.ndarray:
+        """At which samples it does not hold, up to the tolerance."""
+        return ~(self.margin >= -self.tolerance * self.scale)
+
+    @property
     def holds(self) -> bool:
         """Whether it holds at every sample, up to the tolerance."""
-        return bool(self.least >= -self.tolerance * self.scale)
+        return not self._broken.any()
 
     @property
     def share_violated(self) -> float:
         """Share of the samples at which it does not hold."""
-        return float(np.mean(~(self.margin >= -self.tolerance * self.scale)))
+        return float(np.mean(self._broken))
 
     @property
     def first_violated(self) -> float:
         """Time (s) of the first sample at which it does not hold; NaN if there is none."""
-        broken = ~(self.margin >= -self.tolerance * self.scale)
-        return float(self.t[int(np.argmax(broken))]) if broken.any() else np.nan
+        return float(self.t[int(np.argmax(self._broken))]) if self._broken.any() else np.nan
 
 
 def inequality(
@@ -157,39 +164,19 @@ def inequality(
     tolerance: float = POINTWISE,
 ) -> Margin:
     """Return the margin high - low of low <= high."""
-    return _margin(equation, statement, "inequality", t, low, high, scale, tolerance)
-
-
-def equality(
-    equation: str,
-    statement: str,
-    t: np.ndarray,
-    one: Any,
-    other: Any,
-    scale: float | None = None,
-    tolerance: float = POINTWISE,
-) -> Margin:
-    """Return the margin -|one - other| of one = other."""
-    return _margin(equation, statement, "equality", t, one, other, scale, tolerance)
-
-
-def _margin(
-    equation: str, statement: str, kind: Any, t: np.ndarray, low: Any, high: Any,
-    scale: float | None, tolerance: float,
-) -> Margin:  # fmt: skip
     low, high = (np.broadcast_to(np.asarray(side, dtype=float), t.shape) for side in (low, high))
     if scale is None:
         finite = np.abs(np.concatenate([low, high]))
         scale = float(np.max(finite[np.isfinite(finite)], initial=0.0))
     with np.errstate(invalid="ignore"):  # inf - inf is NaN, which does not hold
-        difference = high - low
-    margin = -np.abs(difference) if kind == "equality" else difference
+        margin = high - low
     return Margin(
-        equation=equation,
-        statement=statement,
-        kind=kind,
-        t=t,
-        margin=margin,
-        scale=scale,
+        equation=equation, statement=statement, kind="inequality", t=t, margin=margin, scale=scale,
         tolerance=tolerance,
-    )
+    )  # fmt: skip
+
+
+def equality(equation: str, statement: str, *sides: Any) -> Margin:
+    """Return the margin -|one - other| of one = other; arguments as for `inequality`."""
+    one_way = inequality(equation, statement, *sides)
+    return dataclasses.replace(one_way, kind="equality", margin=-np.abs(one_way.margin))

@@ -157,14 +157,12 @@ def observe(
         seen = _along(loop, response, _LOOKS if place == 0 else 1)
         check_same(loop, compiled.system, seen, member.params, params)
         _check_reproduced(member, signals)
-        lost = None if response.success else float(response.statistics.time)
-        message = str(response.message or "")
         yield MemberRun(
             member=member,
             parts=parts,
             signals=signals,
-            lost=lost,
-            message=message,
+            lost=None if response.success else float(response.statistics.time),
+            message=str(response.message or ""),
             reference=_reference(loop, parts, response, signals),
         )
 

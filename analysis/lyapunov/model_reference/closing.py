@@ -35,7 +35,7 @@ from ..bounds.decomposition import Decomposition, decompose
 from ..loop.checked import disturbed
 from ..loop.same_loop import points_around
 from ..proofs.kind import Closed, ProofKind, ProofOptions, Subject, wider, without_end
-from .decrease import Decrease, decrease, outside_ball
+from .decrease import Decrease, decrease, outside_ball, sigma_of
 from .matching import Matching, matching
 from .model_certificate import ModelReferenceCertificate
 from .model_loop import ModelReferenceLoop, is_model_reference, read_model_reference
@@ -47,7 +47,7 @@ _TIGHTER = 1e-3  # relative: the ultimate bound is computed again as long as it 
 
 
 def _begin(loop: Any, options: ProofOptions) -> Subject:
-    read = read_model_reference(loop, options.params, options.inputs, options.starts)
+    read = read_model_reference(loop, options)
     split = disturbed(_split(read, options), read.disturbance)
     match = matching(read, split, _checked_weights(options.W, len(read.start("weights"))))
     if not outside_ball(match):
@@ -211,7 +211,7 @@ def _rate_of_leakage(weights: Any, r: float) -> float:
     """Return sigma, times |r| for e-modification; what projection takes away is left out."""
     if isinstance(weights, ProjectedWeights):
         return 0.0
-    return weights.sigma_1 if isinstance(weights, AdaptiveWeights) else weights.sigma * abs(r)
+    return sigma_of(weights) * (1.0 if isinstance(weights, AdaptiveWeights) else abs(r))
 
 
 def _delta(match: Matching, t: float, signals: Mapping[str, float]) -> float:

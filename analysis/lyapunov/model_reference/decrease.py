@@ -53,17 +53,18 @@ def decrease(match: Matching, D: arb, V_0: arb) -> Decrease:
     if not D.is_finite():
         endless = arb("inf")
         return Decrease(level=endless, error=endless, weights=endless, mean=endless, how="", end="")
-    modified = {
-        AdaptiveWeights: ("sigma_1", _sigma_modification),
-        EModifiedWeights: ("sigma", _e_modification),
-    }
-    if type(weights) is ProjectedWeights:
+    if isinstance(weights, ProjectedWeights):
         return _projection(match, D, V_0)
-    name, bounds = modified[type(weights)]
-    sigma = exact(getattr(weights, name))
+    sigma = exact(sigma_of(weights))
     if not sigma:
         return _gradient(match.loop.roles.paths["weights"], D, V_0)
+    bounds = _sigma_modification if isinstance(weights, AdaptiveWeights) else _e_modification
     return bounds(match, ball(sigma * match.lam), D, V_0)
+
+
+def sigma_of(weights: AdaptiveWeights | EModifiedWeights) -> float:
+    """Return what the leakage of weights is weighted with."""
+    return weights.sigma_1 if isinstance(weights, AdaptiveWeights) else weights.sigma
 
 
 def _gradient(path: str, D: arb, V_0: arb) -> Decrease:

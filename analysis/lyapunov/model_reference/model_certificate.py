@@ -20,8 +20,8 @@ from ...intervals.written import operations
 from ..bounds.decomposition import Decomposition
 from ..loop.checked import ADDED
 from ..proofs.result import FROM_STARTS, Certificate, Row, per_second, rows_of_split
-from ..proofs.saved import Content, split_content, starts_content, texts
-from .decrease import Decrease, decrease
+from ..proofs.saved import Content, equation_content, split_content, starts_content, texts
+from .decrease import Decrease, decrease, sigma_of
 from .matching import Matching
 from .quadratic_form import QuadraticForm
 from .region import region
@@ -123,7 +123,10 @@ class ModelReferenceCertificate(Certificate):
         return f"|W| + |W_hat - W|{ball}"
 
     def _attempts(self) -> Iterator[Content]:
-        return model_attempts(self.matching, self.split, self.C)
+        premises = _premises(self.matching, self.split)
+        for raised in _RAISED:
+            proof = _proof(self.matching, self.split, self.C * (1 + raised))
+            yield {"premises": premises, "proof": proof}
 
     def _bound(self) -> str:
         return f"|e| <= {self.e:.6g} proved for all t, {self.ultimate:.6g} in the end,"
@@ -134,13 +137,6 @@ _WIDER, _FINE = 1e-3, 1e-3  # relative: room of bounds of the rest, and how shar
 _STAGES, _LESS = 40, 0.99  # of the bound in the end: each is to be less by that
 
 
-def model_attempts(match: Matching, split: Decomposition, C: float) -> Iterator[Content]:
-    """Yield premises and proof of a loop with a reference model, with more and more room."""
-    premises = _premises(match, split)
-    for raised in _RAISED:
-        yield {"premises": premises, "proof": _proof(match, split, C * (1 + raised))}
-
-
 def _premises(match: Matching, split: Decomposition) -> Content:
     loop, places = match.loop, match.loop.roles.places
     x, xm = coordinate_names(loop.order), model_state_names(loop.order)
@@ -148,9 +144,7 @@ def _premises(match: Matching, split: Decomposition) -> Content:
     signals = ("t", *x, *xm, "yd")
     parts = {"plant": "plant", "model": "model", "W_hat": "weights"}
     return {
-        "equation": operations(
-            ("t", *x, "v"), lambda s: loop.acceleration(s["t"], [s[name] for name in x], s["v"])
-        ),
+        "equation": equation_content(loop.acceleration, loop.order),
         "regressor": [
             operations(signals, lambda s, i=i: loop.regressor(s)[i]) for i in range(len(match.W))
         ],
@@ -172,12 +166,10 @@ def _law(weights: Any) -> Content:
     """Return how the weights learn, and what keeps them bounded."""
     if isinstance(weights, ProjectedWeights):
         kind, names = "projection", {"W_max": weights.W_max, "width": weights.width}
-    elif isinstance(weights, AdaptiveWeights):
-        kind, names = "sigma-modification", {"sigma": weights.sigma_1}
-    else:
-        kind, names = "e-modification", {"sigma": weights.sigma}
-        if not weights.sigma:  # both are the gradient law
-            kind = "sigma-modification"
+    else:  # without sigma both are the gradient law
+        names = {"sigma": sigma_of(weights)}
+        by_e = names["sigma"] and not isinstance(weights, AdaptiveWeights)
+        kind = "e-modification" if by_e else "sigma-modification"
     numbers = {name: str(exact(value)) for name, value in names.items()}
     return {"kind": kind, "Gamma": str(exact(weights.Gamma)), **numbers}
 

@@ -10,15 +10,7 @@ from typing import Any
 import control as ct
 import numpy as np
 
-from nlctl.controllers import (
-    AdaptiveWeights,
-    DirectLaw,
-    EModifiedWeights,
-    ModelError,
-    ModelReferenceLaw,
-    ProjectedWeights,
-    ReferenceModel,
-)
+from nlctl import controllers
 from nlctl.controllers.mrac.model_error import lyapunov_matrix
 from nlctl.controllers.mrac.reference_model import model_state_names
 from nlctl.diagrams import Place, leaves
@@ -32,8 +24,8 @@ from ...intervals.branch_and_bound import enclose
 from ...intervals.normal_form import exact
 from ..bounds.error_bounds import reference_bounds
 from ..bounds.starts import Sides
-from ..loop.checked import CheckedLoop, read_checked
-from ..loop.plant_form import Acceleration, acceleration, on_intervals
+from ..loop.checked import NOTHING_SUPPOSED, CheckedLoop, Supposed, read_checked
+from ..loop.plant_form import on_intervals
 from ..loop.roles import Pieces, Roles, declared, record_of
 from .quadratic_form import QuadraticForm, quadratic_form
 
@@ -49,10 +41,14 @@ ADAPTIVE_PIECES: Pieces = {
 }
 _PROVED_FOR = {
     "reference": (SumOfSines, FilteredStep, FunctionReference),
-    "model": (ReferenceModel,),
-    "error": (ModelError,),
-    "weights": (AdaptiveWeights, EModifiedWeights, ProjectedWeights),
-    "law": (ModelReferenceLaw, DirectLaw),
+    "model": (controllers.ReferenceModel,),
+    "error": (controllers.ModelError,),
+    "weights": (
+        controllers.AdaptiveWeights,
+        controllers.EModifiedWeights,
+        controllers.ProjectedWeights,
+    ),
+    "law": (controllers.ModelReferenceLaw, controllers.DirectLaw),
 }
 _OF_V = ("plant", "weights")  # parts whose states V is of, besides those of the model
 Regressor = Callable[[Mapping[str, Any]], list[Any]]
@@ -67,8 +63,6 @@ class ModelReferenceLoop(CheckedLoop):
     form: QuadraticForm
     model_form: QuadraticForm
     command: float  # proved bound of |yd| for all time
-    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
-    acceleration: Acceleration
     # the basis block's own psi_0, psi_1, ... where t, x1, ..., xm1, ..., yd have these
     # values.
     regressor: Regressor = field(repr=False)
@@ -76,7 +70,7 @@ class ModelReferenceLoop(CheckedLoop):
     @property
     def own_feedback(self) -> bool:
         """Whether the law adds nu + nu_e itself; `nlctl.controllers.DirectLaw` learns it."""
-        return isinstance(self.spec("law"), ModelReferenceLaw)
+        return isinstance(self.spec("law"), controllers.ModelReferenceLaw)
 
     @property
     def gain(self) -> Fraction:
@@ -91,14 +85,9 @@ def is_model_reference(loop: Any) -> bool:
     )
 
 
-def read_model_reference(
-    loop: Any,
-    params: Mapping[str, Any] | None = None,
-    inputs: Mapping[str, float] | None = None,
-    starts: Any = None,
-) -> ModelReferenceLoop:
+def read_model_reference(loop: Any, given: Supposed = NOTHING_SUPPOSED) -> ModelReferenceLoop:
     """Read a loop such as `nlctl.mrac` makes with a plant and an actuator."""
-    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, params, inputs, starts, _OF_V)
+    read = read_checked(loop, ADAPTIVE_PIECES, _PROVED_FOR, given, _OF_V)
     roles, order = read.roles, _checked_orders(read.roles)
     model, error = roles.spec("model"), roles.spec("error")
     own_P = np.atleast_2d(error.lyapunov_matrix).copy()
@@ -110,7 +99,6 @@ def read_model_reference(
         form=quadratic_form(roles.paths["error"], error.K, own_P),
         model_form=quadratic_form(roles.paths["model"], model.a, P_of_model),
         command=_bound_of_command(roles.places["reference"], read.start("reference")),
-        acceleration=acceleration(roles.places["plant"]),
         regressor=_regressor(roles.places["basis"], order),
     )
 

@@ -14,7 +14,6 @@ lasts from below.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,8 +24,8 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import number
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
 
+from ..loop.signals import Signals, signals_of
 from .property import GainFunction, antiderivative, lobes
 
 
@@ -48,23 +47,13 @@ class Drift:
     mismatch: float
 
 
-def signal(response: Any, name: str) -> np.ndarray:
-    """Return an output of a response over time, shape (m,)."""
-    labels = list(response.output_labels)
-    if name not in labels:
-        raise unknown("output signal", name, labels, "of the response")
-    values = np.atleast_2d(np.asarray(response.outputs))[labels.index(name)]
+def finite_signal(signals: Signals, name: str) -> np.ndarray:
+    """Return a signal over time, shape (m,), that is finite all the time."""
+    values = signals[name]
     if not np.all(np.isfinite(values)):
-        lost = float(np.asarray(response.time)[~np.isfinite(values)][0])
+        lost = float(signals.t[~np.isfinite(values)][0])
         raise ParameterError(f"{name} is not finite at t = {lost:g} s: end the response before")
     return values
-
-
-def as_response_of(time: np.ndarray, signals: Any, end: float = np.inf) -> Any:
-    """Return zeta, r and u up to a time as `drift` and `slow_drift` read a response."""
-    names, until = ["zeta", "r", "u"], time <= end + 1e-9
-    outputs = np.array([signals[name][until] for name in names])
-    return SimpleNamespace(time=time[until], outputs=outputs, output_labels=names)
 
 
 @as_annotated
@@ -94,19 +83,19 @@ def drift(response: Any, N: GainFunction = functions.nussbaum) -> Drift:
     >>> print(run.mismatch < 0.01, drift_margin(run, 1.0, 10.0, l_min=0.7, l_max=1.3).monotone)
     True False
     """
-    if not hasattr(response, "output_labels"):
+    if not isinstance(response, Signals) and not hasattr(response, "output_labels"):
         raise ParameterError(
             f"drift needs a response with the outputs zeta, r and u, got {type(response).__name__}"
         )
-    time = np.asarray(response.time, dtype=float)
-    zeta, r, u = (signal(response, name) for name in ("zeta", "r", "u"))
+    signals = signals_of(response)
+    zeta, r, u = (finite_signal(signals, name) for name in ("zeta", "r", "u"))
     integral = antiderivative(N)(zeta)
     steps = np.diff(integral, prepend=integral[0])
     phi = integral - integral[0]
-    work = cumulative_trapezoid(r * u, time, initial=0)
+    work = cumulative_trapezoid(r * u, signals.t, initial=0)
     largest = np.max(np.abs(phi))
     return Drift(
-        time=time,
+        time=signals.t,
         zeta=zeta,
         r=r,
         phi=phi,

@@ -10,7 +10,7 @@ import numpy as np
 from nlctl import functions
 from nlctl.errors import ParameterError
 
-from .energy import as_response_of
+from ..loop.signals import Signals
 from .property import lobe_around
 from .slow_drift import slow_drift
 
@@ -80,7 +80,7 @@ class BurstForecast:
         beyond = np.flatnonzero(zeta >= lobe.high)
         if beyond.size:
             return float(t[beyond[0]])
-        run = as_response_of(t, {"zeta": zeta, "r": r, "u": u})
+        run = Signals(t=t, values={"zeta": zeta, "r": r, "u": u})
         try:
             return float(slow_drift(run, self.N, window=self.window).burst)
         except ParameterError:

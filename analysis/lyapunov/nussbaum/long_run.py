@@ -14,7 +14,7 @@ from nlctl.attributes import described_record
 from nlctl.response import input_output_response
 
 from ..loop.roles import read_parts
-from .energy import as_response_of
+from ..loop.signals import Signals, signals_of
 from .property import Lobe, lobe_around
 from .slow_drift import SlowDrift, slow_drift
 
@@ -145,7 +145,7 @@ def long_run(
     whole = _watched(compiled, times, start, progress, settings)
     time, signals = whole.time, _signals(whole)
     predictions = tuple(
-        slow_drift(as_response_of(time, signals, look), N, window=window)
+        slow_drift(_until(look, time, signals), N, window=window)
         for look, window in LOOKS.items()
         if look <= last
     )
@@ -185,8 +185,13 @@ def _watched(
 
 
 def _signals(response: Any) -> dict[str, np.ndarray]:
-    rows = dict(zip(response.output_labels, np.asarray(response.outputs), strict=True))
-    return {name: rows[name] for name in LONG_RUN_SIGNALS}
+    signals = signals_of(response)
+    return {name: signals[name] for name in LONG_RUN_SIGNALS}
+
+
+def _until(end: float, time: np.ndarray, signals: Mapping[str, np.ndarray]) -> Signals:
+    seen = time <= end + 1e-9
+    return Signals(t=time[seen], values={name: y[seen] for name, y in signals.items()})
 
 
 @dataclass

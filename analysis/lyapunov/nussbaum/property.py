@@ -114,13 +114,6 @@ def _quadrature(N: GainFunction, low: float, high: float) -> float:
     return quad(N, low, high, epsabs=1e-12 * size, epsrel=1e-10, limit=200)[0]
 
 
-def running_means(s: np.ndarray, N: GainFunction = functions.nussbaum) -> np.ndarray:
-    """Return (1/s) int_0^s N for an array of s != 0; the limit N(0) at s = 0."""
-    s = np.asarray(s, dtype=float)
-    whole = antiderivative(N)(s)
-    return np.where(s == 0, N(0.0), whole / np.where(s == 0, 1.0, s))
-
-
 def lobes(
     N: GainFunction = functions.nussbaum, low: float = 0.0, high: float = 9.0, *, step: float = 0.01
 ) -> tuple[Lobe, ...]:

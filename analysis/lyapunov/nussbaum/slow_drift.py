@@ -327,6 +327,12 @@ def _fitted(rates: np.ndarray, inverse: np.ndarray) -> Balance:
     return Balance(p=float(p), q=float(q), residual=float(np.sqrt(np.mean(left**2))))
 
 
+def _partial_fits(rates: np.ndarray, inverse: np.ndarray) -> list[Balance]:
+    """Return fits that leave a part of the windows out, one after the other."""
+    parts = np.array_split(np.arange(rates.size), BLOCKS)
+    return [_fitted(np.delete(rates, part), np.delete(inverse, part)) for part in parts]
+
+
 def _rest_of(balance: Balance, N: GainFunction, lobe: Lobe) -> float | None:
     """Return the zeta of the lobe, below its extremum, at which the balance stops the drift."""
     # Beyond the extremum |N| falls again, and the same |N| is passed on the way to the burst.
@@ -343,10 +349,8 @@ def _rest(
 ) -> tuple[float | None, tuple[float, float] | None]:
     """Return the resting zeta, and its range over fits that leave a part of the windows out."""
     # A fit in which the drift does not stop counts as the lobe's upper end.
-    rests = []
-    for part in np.array_split(np.arange(rates.size), BLOCKS):
-        rest = _rest_of(_fitted(np.delete(rates, part), np.delete(inverse, part)), N, lobe)
-        rests.append(lobe.high if rest is None else rest)
+    partial = [_rest_of(balance, N, lobe) for balance in _partial_fits(rates, inverse)]
+    rests = [lobe.high if rest is None else rest for rest in partial]
     rest = _rest_of(_fitted(rates, inverse), N, lobe)
     if rest is None and min(rests) == lobe.high:
         return None, None
@@ -379,8 +383,7 @@ def _forecast(
 
 def _slope(rates: np.ndarray, inverse: np.ndarray) -> tuple[float, float, float]:
     """Return p of the balance, and the standard errors of p (jackknife) and of the mean rate."""
-    fit, parts = _fitted(rates, inverse), np.array_split(np.arange(rates.size), BLOCKS)
-    slopes = [_fitted(np.delete(rates, part), np.delete(inverse, part)).p for part in parts]
+    fit, slopes = _fitted(rates, inverse), [one.p for one in _partial_fits(rates, inverse)]
     of_slope = np.sqrt((BLOCKS - 1) * np.var(slopes))
     freedom = max(rates.size - 2, 1)
     return fit.p, float(of_slope), fit.residual / float(np.sqrt(freedom))

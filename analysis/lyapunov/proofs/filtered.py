@@ -11,7 +11,6 @@ from typing import Any, Literal
 import numpy as np
 from flint import arb
 
-from nlctl.params import equation_arguments
 from nlctl.plants import coordinate_names
 from nlctl.references import SumOfSines
 from nlctl.wording import counted
@@ -21,15 +20,15 @@ from ...intervals.box import Box
 from ...intervals.branch_and_bound import enclose, upper
 from ...intervals.machine import Readable
 from ...intervals.normal_form import exact
-from ...intervals.written import operations
-from ..bounds.decomposition import Decomposition
-from ..bounds.error_bounds import error_bounds, filter_poles, reference_bounds
+from ..bounds.decomposition import Decomposition, decompose
+from ..bounds.error_bounds import error_bounds, filter_poles, initial_errors, reference_bounds
 from ..bounds.final_bound import total_error
 from ..bounds.sector import quotient_function, range_of_quotient
-from ..loop.checked import ADDED, CheckedLoop
-from ..loop.plant_form import Acceleration, acceleration
+from ..loop.checked import ADDED, CheckedLoop, disturbed
+from ..loop.plant_form import Acceleration
+from .kind import ProofOptions, Subject
 from .result import Certificate, Row, per_second, rows_of_split
-from .saved import Content, split_content, starts_content, texts
+from .saved import Content, equation_content, split_content, starts_content, texts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +37,6 @@ class FilteredLoop(CheckedLoop):
 
     reference: SumOfSines
     e0: tuple[arb, ...]  # initial errors e_1(0), ..., e_n(0): of all starts
-    # x_n' as ``acceleration(t, x, v)``: the last entry of the plant's own update
-    acceleration: Acceleration
 
     @property
     def law(self) -> Any:
@@ -64,20 +61,17 @@ class FilteredLoop(CheckedLoop):
 
 def as_filtered(read: CheckedLoop) -> dict[str, Any]:
     """Return the fields of a `FilteredLoop`."""
-    return vars(read) | {
-        "reference": read.spec("reference"),
-        "e0": _initial_errors(read),
-        "acceleration": acceleration(read.roles.places["plant"]),
-    }
+    reference, x0 = read.spec("reference"), [between(*ends) for ends in read.start("plant")]
+    return vars(read) | {"reference": reference, "e0": initial_errors(reference, x0)}
 
 
-def _initial_errors(read: CheckedLoop) -> tuple[arb, ...]:
-    """Return e_1(0), ..., e_n(0) of a plant and a reference without states."""
-    reference = read.spec("reference")
-    yd = reference.output(0.0, (), (), equation_arguments(reference))
-    # the radius covers what double precision has lost in yd(0)
-    ends = zip(read.start("plant"), yd, strict=False)
-    return tuple(between(*x) - arb(float(y), 1e-12) for x, y in ends)
+def subject_of(loop: FilteredLoop, options: ProofOptions, u_max: float) -> Subject:
+    """Return what a proof of a bound of |r| begins with; `u_max` is that of the split."""
+    actuator, tol = loop.spec("actuator"), options.tol
+    split = disturbed(decompose(actuator, k=options.k, u_max=u_max, tol=tol), loop.disturbance)
+    return Subject(
+        loop=loop, start=abs(loop.r_0), actuator=actuator, split=split, u_max=u_max, tol=tol
+    )
 
 
 def between(low: float, high: float) -> arb:
@@ -196,7 +190,7 @@ class FilteredCertificate(Certificate):
         loop, need, (gains, states) = self.loop, self.region, self._numbers()
         reference = ("amplitudes", "frequencies", "phases")
         premises = {
-            "equation": _equation(loop),
+            "equation": equation_content(loop.acceleration, len(loop.e0)),
             "reference": {name: texts(getattr(loop.reference, name)) for name in reference},
             "lambdas": texts(loop.lambdas),
             "actuator": split_content(self.split),
@@ -207,13 +201,6 @@ class FilteredCertificate(Certificate):
         for raised, wider in _WIDER:
             region = demand(loop, self.split, need.C * (1 + raised)) if raised else need
             yield {"premises": premises, "proof": _proof(loop, region, Fraction(wider))}
-
-
-def _equation(loop: FilteredLoop) -> list[list[Any]]:
-    names = coordinate_names(len(loop.lambdas) + 1)
-    return operations(
-        ("t", *names, "v"), lambda s: loop.acceleration(s["t"], [s[x] for x in names], s["v"])
-    )
 
 
 def _proof(loop: FilteredLoop, need: Demand, wider: Fraction) -> Content:

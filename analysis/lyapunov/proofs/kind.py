@@ -18,16 +18,14 @@ from nlctl.wording import counted
 
 from ...intervals.branch_and_bound import upper
 from ..bounds.decomposition import Decomposition, only_declared
+from ..loop.checked import Supposed
 from .result import Certificate, ProofResult
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProofOptions:
+class ProofOptions(Supposed):
     """What `certify` is asked; see there."""
 
-    params: Mapping[str, Any] | None
-    inputs: Mapping[str, float] | None
-    starts: Any
     k: tuple[float, float] | None
     W: Sequence[float] | None
     u_max: float
@@ -64,10 +62,6 @@ class Closed:
         return value if self.holds else float("inf")
 
 
-def _not_looked_at(region: Any, iterations: Sequence[float]) -> str:
-    return ""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProofKind:
     """A kind of proof.
@@ -91,7 +85,7 @@ class ProofKind:
     # and a `doubt` where there is none
     bound: Callable[[Subject, Any], Any] | None = None
     # ``endless(region, iterations)`` says why the iteration is given up; nothing if it is not
-    endless: Callable[[Any, Sequence[float]], str] = _not_looked_at
+    endless: Callable[[Any, Sequence[float]], str] = lambda region, iterations: ""
     # ``largest_input(subject, region, bound)`` returns a bound of |u|
     largest_input: Callable[[Subject, Any, Any], float] | None = None
     # ``fields(subject, closed)`` returns the fields of `result` that are its own

@@ -17,12 +17,15 @@ from typing import Any
 
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
+from nlctl.plants import coordinate_names
 
 from ...intervals.normal_form import exact
 from ...intervals.paths import Undecided
+from ...intervals.written import operations
 from ...recheck import FORMAT, Refuted, proved_bounds, recheck, seal_of
 from ..bounds.decomposition import Decomposition
 from ..bounds.starts import Starts
+from ..loop.plant_form import Acceleration
 
 Content = dict[str, Any]
 
@@ -67,6 +70,14 @@ def _rounded_up(bound: Fraction) -> Fraction:
 def texts(values: Iterable[Any]) -> list[str]:
     """Return finite numbers as exact texts."""
     return [str(exact(value)) for value in values]
+
+
+def equation_content(acceleration: Acceleration, order: int) -> list[list[Any]]:
+    """Return x_n' of a plant, in t, x1, ..., xn and v."""
+    names = coordinate_names(order)
+    return operations(
+        ("t", *names, "v"), lambda s: acceleration(s["t"], [s[x] for x in names], s["v"])
+    )
 
 
 def split_content(split: Decomposition) -> Content:
