@@ -12,8 +12,9 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.attributes import described_record
 
 from ..report.document import Item
+from .cases import PaperCase, PaperRun
 
-PaperRuns = Mapping[str, Any]
+PaperRuns = Mapping[str, PaperRun]
 """Simulated cases of a paper by key."""
 
 
@@ -166,10 +167,8 @@ class Paper:
     question: str  # What the page answers.
     citation: str  # Where the paper appeared.
     parts: tuple[Part, ...]
-    # ``simulate(done) -> runs``; ``done(amount)`` is called as cases are finished.
-    simulate: Callable[[Callable[[float], object]], PaperRuns]
-    cases: int  # How many are simulated.
-    statements: Callable[[], Sequence[Statement]]  # Returns them; it is called once per page.
+    cases: tuple[PaperCase, ...]  # What is simulated.
+    statements: tuple[Statement, ...]
     reproduced: str  # In a few words each, for the table of papers and the verdict.
     not_reproduced: str
     heading: str = "What the paper has"  # Of the section that says what the paper has.
@@ -179,7 +178,7 @@ class Paper:
     open_points: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()  # Paragraphs, as those of a `Report`.
     limits: tuple[str, ...] = ()
-    references: tuple[str, ...] = ()
+    others_cited: tuple[str, ...] = ()  # Behind the paper itself, in the list of references.
     lead: PaperFigure | None = None  # The picture at the top.
     # Heading and caption of the tables of numbers.
     numbers_title: str = "{count} numbers, as printed or required, and as found"
@@ -192,3 +191,8 @@ class Paper:
     command: str = ""  # What makes the page again; ``nlctl report KEY`` where it is empty.
     # Packages whose versions stand on the page next to those of every report.
     packages: tuple[str, ...] = field(default=())
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The paper, and what else its page cites."""
+        return (self.citation, *self.others_cited)

@@ -11,23 +11,22 @@ from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Figure, Paragraph, Report, Section, captioned
 from ...reproductions.page import report_of
+from ...reproductions.paper import PaperRuns
 from ...reproductions.sections import model_section, part_sections
-from .. import TAIL, CaseRun, checks
+from .. import TAIL, checks
 from .. import figures as histories
 from ..burst import Burst
 from . import text as text
 from .claims import number_claims, paper_claims, paper_verdict, proof_claims, theorem_claims
 from .closing import closing_sections, metric_table
 from .proof import Evidence, lyapunov_sections
-from .record import LV_2017, found_of
+from .record import LV_2017
 from .rivals import rivals_section
 from .sampling import sampling_section
 
-_Runs = Mapping[str, CaseRun]
-
 
 def paper_report(
-    runs: _Runs,
+    runs: PaperRuns,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
@@ -64,14 +63,14 @@ def paper_report(
 
 
 def paper_sections(
-    runs: _Runs,
+    runs: PaperRuns,
     *,
     proofs: Mapping[int, Evidence] | None = None,
     far: Mapping[str, LongRun] | None = None,
     burst: Burst | None = None,
 ) -> list[Section]:
     """Return the sections of `paper_report` up to those on studies; the arguments are the same."""
-    numbers = [found_of(check) for check in checks(runs)]
+    numbers = checks(runs)
     return [
         model_section(LV_2017),
         *(
@@ -84,7 +83,7 @@ def paper_sections(
     ]
 
 
-def _lead(runs: _Runs, long: LongRun | None) -> Figure:
+def _lead(runs: PaperRuns, long: LongRun | None) -> Figure:
     """Return the picture at the top: Example 2 follows its reference, and zeta drifts."""
     run = runs["2"]
     caption = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
@@ -98,7 +97,7 @@ def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     )
 
 
-def _exchange(runs: _Runs) -> Section:
+def _exchange(runs: PaperRuns) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",
