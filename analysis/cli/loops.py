@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,8 +45,6 @@ def named_loop(name: str) -> Any:
 
 def _check_takes_nothing(name: str, function: Any) -> None:
     """Refuse a function that cannot be called without arguments."""
-    import inspect
-
     try:
         signature = inspect.signature(function)
         signature.bind()
