@@ -21,22 +21,17 @@ BOUND = 0.15  # of |e₁| from TAIL on: a sixth of the reference; the paper name
 _RTOL = 1e-9
 
 _number = partial(Metric, unit="1")
+_late = partial(_number, start=TAIL)
 METRICS = (
-    _number(
-        key="tail_max_e", signal="e", meaning="max |e₁| for t ≥ 10 s", function=peak, start=TAIL
-    ),
-    _number(
-        key="tail_rms_e", signal="e", meaning="RMS of e₁ for t ≥ 10 s", function=rms, start=TAIL
-    ),
+    _late(key="tail_max_e", signal="e", meaning="max |e₁| for t ≥ 10 s", function=peak),
+    _late(key="tail_rms_e", signal="e", meaning="RMS of e₁ for t ≥ 10 s", function=rms),
     _number(key="rms_e", signal="e", meaning="RMS of e₁", function=rms),
     _number(key="max_u", signal="u", meaning="max |u|", function=peak),
     _number(key="zeta_min", signal="zeta", meaning="min ζ", function=lowest),
     _number(key="zeta_max", signal="zeta", meaning="max ζ", function=highest),
     _number(key="zeta_end", signal="zeta", meaning="ζ(20 s)", function=final),
     _number(key="max_r", signal="r", meaning="max |r|", function=peak),
-    _number(
-        key="tail_max_r", signal="r", meaning="max |r| for t ≥ 10 s", function=peak, start=TAIL
-    ),
+    _late(key="tail_max_r", signal="r", meaning="max |r| for t ≥ 10 s", function=peak),
     _number(key="max_delta_hat", signal="delta_hat", meaning="max δ̂", function=highest),
     _number(key="max_W", signal="W_norm", meaning="max ‖Ŵ‖", function=highest),
     _number(key="x1_end", signal="x1", meaning="x₁(20 s)", function=final),

@@ -69,93 +69,51 @@ class FoundNumber:
         return self.error <= self.statement.tolerance
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class PaperFigure:
-    """A figure of the page: its anchor, its caption, and how it is drawn from the runs.
+    """A figure of the page, and how it is drawn from the runs."""
 
-    Attributes
-    ----------
-    description : str or callable
-        For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The
-        caption where it is empty.
-    folded : bool
-        Whether it stands behind a heading that is opened.
-    """
-
-    key: str
+    key: str  # Its anchor.
     caption: str
     draw: Callable[[PaperRuns], MatplotlibFigure]
+    # For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The caption
+    # where it is empty.
     description: str | Callable[[PaperRuns], str] = ""
-    folded: bool = False
+    folded: bool = False  # Whether it stands behind a heading that is opened.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class MovedLoop:
-    """What the reader of a page that runs may move of an example.
+    """What the reader of a page that runs may move of an example."""
 
-    Attributes
-    ----------
-    make : callable
-        Returns the diagram, with faults that may be switched on.
-    call : str
-        The Python that makes it.
-    until, step : float
-        Of the run (s).
-    names : tuple of str
-        Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
-    signals : tuple of str or of lists of str
-        What is drawn, a row each; all outputs where it is empty.
-    requirements : tuple of (str, str)
-        What the page watches, as study files have it, and what it means.
-    """
-
-    make: Callable[[], Any]
-    call: str
-    until: float
-    step: float = 0.01
+    make: Callable[[], Any]  # Returns the diagram, with faults that may be switched on.
+    call: str  # The Python that makes it.
+    until: float  # End of the run (s).
+    step: float = 0.01  # Of its samples (s).
+    # Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
     names: tuple[str, ...] = ()
-    signals: tuple[str | list[str], ...] = ()
+    signals: tuple[str | list[str], ...] = ()  # What is drawn, a row each; else all outputs.
+    # What the page watches, as study files have it, and what it means.
     requirements: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Part:
-    """One example of a paper on its page.
+    """One example of a paper on its page."""
 
-    Attributes
-    ----------
-    key, title : str
-        Its anchor and its heading.
-    make : callable
-        Returns the diagram.
-    blocks : tuple of str
-        Blocks whose equations stand on the page.
-    number : str
-        In front of each equation; empty for none.
-    picture : str
-        Caption of the diagram.
-    figures : tuple of PaperFigure
-    more : str
-        Heading of the figures that are folded.
-    parameters : tuple of (str, str, str, str)
-        Name, as printed, as used, remark; the third is filled in from the blocks by name.
-    items : callable, optional
-        ``items(runs)``, what else stands behind its figures.
-    moved : MovedLoop, optional
-        What a page that runs moves.
-    """
-
-    key: str
-    title: str
-    make: Callable[[], Any]
-    blocks: tuple[str, ...]
-    number: str = ""
-    picture: str = "The loop as simulated."
+    key: str  # Its anchor.
+    title: str  # Its heading.
+    make: Callable[[], Any]  # Returns the diagram.
+    blocks: tuple[str, ...]  # Blocks whose equations stand on the page.
+    number: str = ""  # In front of each equation; empty for none.
+    picture: str = "The loop as simulated."  # Caption of the diagram.
     figures: tuple[PaperFigure, ...] = ()
-    more: str = "More figures"
+    more: str = "More figures"  # Heading of the figures that are folded.
+    # Name, as printed, as used, remark; the third is filled in from the blocks by name.
     parameters: tuple[tuple[str, str, str, str], ...] = ()
+    # ``items(runs)``, what else stands behind its figures.
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
-    moved: MovedLoop | None = None
+    moved: MovedLoop | None = None  # What a page that runs moves.
 
 
 @described_record(eq=False)

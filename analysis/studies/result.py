@@ -23,6 +23,19 @@ LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
 
 
+_COLUMNS = {  # of tables; None: those that their rows have
+    "quantities": None,
+    "requirements": None,
+    "metrics": ("key", "signal", "unit", "meaning"),
+}
+
+
+def described(rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a study varies, requires and measures as tables, from the rows of each."""
+    tables = {name: pd.DataFrame(rows[name], columns=names) for name, names in _COLUMNS.items()}
+    return {name: table.set_index(table.columns[0]) for name, table in tables.items()}
+
+
 @described_record(eq=False, made_by="run")
 class Result:
     """A study and what it has found; nothing is run to read it."""
@@ -113,10 +126,7 @@ class Result:
         dict
             Title, verdict, notes and findings.
         """
-        tables = {
-            name: getattr(self, name).reset_index().to_dict("records")
-            for name in ("quantities", "requirements", "metrics")
-        }
+        tables = {name: getattr(self, name).reset_index().to_dict("records") for name in _COLUMNS}
         rows = None if self.rows is None else {"done": self.rows.done}
         return as_json(
             {
