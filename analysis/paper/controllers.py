@@ -7,22 +7,9 @@ from typing import Any
 
 import control as ct
 
-from nlctl import paper
+from nlctl import controllers, paper
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
-from nlctl.controllers import (
-    PID,
-    AdaptiveWeights,
-    DeadZoneNussbaumLaw,
-    KnownSignLaw,
-    LeakyNussbaumLaw,
-    MonotoneNussbaumLaw,
-    RobustTerm,
-    SlidingModeLaw,
-    ablations,
-    replaced,
-    sliding_mode,
-)
 from nlctl.names import unknown
 from nlctl.references import BandLimitedNoise
 
@@ -96,23 +83,23 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     published, gains = published_controller(example), GAINS[example]
     beta = part_of(published, "law").spec.beta
     laws = {
-        "dead zone in zeta'": DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
-        "leakage": LeakyNussbaumLaw(beta=beta),
-        "monotone zeta": MonotoneNussbaumLaw(beta=beta),
+        "dead zone in zeta'": controllers.DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
+        "leakage": controllers.LeakyNussbaumLaw(beta=beta),
+        "monotone zeta": controllers.MonotoneNussbaumLaw(beta=beta),
     }
     return {
         "paper": published,
-        **ablations(published, kappa=gains.reached),
+        **controllers.ablations(published, kappa=gains.reached),
         **baselines(example),
-        "certified": replaced(
+        "certified": controllers.replaced(
             published,
-            weights=AdaptiveWeights(
+            weights=controllers.AdaptiveWeights(
                 nodes=part_of(published, "weights").spec.nodes, **gains.weights
             ),
-            robust=RobustTerm(**gains.robust),
-            law=KnownSignLaw(**gains.law),
+            robust=controllers.RobustTerm(**gains.robust),
+            law=controllers.KnownSignLaw(**gains.law),
         ),
-        **{label: replaced(published, law=law) for label, law in laws.items()},
+        **{label: controllers.replaced(published, law=law) for label, law in laws.items()},
     }
 
 
@@ -123,8 +110,10 @@ def baselines(example: str) -> dict[str, Any]:
     # gain and have gains made for this plant; the paper's controller has neither.
     surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
-        "PID": PID(**gains.pid, u_max=100.0),
-        "sliding mode": sliding_mode(surface, SlidingModeLaw(**gains.sliding)),
+        "PID": controllers.PID(**gains.pid, u_max=100.0),
+        "sliding mode": controllers.sliding_mode(
+            surface, controllers.SlidingModeLaw(**gains.sliding)
+        ),
     }
 
 
