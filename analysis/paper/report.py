@@ -61,11 +61,12 @@ def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
 
 
 def proof(
-    horizon: float = HORIZON, far: proofs.FarRuns | None = None, watch: ProgressWatch = unwatched
+    horizon: float = HORIZON,
+    far: proofs.FarRuns = proofs.NO_FAR_RUNS,
+    watch: ProgressWatch = unwatched,
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part."""
-    far = far or proofs.FarRuns()
-    return lyapunov_sections(_proved(horizon, watch), far.runs, far.burst)
+    return lyapunov_sections(_proved(horizon, watch), far)
 
 
 def robustness(
@@ -101,9 +102,8 @@ def compose(
         runs, waiting = _runs(other, folder, studies, threads, watch)
         proved = _proved(horizon, watch)
         with watch("running far beyond 20 s, and the studies", 2) as advance:
-            far_away = long_runs.result()
+            shown: Any = {"proofs": proved, "far": long_runs.result()}
             advance(1)
-            shown: Any = {"proofs": proved, "far": far_away.runs, "burst": far_away.burst}
             sections = paper_sections(runs, **shown)
             drawn = draw_ahead(sections, until=waiting[-1].done)
             *_, record, numbers = (task.result() for task in (*ahead, *waiting))
@@ -144,7 +144,7 @@ def _far_away(far: bool, whole: bool) -> Iterator[Future[proofs.FarRuns]]:
         with proofs.far_runs_in_background(whole=whole) as long_runs:
             yield long_runs
     else:
-        yield _Here().submit(proofs.FarRuns)
+        yield _Here().submit(lambda: proofs.NO_FAR_RUNS)
 
 
 def _runs(

@@ -12,7 +12,7 @@ from ...reproductions.cases import PaperRun
 from ...reproductions.paper import FoundNumber, PaperRuns
 from .. import BOUND, HORIZON, TAIL
 from ..burst import Burst
-from ..evidence import Evidence
+from ..evidence import Evidence, FarRuns
 
 PAPER = "the paper"
 ACTUATED = ("1", "2", "1-backlash", "2-dead-zone")  # cases: both examples, both actuators
@@ -113,12 +113,10 @@ def _titled(name: str) -> str:
     return name.replace("_", " ").replace("-", " ").capitalize()
 
 
-def theorem_claims(
-    proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None = None
-) -> list[Claim]:
+def theorem_claims(proofs: Mapping[int, Evidence], far: FarRuns) -> list[Claim]:
     """Return what the paper claims for all time."""
     claims = [_theorem()] if proofs else []
-    return claims + [_bounded(run, burst) for run in _lost(far)]
+    return claims + [_bounded(run, far.burst) for run in _lost(far.runs)]
 
 
 def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
