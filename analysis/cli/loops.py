@@ -97,14 +97,13 @@ def input_values(diagram: System, texts: Sequence[str]) -> np.ndarray:
     import numpy as np
 
     from nlctl.arguments import number
-    from nlctl.names import unknown
+    from nlctl.names import check_known
 
     labels = list(diagram.input_labels)
     values = dict.fromkeys(labels, 0.0)
     for text in texts:
         name, value = _pair("--input", text)
-        if name not in values:
-            raise unknown("input", name, labels, f"of '{diagram.name}'")
+        check_known("input", name, labels, f"of '{diagram.name}'")
         values[name] = number("simulate", f"input '{name}'", number_of(name, value))
     return np.array([values[name] for name in labels])
 

@@ -10,7 +10,7 @@ import control as ct
 from nlctl import controllers, paper
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.references import BandLimitedNoise
 
 
@@ -119,22 +119,21 @@ def baselines(example: str) -> dict[str, Any]:
 
 def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     """Return measurement noise on all states of an example, 0 to 50 rad/s."""
-    states = part_of(_build(example)(), "plant").spec.states
+    states = part_of(paper_example(example)(), "plant").spec.states
     return BandLimitedNoise(
         inputs=states, outputs=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
 
 
-def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:
+def paper_example(example: str) -> Callable[..., ct.InterconnectedSystem]:
     """Return what makes the diagram of an example."""
-    if example not in paper.EXAMPLES:
-        raise unknown("example", example, paper.EXAMPLES)
+    check_known("example", example, paper.EXAMPLES)
     return paper.EXAMPLES[example]
 
 
 def published_controller(example: str) -> ct.InterconnectedSystem:
     """Return the paper's controller of an example."""
-    return part_of(_build(example)(), "controller")
+    return part_of(paper_example(example)(), "controller")
 
 
 def part_of(diagram: ct.InterconnectedSystem, name: str) -> Any:

@@ -35,7 +35,7 @@ from nlctl.controllers import (
     replaced,
     sliding_mode,
 )
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 from ..loop_record import loop_facts, loop_values
 from ..studies import shipped
@@ -202,14 +202,12 @@ def rival_controller(example: str, label: str) -> Any:
     gains = _gains(example)
     if label == "paper":
         return published_controller(example)
-    if label not in gains:
-        raise unknown("controller", label, ("paper", *gains))
+    check_known("controller", label, ("paper", *gains))
     return made_with(example, label, gains[label])
 
 
 def _gains(example: str) -> dict[str, dict[str, float]]:
-    if example not in RIVAL_GAINS:
-        raise unknown("example", example, RIVAL_GAINS)
+    check_known("example", example, RIVAL_GAINS)
     return RIVAL_GAINS[example]
 
 
@@ -231,8 +229,7 @@ def rival_actuators(example: str) -> dict[str, Any]:
 
 def behind(example: str, actuator: str) -> dict[str, str]:
     """Return ``{controller: pair}`` for one actuator: the options of a comparison."""
-    if actuator not in rival_actuators(example):
-        raise unknown("actuator", actuator, rival_actuators(example))
+    check_known("actuator", actuator, rival_actuators(example))
     return {label: f"{label} / {actuator}" for label in ("paper", *_gains(example))}
 
 
@@ -242,8 +239,7 @@ def rival_loop(
     """An example with one controller behind one actuator."""
     label, _, actuator = pair.partition(" / ")
     controller, actuators = rival_controller(example, label), rival_actuators(example)
-    if actuator not in actuators:
-        raise unknown("actuator", actuator, actuators)
+    check_known("actuator", actuator, actuators)
     return example_with(example, controller, actuators[actuator], noise)
 
 

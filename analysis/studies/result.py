@@ -11,7 +11,7 @@ import pandas as pd
 
 from nlctl.attributes import described_record
 from nlctl.host.notebook import table_html
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted, some_of
 
 from ..robustness.runs.sweep import Sweep
@@ -114,8 +114,7 @@ class Result:
     def __getitem__(self, key: str) -> Finding:
         """Return the finding with this key."""
         findings = {finding.key: finding for finding in self.findings}
-        if key not in findings:
-            raise unknown("finding", key, findings)
+        check_known("finding", key, findings)
         return findings[key]
 
     def plain(self) -> dict[str, Any]:

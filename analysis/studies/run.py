@@ -26,7 +26,7 @@ from .file.schema import Study, keyed
 from .finding import Finding
 from .folder import checked, load_finding, load_run, load_study, save_finding
 from .intact.contents import seal, unseal
-from .kind import Ground, Setup, answer, unanswered
+from .kind import Ground, Setup, headed, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
@@ -212,11 +212,12 @@ def _through(run: _Run) -> Result:
 def _answered(key: str, asked: Any, ground: Ground, sweeps: Sequence[Sweep]) -> Finding | None:
     """Run one analysis; what it may not be made of costs it alone, not what others have found."""
     try:
-        return answer(key, asked, ground)
+        finding = asked.definition.run(asked, ground)
     except (StoreError, RunFolderError):
         raise
     except UsageError as error:
-        return unanswered(key, asked, error, sum(done.done for done in sweeps))
+        finding = unanswered(asked, error, sum(done.done for done in sweeps))
+    return None if finding is None else headed(key, asked, finding)
 
 
 def _main_rows(run: _Run, every: Mapping[str, Any]) -> Sweep:

@@ -33,7 +33,7 @@ from nlctl.analysis.robustness import Space, Uncertain, confidence_sequence, ind
 from nlctl.analysis.robustness.search.radius import size_of
 from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
-from nlctl.analysis.studies.kind import unanswered
+from nlctl.analysis.studies.kind import headed, unanswered
 from nlctl.analysis.studies.kinds import KINDS
 from nlctl.analysis.studies.page.deviations import deviations_table
 from nlctl.analysis.studies.page.running import running
@@ -351,7 +351,7 @@ def test_an_analysis_without_an_answer_says_why(result):
     """
     of = dict(zip((f.key for f in result.findings), result.study.analysis, strict=True))
     error = UsageError("the rows do not admit it")
-    lost = {key: unanswered(key, asked, error) for key, asked in of.items()}
+    lost = {k: headed(k, asked, unanswered(asked, error)) for k, asked in of.items()}
     for gone in ({*lost}, {"sobol", "probability"}):
         findings = tuple(lost[f.key] if f.key in gone else f for f in result.findings)
         part = replace(result, findings=findings)

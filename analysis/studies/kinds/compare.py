@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import Field
 
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted
 
 from ... import figures as figures
@@ -126,8 +126,7 @@ def _options(asked: Compare, setup: Setup) -> Choice:
     labels = asked.only or tuple(every.options)
     for named, labels_of in ((labels, every.options), (asked.better or (), labels)):
         for label in named:
-            if label not in labels_of:
-                raise unknown("option", label, labels_of)
+            check_known("option", label, labels_of)
     return Choice(name=asked.keyword, options={label: every.options[label] for label in labels})
 
 
@@ -141,8 +140,7 @@ def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
     signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
     counting = {r.key: r for r in experiment.spec.requirements}
     for key in asked.requirements:
-        if key not in counting:
-            raise unknown("requirement", key, counting)
+        check_known("requirement", key, counting)
     spec = Spec(requirements=tuple(counting[key] for key in asked.requirements or counting))
     for requirement in spec.requirements:
         lacking = [signal for signal in requirement.signals if signal not in signals]
@@ -170,8 +168,7 @@ def _check(asked: Compare, setup: Setup) -> None:
     """Refuse metrics that not all options have."""
     columns = [metric.key for metric in _experiment(asked, setup).metrics]
     for metric in asked.metrics:
-        if metric not in columns:
-            raise unknown("metric", metric, columns, "of all options")
+        check_known("metric", metric, columns, "of all options")
 
 
 def _run(asked: Compare, ground: Ground) -> Finding | None:
