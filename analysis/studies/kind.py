@@ -73,22 +73,15 @@ class Setup:
 
 
 @described_record(eq=False, made_by="Kind")
-class Ground:
+class Ground(Setup):
     """What an analysis uses while it runs."""
 
-    study: Study
-    folder: Path  # What paths in the study are relative to.
     prepared: Prepared  # The study's experiment.
     rows: Sweep | None  # The main table, with its design.
     # Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
     # leaves out is nominal.
     simulate: Callable[[pd.DataFrame], pd.DataFrame]
     run_design: RunDesign
-
-    @property
-    def setup(self) -> Setup:
-        """What was known before."""
-        return Setup(study=self.study, folder=self.folder, experiment=self.prepared.experiment)
 
     @property
     def seed(self) -> int:

@@ -22,7 +22,9 @@ from ..robustness.runs.progress import Progress
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
-from .file.schema import Study, keyed
+from .code.record import study_digest
+from .code.rule import remember_code
+from .file.schema import Study, keyed, study_data
 from .finding import Finding
 from .folder import checked, load_finding, load_run, load_study, save_finding
 from .intact.contents import seal, unseal
@@ -35,7 +37,7 @@ from .origin import (
     version_differences,
 )
 from .reading.parse import StudyFile, read_study
-from .reading.written import remember_run, to_toml
+from .reading.written import to_toml
 from .result import Result, described
 from .sealed import RunFolderError, origin_key, write_json
 
@@ -155,7 +157,7 @@ def run(
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
         origin = _stamped(file, prepared, folder)
-        remember_run(file.study, file.folder)
+        remember_code(file.study, study_digest(study_data(file.study)), file.folder)
         going = _Run(
             file=file,
             folder=folder,
@@ -254,6 +256,7 @@ def _ground(run: _Run, rows: Sweep | None, part: str, sweeps: list[Sweep]) -> Gr
     return Ground(
         study=run.file.study,
         folder=run.file.folder,
+        experiment=run.prepared.experiment,
         prepared=run.prepared,
         rows=rows,
         simulate=simulate,

@@ -153,10 +153,10 @@ def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
 
 def _run(asked: Faults, ground: Ground) -> Finding | None:
     """Run the loop without a fault, with each, and with every two."""
-    setup, faults = ground.setup, _faults(ground.setup)
+    faults = _faults(ground)
     if not faults:
         raise ParameterError("no faults under [faults]")
-    prepared, cases = prepare(_experiment(asked, setup)), _cases(asked, setup)
+    prepared, cases = prepare(_experiment(asked, ground)), _cases(asked, ground)
     space = prepared.experiment.space
     onsets = dict(zip(faults, space.names[-len(faults) :], strict=True))
     rows = pd.DataFrame([nominal(space)] * len(cases))
@@ -176,7 +176,7 @@ def _run(asked: Faults, ground: Ground) -> Finding | None:
             "status": table["status"].astype(str).to_numpy(),
         }
     )
-    watched = (*setup.experiment.spec.requirements, *_detectors(asked, setup.experiment))
+    watched = (*ground.experiment.spec.requirements, *_detectors(asked, ground.experiment))
     effects = effects.join(_times(prepared, table, watched)).rename_axis("row")
     return _finding(asked, effects)
 

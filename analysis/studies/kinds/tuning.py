@@ -120,7 +120,7 @@ def _runs(asked: Tuning, setup: Setup) -> int:
 
 def _run(asked: Tuning, ground: Ground) -> Finding | None:
     """Find gains, then run fresh rows with those of before and after."""
-    prepared = prepare(_experiment(asked, ground.setup))
+    prepared = prepare(_experiment(asked, ground))
     tuned = _tuned(asked, ground, prepared)
     space = prepared.experiment.space
     design = independent(ground.prepared.experiment.space, asked.runs, ground.seed)
