@@ -11,7 +11,7 @@ import typer
 
 from nlctl.errors import ParameterError
 
-from .loops import USUAL_STEP, assignments, named_loop, simulated
+from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun, assignments, named_loop, simulated
 from .printing import error_line, say
 from .report import Input, Set, compare_command, report, write_gallery_of
 from .studies import (
@@ -71,7 +71,7 @@ def simulate(
         str,
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
     ] = "auto",
-    until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
+    until: Annotated[float, typer.Option(help="Horizon in s.")] = USUAL_HORIZON,
     step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = USUAL_STEP,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
@@ -86,7 +86,8 @@ def simulate(
         check_figure(plot)
     if csv is not None:
         check_file(csv)
-    response = simulated(loop, set_ or [], input_ or [], until, step, engine).response
+    run = AskedRun(loop=loop, settings=set_ or [], inputs=input_ or [], until=until, step=step)
+    response = simulated(run, engine).response
     times = response.time
     signals = dict(zip(response.output_labels, response.y, strict=True))
     show_metrics(times, signals)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -16,15 +16,9 @@ from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from ..papers import paper_key
+from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun
 from .memory import TO_BEGIN, check_memory
-from .own_page import (
-    HORIZON_OF_PAGE,
-    STEP_OF_PAGE,
-    compose_page,
-    is_loop_name,
-    is_paper_name,
-    page_folder,
-)
+from .own_page import compose_page, is_loop_name, is_paper_name, page_folder
 from .printing import error_line, in_json, notify, say
 from .studies import (
     Json,
@@ -159,8 +153,14 @@ def report(
             folder = out or Path("reports", "paper" if what is None else key)
             written = _paper(key, folder, options, far=far)
         elif is_loop:
-            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE)
-            written = _loop(str(what), (*run, options.live, require or []), options)
+            run = AskedRun(
+                loop=str(what),
+                settings=set_ or [],
+                inputs=input_ or [],
+                until=until or USUAL_HORIZON,
+                step=step or USUAL_STEP,
+            )
+            written = _loop(run, require or [], options)
         else:
             written = _study(what, options)
         from ..report.typography import plain_text
@@ -181,13 +181,13 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
         )
 
 
-def _loop(name: str, run: Any, options: PageOptions) -> WrittenPage:
+def _loop(run: AskedRun, required: Sequence[str], options: PageOptions) -> WrittenPage:
     """Report a loop of the user's."""
-    folder = options.out or page_folder(name)
+    folder = options.out or page_folder(run.loop)
     check_report_options(folder, pdf=options.pdf, force=options.force)
     from ..report.render import write_report
 
-    composed = stamped(compose_page(name, *run), options)
+    composed = stamped(compose_page(run, options.live, required), options)
     page = write_report(composed, folder, interactive=options.interactive, force=options.force)
     code = int(not all(claim.holds for claim in composed.claims))
     return _written(composed, page, code)

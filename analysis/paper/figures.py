@@ -28,12 +28,8 @@ from ..reproductions.cases import PaperRun
 from . import TAIL
 from .burst import Burst
 
-SAMPLED_CONTROLLERS = (
-    "paper",
-    "sliding mode",
-    "PID",
-    "certified",
-)  # of the controllers on computers
+# of the controllers on computers
+SAMPLED_CONTROLLERS = ("paper", "sliding mode", "PID", "certified")
 
 
 def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:

@@ -41,12 +41,8 @@ from .reading.written import to_toml
 from .result import Result, described
 from .sealed import RunFolderError, origin_key, write_json
 
-_OWN = (
-    ".lock",
-    ".owner",
-    "..owner.",
-    ".study.toml.",
-)  # what `locked` makes, and a killed run leaves
+# what `locked` makes, and a killed run leaves
+_OWN = (".lock", ".owner", "..owner.", ".study.toml.")
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], object] | None]]
 """``watch(title)`` is entered around every sweep and gives its `progress`."""

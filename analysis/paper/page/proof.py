@@ -138,29 +138,19 @@ def _lemma() -> Section:
 
 
 def _example(number: int, one: Evidence) -> list[Section]:
-    key = f"proof-{number}"
+    key, name = f"proof-{number}", f"Example {number}"
+    folded = (
+        ("bound", "V, its bounds, and their conservatism", _bound(key, one)),
+        ("steps", "margins of all steps over time", _margins(key, one)),
+        ("constants", "constants of the proof", [_constants(one)]),
+    )
     return [
-        ledger_section(one.ledger, key, f"Example {number}: the proof line by line", level=3),
-        Section(
-            key=f"{key}-bound",
-            title=f"Example {number}: V, its bounds, and their conservatism",
-            level=3,
-            folded=True,
-            items=[*_bound(key, one)],
-        ),
-        Section(
-            key=f"{key}-steps",
-            title=f"Example {number}: margins of all steps over time",
-            level=3,
-            folded=True,
-            items=[*_margins(key, one)],
-        ),
-        Section(
-            key=f"{key}-constants",
-            title=f"Example {number}: constants of the proof",
-            level=3,
-            folded=True,
-            items=[_constants(one)],
+        ledger_section(one.ledger, key, f"{name}: the proof line by line", level=3),
+        *(
+            Section(
+                key=f"{key}-{part}", title=f"{name}: {title}", level=3, folded=True, items=[*items]
+            )
+            for part, title, items in folded
         ),
     ]
 
