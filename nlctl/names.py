@@ -13,7 +13,7 @@ difference (``tests/diagrams/test_copied_parameters.py``).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import control as ct
@@ -41,6 +41,12 @@ def unknown(
         hint = "known: " + (", ".join(f"'{n}'" for n in names[:_LISTED]) or "none")
         hint += f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return error(f"unknown {kind} '{name}'{where and ' ' + where}; {hint}")
+
+
+def check_known(kind: str, name: str, known: Collection[str], where: str = "") -> None:
+    """Refuse a `name` that is none of those that are known."""
+    if name not in known:
+        raise unknown(kind, name, known, where)
 
 
 def base_name(name: str) -> str:

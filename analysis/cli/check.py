@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -16,8 +16,8 @@ from nlctl.errors import ParameterError
 from nlctl.names import find_name
 from nlctl.response import input_output_response
 
-if TYPE_CHECKING:
-    from ..lyapunov.ledger import Ledger, Line
+from ..lyapunov.ledger import Ledger, Line
+from ..lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of
 
 STATUSES = ("proved", "computed", "checked", "undecided", "not applicable", "violated")
 _STYLES = {"proved": "bold green", "computed": "green", "violated": "bold red"}
@@ -44,8 +44,6 @@ def interpreted_runs(
     diagram: Any, horizon: float, start: Mapping[str, Any], params: Mapping[str, Any]
 ) -> list[Any]:
     """Return runs of python-control, one for each member of an ensemble."""
-    from ..lyapunov.loop.simulation import SAMPLING_INTERVAL, members_of  # takes a second
-
     return [
         input_output_response(
             diagram,

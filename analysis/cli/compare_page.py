@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import shlex
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from ..pages.compared import Compared
-    from ..report.document import Report
+from ..pages.compared import Compared, comparison_page
+from ..pages.study.report import study_report
+from ..report.compare import read_report
+from ..report.document import Report
+from ..report.render import render_json
+from ..studies import load_result, origin_differences
+from ..studies.differences import long_table_differences
 
 
 def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Report:
     """Compose the page of two reports or runs, which have been checked."""
-    from ..pages.compared import comparison_page
-    from ..studies import origin_differences
-    from ..studies.differences import long_table_differences
-
     both = (first, second)
     are_runs = all((path / "results.json").exists() for path in both)
     others = []
@@ -38,20 +37,8 @@ def compose_comparison(first: Path, second: Path, out: Path, rtol: float) -> Rep
 
 def _compared(path: Path) -> Compared:
     """Return what is compared; a run without a page has what its page would say without figures."""
-    from ..pages.compared import Compared
-    from ..report.compare import read_report
-
     if path.is_dir() and not (path / "report.json").exists():
-        return Compared(name=path.as_posix(), content=_of_run(path))
+        page = json.loads(render_json(study_report(load_result(path))))
+        return Compared(name=path.as_posix(), content=page)
     folder = path if path.is_dir() else path.parent
     return Compared(name=path.as_posix(), content=read_report(path), folder=folder)
-
-
-def _of_run(folder: Path) -> Mapping[str, Any]:
-    import json
-
-    from ..pages.study.report import study_report
-    from ..report.render import render_json
-    from ..studies import load_result
-
-    return json.loads(render_json(study_report(load_result(folder))))

@@ -10,6 +10,8 @@ from nlctl.export import TARGETS, c_files, export_controller, export_equations, 
 from nlctl.host.files import replace_file
 from nlctl.names import unknown
 
+from .loops import assignments, named_loop
+
 __all__ = ["write_export", "write_fmu"]
 
 
@@ -26,8 +28,6 @@ def write_export(
 ) -> list[Path]:
     """Write what a loop's name stands for; return the files."""
     # All content is made before the first file is written.
-    from .loops import assignments, named_loop
-
     if target != "c" and target not in TARGETS:
         raise unknown("target", target, ["c", *TARGETS], "of export")
     content: dict[str, str | bytes] = {}
@@ -66,8 +66,6 @@ def write_fmu(
 ) -> Path:
     """Write what a loop's name stands for as an FMU; return the file."""
     # `others` are options that are of controllers alone.
-    from .loops import assignments, named_loop
-
     given = [option for option, value in others.items() if value is not None]
     if given or target != "c":
         raise ParameterError(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from nlctl.errors import ParameterError
+from nlctl.errors import ParameterError, UsageError
 
 from ..catalogue import (
     block_summaries,
@@ -136,8 +138,6 @@ def _show_block(name: str, record: type) -> None:
 
 def _signals(record: type) -> str:
     """Return what a block takes and outputs with its own parameters, if it has such."""
-    from nlctl.errors import UsageError
-
     try:
         spec = record()
         states = f"; states {', '.join(spec.states)}" if spec.states else ""
@@ -148,8 +148,6 @@ def _signals(record: type) -> str:
 
 def _show_paper(key: str) -> None:
     """Print the examples of a paper, and what makes its page."""
-    from importlib import import_module
-
     module = import_module(f"nlctl.papers.{key}")
     table = Table("example", "what it is", title=None)
     for name in module.__all__:
@@ -161,8 +159,6 @@ def _show_paper(key: str) -> None:
 
 def _show_function(name: str, function: Any) -> None:
     """Print the arguments of a function that makes blocks, and what signals these have."""
-    import inspect
-
     table = Table("argument", "default", "meaning", title=None)
     meanings = _documented_arguments(inspect.getdoc(function) or "")
     rows: dict[tuple[str, str], list[str]] = {}
@@ -191,8 +187,6 @@ def _documented_arguments(docstring: str) -> dict[str, str]:
 
 def _signals_of_system(function: Any) -> str:
     """Return the signals of what a function makes of its defaults, if it makes anything of them."""
-    from nlctl.errors import UsageError
-
     try:
         system = function()
         return f"({', '.join(system.input_labels)}) -> ({', '.join(system.output_labels)})"

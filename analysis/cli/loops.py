@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
     from nlctl.upstream.systems import System
 
-USUAL_STEP = 0.01  # s, between samples of a run where none is given
+USUAL_HORIZON, USUAL_STEP = 20.0, 0.01  # s: of a run, and between its samples
 _MOST_SAMPLES = 2_000_000  # times of one run: 16 MB a signal
 
 
@@ -44,8 +46,6 @@ def named_loop(name: str) -> Any:
 
 def _check_takes_nothing(name: str, function: Any) -> None:
     """Refuse a function that cannot be called without arguments."""
-    import inspect
-
     try:
         signature = inspect.signature(function)
         signature.bind()
@@ -98,14 +98,13 @@ def input_values(diagram: System, texts: Sequence[str]) -> np.ndarray:
     import numpy as np
 
     from nlctl.arguments import number
-    from nlctl.names import unknown
+    from nlctl.names import check_known
 
     labels = list(diagram.input_labels)
     values = dict.fromkeys(labels, 0.0)
     for text in texts:
         name, value = _pair("--input", text)
-        if name not in values:
-            raise unknown("input", name, labels, f"of '{diagram.name}'")
+        check_known("input", name, labels, f"of '{diagram.name}'")
         values[name] = number("simulate", f"input '{name}'", number_of(name, value))
     return np.array([values[name] for name in labels])
 
@@ -150,6 +149,25 @@ def number_of(name: str, text: str) -> float:
         raise ParameterError(f"{name} needs a number, got '{text}'") from None
 
 
+@dataclass(frozen=True, kw_only=True)
+class AskedRun:
+    """A run of a loop, as options of a command ask for it."""
+
+    loop: str
+    settings: Sequence[str]
+    inputs: Sequence[str]
+    until: float = USUAL_HORIZON
+    step: float = USUAL_STEP
+
+    def command(self, verb: str) -> list[str]:
+        """Return the command that asks for it, as words."""
+        words = ["nlctl", verb, self.loop]
+        words += [part for text in self.settings for part in ("--set", text)]
+        words += [part for text in self.inputs for part in ("--input", text)]
+        words += ["--until", f"{self.until:g}"] * (self.until != USUAL_HORIZON)
+        return words + ["--step", f"{self.step:g}"] * (self.step != USUAL_STEP)
+
+
 @described_record
 class Simulated:
     """A loop, what was set of it, and its run."""
@@ -160,24 +178,17 @@ class Simulated:
     start: Mapping[str, float]  # Initial states that were set.
 
 
-def simulated(
-    name: str,
-    settings: Sequence[str],
-    inputs: Sequence[str],
-    until: float,
-    step: float,
-    engine: str = "auto",
-) -> Simulated:
+def simulated(run: AskedRun, engine: str = "auto") -> Simulated:
     """Make the loop of a name, and run it under a bar."""
     from nlctl.response import input_output_response
 
     from .progress import progress_bar
 
-    loop = named_loop(name)
-    times = sampled_times(until, step, loop)
-    params, start = assignments(loop, settings)
-    u = input_values(loop, inputs)[:, None] + 0 * times
-    with progress_bar(f"simulating {name}", until) as advance:
+    loop = named_loop(run.loop)
+    times = sampled_times(run.until, run.step, loop)
+    params, start = assignments(loop, run.settings)
+    u = input_values(loop, run.inputs)[:, None] + 0 * times
+    with progress_bar(f"simulating {run.loop}", run.until) as advance:
         reached = [0.0]
 
         def progress(t: float) -> None:

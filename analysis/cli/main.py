@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import shlex
+import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .loops import USUAL_STEP
+from nlctl.errors import ParameterError
+
+from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun, assignments, named_loop, simulated
 from .printing import error_line, say
-from .report import Input, Set, compare_command, gallery, report
+from .report import Input, Set, compare_command, report, write_gallery_of
 from .studies import (
     FAILS,
     OPEN,
@@ -68,7 +71,7 @@ def simulate(
         str,
         typer.Option(help="native, python-control, or auto: native if it can be compiled."),
     ] = "auto",
-    until: Annotated[float, typer.Option(help="Horizon in s.")] = 20.0,
+    until: Annotated[float, typer.Option(help="Horizon in s.")] = USUAL_HORIZON,
     step: Annotated[float, typer.Option(help="Sampling interval of the output in s.")] = USUAL_STEP,
     plot: Annotated[Path | None, typer.Option(help="Figure to write: .svg, .png, .pdf.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Table of signals to write.")] = None,
@@ -77,14 +80,14 @@ def simulate(
 
     A table of its signals is printed: peaks, root mean squares, and last values.
     """
-    from .loops import simulated
     from .terminal import check_figure, check_file, show_metrics, write_figure
 
     if plot is not None:
         check_figure(plot)
     if csv is not None:
         check_file(csv)
-    response = simulated(loop, set_ or [], input_ or [], until, step, engine).response
+    run = AskedRun(loop=loop, settings=set_ or [], inputs=input_ or [], until=until, step=step)
+    response = simulated(run, engine).response
     times = response.time
     signals = dict(zip(response.output_labels, response.y, strict=True))
     show_metrics(times, signals)
@@ -142,7 +145,6 @@ def check(
     from rich.console import Console
 
     from nlctl.arguments import one_of
-    from nlctl.errors import ParameterError
     from nlctl.response import ENGINES
 
     from ..lyapunov.ledger import ledger
@@ -154,7 +156,6 @@ def check(
         show_ledger,
         worst_lines,
     )
-    from .loops import assignments, named_loop
 
     if not 0 < horizon < float("inf"):
         raise ParameterError(f"check needs a horizon > 0, got {horizon:g}")
@@ -279,7 +280,6 @@ def diagram(
     """Draw the block diagram of a loop."""
     from nlctl.drawing.picture import draw
 
-    from .loops import named_loop
     from .terminal import check_figure, write_figure
 
     check_figure(out)
@@ -297,7 +297,7 @@ def _write_csv(path: Path, times, signals) -> None:
 
 
 for name, command in {
-    "report": report, "compare": compare_command, "gallery": gallery, "run": run_command,
+    "report": report, "compare": compare_command, "gallery": write_gallery_of, "run": run_command,
     "validate": validate, "replay": replay_command, "verify": verify_command, "schema": schema,
     "tune": tune_command,
 }.items():  # fmt: skip
@@ -306,8 +306,6 @@ for name, command in {
 
 def _say_warnings() -> None:
     """Print warnings of nlctl as sentences; others stay as Python has them."""
-    import warnings
-
     usual = warnings.showwarning
 
     def shown(message: Any, category: Any, *place: Any, **more: Any) -> None:

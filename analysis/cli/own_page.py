@@ -8,13 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .loops import USUAL_STEP, simulated
+from .loops import AskedRun, simulated
 
 if TYPE_CHECKING:
     from ..report.document import Report
     from ..robustness.stl.spec import Requirement
-
-HORIZON_OF_PAGE, STEP_OF_PAGE = 20.0, USUAL_STEP  # s, as `nlctl simulate` has them
 
 
 def is_loop_name(text: str) -> bool:
@@ -35,17 +33,14 @@ def page_folder(name: str) -> Path:
     return Path("reports") / (stem if function == "make" else f"{stem}-{function}")
 
 
-def compose_page(
-    name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float,
-    live: bool | Sequence[str] = False, required: Sequence[str] = (),
-) -> Report:  # fmt: skip
+def compose_page(asked: AskedRun, live: bool | Sequence[str], required: Sequence[str]) -> Report:
     """Run a loop, check what can be checked of any, and compose its page."""
-    requirements = _requirements(required, until)
+    requirements = _requirements(required, asked.until)
     if live:
         from nlctl.export.web import check_linker
 
         check_linker()
-    run = simulated(name, settings, inputs, until, step)
+    run = simulated(asked)
     from ..loop_checks import (
         LoopCheck,
         checks_of,
@@ -61,7 +56,7 @@ def compose_page(
     with progress_bar("checking the loop", 2) as advance:
         checks = checks_of(run.loop, run.response, run.params)
         advance(1)
-        proof = proof_of(run.loop, until, run.start, run.params)
+        proof = proof_of(run.loop, asked.until, run.start, run.params)
         advance(1)
     applies = not isinstance(proof, LoopCheck)
     every = [*checks, proof_check(proof) if applies else proof]
@@ -72,11 +67,10 @@ def compose_page(
         params=run.params,
         ledger=proof if applies else None,
         sections=[checks_section(every)],
-        command=_command("report", name, settings, inputs, until, step)
-        + live_words(live, required),
+        command=shlex.join(asked.command("report")) + live_words(live, required),
         live=live,
         requirements=requirements,
-        repeat=shlex.split(_command("simulate", name, settings, inputs, until, step)),
+        repeat=asked.command("simulate"),
     )
     return replace(page, verdict=f"{page.verdict} {in_sentences(every)}", headline=headline(every))
 
@@ -97,16 +91,3 @@ def live_words(live: bool | Sequence[str], required: Sequence[str] = ()) -> str:
     words = [] if isinstance(live, bool) else [w for name in live for w in ("--move", name)]
     words = ["--live"] * (live is True) + words + [w for r in required for w in ("--require", r)]
     return "".join(f" {shlex.quote(word)}" for word in words)
-
-
-def _command(
-    verb: str, name: str, settings: Sequence[str], inputs: Sequence[str], until: float, step: float
-) -> str:
-    """Return what makes the page again."""
-    words = ["nlctl", verb, name]
-    words += [part for text in settings for part in ("--set", text)]
-    words += [part for text in inputs for part in ("--input", text)]
-    words += ["--until", f"{until:g}"] * (until != HORIZON_OF_PAGE) + ["--step", f"{step:g}"] * (
-        step != STEP_OF_PAGE
-    )
-    return shlex.join(words)

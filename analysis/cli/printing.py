@@ -25,6 +25,11 @@ def error_line(text: object) -> None:
     print(printable(text), file=sys.stderr)
 
 
+def notify(words: str) -> None:
+    """Print on stderr what the user has to know, such as what a page will lack."""
+    error_line(f"nlctl: {words}")
+
+
 def error_text(error: Exception) -> str:
     """Return what an error says; of the system's without its number."""
     if isinstance(error, OSError) and error.strerror and error.filename:

@@ -6,47 +6,45 @@ import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nlctl.errors import UsageError
 from nlctl.wording import counted
 
 from ..papers import paper_key
+from .loops import USUAL_HORIZON, USUAL_STEP, AskedRun
 from .memory import TO_BEGIN, check_memory
-from .own_page import (
-    HORIZON_OF_PAGE,
-    STEP_OF_PAGE,
-    compose_page,
-    is_loop_name,
-    is_paper_name,
-    page_folder,
-)
-from .printing import error_line, in_json, say
+from .own_page import compose_page, is_loop_name, is_paper_name, page_folder
+from .printing import error_line, in_json, notify, say
 from .studies import (
-    EXIT_CODES,
-    INCOMPLETE,
-    INTERRUPTED,
     Json,
     Junit,
     Trust,
     check_junit,
     check_run_path,
     check_study_path,
+    exit_code,
     exit_codes,
     run_folder,
     write_claims,
 )
-from .study_report import Stamp, stamped
+from .written_page import (
+    PageOptions,
+    WrittenPage,
+    check_report_options,
+    finish_report,
+    show_page,
+    stamped,
+)
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from nlctl.errors import UsageError
-
-    from ..report.document import Claim, Report
+    from ..report.document import Report
 
 Set = Annotated[
     list[str] | None,
@@ -61,6 +59,10 @@ Input = Annotated[
     typer.Option("--input", metavar="NAME=VALUE", help="A constant input of a loop; 0 by default."),
 ]
 Open = Annotated[bool, typer.Option("--open", help="Show the page in a browser.")]
+Pdf = Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")]
+Interactive = Annotated[
+    bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
+]
 Force = Annotated[
     bool, typer.Option("--force", help="Replace files of others in the folder of the page.")
 ]
@@ -92,11 +94,9 @@ def report(
         float | None, typer.Option(help="Sampling interval of a loop, s; 0.01.")
     ] = None,
     open_: Open = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    pdf: Pdf = False,
     junit: Junit = None,
-    interactive: Annotated[
-        bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
-    ] = False,
+    interactive: Interactive = False,
     live: Annotated[
         bool,
         typer.Option("--live", help="Let the page run what it shows, with sliders."),
@@ -129,26 +129,40 @@ def report(
 
     Rows of a study are drawn from its loop: the code that the study names is run.
     """
-    stamp = {k: v for k, v in (("revision", revision), ("date", date)) if v}
-    options: dict[str, Any] = {
-        "pdf": pdf, "interactive": interactive, "force": force, "stamp": stamp,
-    }  # fmt: skip
+    options = PageOptions(
+        out=out,
+        threads=jobs or None,
+        pdf=pdf,
+        interactive=interactive,
+        force=force,
+        trust=trust,
+        live=move or live,
+        stamp={k: v for k, v in (("revision", revision), ("date", date)) if v},
+    )
     with exit_codes(json=False):
         is_loop = what is not None and is_loop_name(str(what))
         _check_loop_options(is_loop, set_, input_, until, step, require)
         check_junit(junit)
         if what is None or is_paper_name(str(what)):
             if move:
-                raise _no_names()
+                raise UsageError(
+                    "--move is of a loop or a study; the page of a paper has its own sliders, "
+                    "with --live"
+                )
             key = "lv_2017" if what is None else paper_key(str(what), "file, folder or paper")
             folder = out or Path("reports", "paper" if what is None else key)
-            written = _paper(key, folder, jobs, far=far, live=live, **options)
+            written = _paper(key, folder, options, far=far)
         elif is_loop:
-            run = (set_ or [], input_ or [], until or HORIZON_OF_PAGE, step or STEP_OF_PAGE,
-                   move or live, require or [])  # fmt: skip
-            written = _loop(str(what), run, out, **options)
+            run = AskedRun(
+                loop=str(what),
+                settings=set_ or [],
+                inputs=input_ or [],
+                until=until or USUAL_HORIZON,
+                step=step or USUAL_STEP,
+            )
+            written = _loop(run, require or [], options)
         else:
-            written = _study(what, out, jobs, trust=trust, live=move or live, **options)
+            written = _study(what, options)
         from ..report.typography import plain_text
 
         say(plain_text(written.verdict))
@@ -158,29 +172,8 @@ def report(
             raise typer.Exit(written.code)
 
 
-@dataclass(frozen=True)
-class WrittenPage:
-    """A page that was written: its verdict, its claims, and the exit code of the command."""
-
-    verdict: str
-    title: str
-    claims: Sequence[Claim]
-    page: Path
-    code: int
-
-
-def _no_names() -> UsageError:
-    from nlctl.errors import UsageError
-
-    return UsageError(
-        "--move is of a loop or a study; the page of a paper has its own sliders, with --live"
-    )
-
-
 def _check_loop_options(is_loop: bool, *options: object) -> None:
     """Refuse what is set of a loop where there is none."""
-    from nlctl.errors import UsageError
-
     if not is_loop and any(option is not None for option in options):
         raise UsageError(
             "--set, --input, --until, --step and --require are of a loop, "
@@ -188,57 +181,47 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
         )
 
 
-def _loop(
-    name: str,
-    run: Any,
-    out: Path | None,
-    *,
-    pdf: bool,
-    interactive: bool,
-    force: bool,
-    stamp: Stamp,
-) -> WrittenPage:
+def _loop(run: AskedRun, required: Sequence[str], options: PageOptions) -> WrittenPage:
     """Report a loop of the user's."""
-    folder = out or page_folder(name)
-    check_report_options(folder, pdf=pdf, force=force)
+    folder = options.out or page_folder(run.loop)
+    check_report_options(folder, pdf=options.pdf, force=options.force)
     from ..report.render import write_report
 
-    composed = stamped(compose_page(name, *run), stamp)
-    page = write_report(composed, folder, interactive=interactive, force=force)
+    composed = stamped(compose_page(run, options.live, required), options)
+    page = write_report(composed, folder, interactive=options.interactive, force=options.force)
     code = int(not all(claim.holds for claim in composed.claims))
     return _written(composed, page, code)
 
 
-def _paper(
-    name: str, out: Path, jobs: int, *, far: bool, live: bool, pdf: bool, interactive: bool,
-    force: bool, stamp: Stamp,
-) -> WrittenPage:  # fmt: skip
+def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenPage:
     """Reproduce a paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
-        check_report_options(out, pdf=pdf, force=force)
+        check_report_options(out, pdf=options.pdf, force=options.force)
         from ..papers import named_paper
         from ..report.render import write_report
         from .progress import progress_bar
-        from .study_report import notify
 
         reproduction = named_paper(name)
-        if live:
+        if options.live:
             from ..reproductions.live import check_moved, with_parts_live
 
             check_moved(reproduction.paper)
-        reproduction.clear(out, force=force)
+        reproduction.clear(out, force=options.force)
         composed = reproduction.compose(
-            out, whole=far, threads=jobs or None, beside=beside, watch=progress_bar, notify=notify
-        )
+            out, whole=far, threads=options.threads, beside=beside, watch=progress_bar,
+            notify=notify,
+        )  # fmt: skip
         report = composed.report
-        if live:
+        if options.live:
             report = with_parts_live(reproduction.paper, report)
-        options = " --far" * far + " --interactive" * interactive + " --live" * live
-        report = stamped(replace(report, command=report.command + options), stamp)
+        words = " --far" * far + " --interactive" * options.interactive
+        words += " --live" * bool(options.live)
+        report = stamped(replace(report, command=report.command + words), options)
         page = write_report(
-            report, out, interactive=interactive, force=force, pool=beside, drawn=composed.drawn
-        )
+            report, out, interactive=options.interactive, force=options.force, pool=beside,
+            drawn=composed.drawn,
+        )  # fmt: skip
     return _written(report, page, int(not composed.passed))
 
 
@@ -268,48 +251,24 @@ def _other_process() -> Iterator[Executor]:
             raise
 
 
-def _study(
-    study: Path,
-    out: Path | None,
-    jobs: int,
-    *,
-    pdf: bool,
-    interactive: bool,
-    force: bool,
-    trust: bool,
-    stamp: Stamp,
-    live: bool | Sequence[str],
-) -> WrittenPage:
+def _study(study: Path, options: PageOptions) -> WrittenPage:
     """Report a study."""
+    check_memory(TO_BEGIN)
     from ..pages.study.claims import claims
-    from .progress import sweep_bar
     from .study_report import report_study
 
-    check_memory(TO_BEGIN)
-    if study.suffix == ".toml":
+    is_file = study.suffix == ".toml"
+    if is_file:
         check_study_path(study)
     elif study.is_file():
         check_run_path(study)
-    kept = run_folder(study) if study.suffix == ".toml" else study
-    check_report_options(out or kept, pdf=pdf, force=force)
-    page, result = report_study(
-        study,
-        out,
-        threads=jobs or None,
-        watch=sweep_bar,
-        interactive=interactive,
-        force=force,
-        trust=trust,
-        stamp=stamp,
-        live=live,
-    )
-    code = EXIT_CODES.get(result.answer, 0)
-    if not result.complete:
-        code = INTERRUPTED if result.interrupted else INCOMPLETE
-        if study.suffix == ".toml":
-            error_line("nlctl: incomplete; the same command resumes")
+    kept = run_folder(study) if is_file else study
+    check_report_options(options.out or kept, pdf=options.pdf, force=options.force)
+    page, result = report_study(study, options)
+    if is_file and not result.complete:
+        error_line("nlctl: incomplete; the same command resumes")
     title = result.study.study.title
-    return WrittenPage(result.verdict, title, claims(result), page, code)
+    return WrittenPage(result.verdict, title, claims(result), page, exit_code(result))
 
 
 def compare_command(
@@ -320,7 +279,7 @@ def compare_command(
         Path | None, typer.Option(help="Folder for a page of what differs; none by default.")
     ] = None,
     open_: Open = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
+    pdf: Pdf = False,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -344,15 +303,13 @@ def compare_command(
 
 def _check_page_options(out: Path | None, *, pdf: bool, open_: bool, force: bool) -> None:
     """Refuse what is set of a page where none is made, or where it could not be written."""
-    from nlctl.errors import UsageError
-
     if out is not None:
         check_report_options(out, pdf=pdf, force=force)
     elif pdf or open_ or force:
         raise UsageError("--pdf, --open and --force are of a page: say where, with --out DIR")
 
 
-def gallery(
+def write_gallery_of(
     folder: Annotated[Path, typer.Argument(help="Folder with reports below it.")],
     open_: Open = False,
     force: Force = False,
@@ -361,34 +318,15 @@ def gallery(
 
     Reports of one title are shown over their dates and revisions.
     """
-    write_gallery_of(folder, open_=open_, force=force)
-
-
-def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
-    """Refuse, before anything is computed, what could not be written afterwards."""
-    from ..report.page import check_report_folder
+    from ..pages.trend import trend_figure
+    from ..report.gallery import write_gallery
+    from ..studies.intact.contents import check_page
     from .terminal import check_writable
 
-    check_writable(out)
-    if not force:
-        check_report_folder(out)
-    if pdf:
-        from ..report.browser import find_browser
-
-        find_browser()
-
-
-def finish_report(page: Path, *, pdf: bool, open_: bool) -> None:
-    """Print where the page is; print it to PDF and show it, as wanted."""
-    from ..report.browser import open_page, write_pdf
-    from ..studies.intact.contents import recorded_print
-
+    check_writable(folder)
+    page = write_gallery(folder, force=force, check=check_page, draw=trend_figure)
     say(page)
-    if pdf:
-        with recorded_print(page.parent):
-            say(write_pdf(page, page.with_name("report.pdf")))
-    if open_ and not open_page(page):
-        say("no browser was found to show it")
+    show_page(page, open_)
 
 
 def compare_reports(first: Path, second: Path, *, rtol: float, as_json: bool) -> bool:
@@ -442,8 +380,6 @@ def _check_run(path: Path) -> None:
 
 def _no_report(path: Path) -> UsageError:
     """Return why a path cannot be compared, with the next step."""
-    from nlctl.errors import UsageError
-
     if not path.exists():
         return UsageError(f"there is no '{path}': compare needs two reports, or two runs")
     run = shlex.quote(str(path))
@@ -454,18 +390,3 @@ def _no_report(path: Path) -> UsageError:
             f"'{path}' is a run that is not done: finish it with 'nlctl run STUDY --resume'"
         )
     return UsageError(f"'{path}' holds neither a report nor a run of a study")
-
-
-def write_gallery_of(folder: Path, *, open_: bool, force: bool = False) -> None:
-    """Write the index page over the reports below a folder, and print where it is."""
-    from ..pages.trend import trend_figure
-    from ..report.browser import open_page
-    from ..report.gallery import write_gallery
-    from ..studies.intact.contents import check_page
-    from .terminal import check_writable
-
-    check_writable(folder)
-    page = write_gallery(folder, force=force, check=check_page, draw=trend_figure)
-    say(page)
-    if open_ and not open_page(page):
-        say("no browser was found to show it")

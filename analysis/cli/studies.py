@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from nlctl.errors import DivergedError, ParameterError, UsageError
 from nlctl.wording import counted
 
 from .memory import TO_BEGIN, TOO_LITTLE, check_memory, is_short_of_memory
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
     from ..studies.result import Result
 
 FAILS, INVALID, INTERNAL, INCOMPLETE, OPEN, INTERRUPTED = 1, 2, 3, 4, 5, 130
-EXIT_CODES = {
-    "refuted": FAILS,
-    "not shown yet": OPEN,
-}  # exit code by the answer to a study's claims
 T = TypeVar("T")
 CONNECT = "5s"  # how long a scheduler may take to answer
 
@@ -115,10 +112,8 @@ def run_command(
             from ..pages.study.claims import claims
 
             write_claims(junit, result.study.study.title, claims(result))
-        if not result.complete:
-            raise typer.Exit(INTERRUPTED if result.interrupted else INCOMPLETE)
-        if result.answer in EXIT_CODES:
-            raise typer.Exit(EXIT_CODES[result.answer])
+        if code := exit_code(result):
+            raise typer.Exit(code)
 
 
 def validate(
@@ -241,8 +236,6 @@ def schema() -> None:
 
 def check_study_path(study: Path) -> None:
     """Refuse a folder where a study file is wanted."""
-    from nlctl.errors import UsageError
-
     from ..studies.intact.contents import is_run
 
     if study.is_dir():
@@ -253,8 +246,6 @@ def check_study_path(study: Path) -> None:
 
 def check_run_path(run: Path) -> None:
     """Refuse a file where the folder of a run is wanted."""
-    from nlctl.errors import UsageError
-
     if run.exists() and not run.is_dir():
         loop = f"a loop of it is {run.as_posix()}:NAME" if run.suffix == ".py" else ""
         advice = loop or f"name '{run.parent}'"
@@ -299,8 +290,6 @@ def _saying_how_to_resume(
 @contextmanager
 def exit_codes(json: bool) -> Iterator[None]:
     """Turn what goes wrong into one message and an exit code."""
-    from nlctl.errors import DivergedError, UsageError
-
     try:
         yield
     except KeyboardInterrupt:
@@ -352,8 +341,6 @@ def _is_full(error: BaseException | None) -> bool:
 @contextmanager
 def _executor(text: str, jobs: int) -> Iterator[Any]:
     """Yield the executor that an option names; None for the engine's own threads."""
-    from nlctl.errors import ParameterError
-
     if text == "threads":
         yield None
     elif text == "processes":
@@ -371,8 +358,6 @@ def _executor(text: str, jobs: int) -> Iterator[Any]:
 
 def _dask_client(address: str) -> Any:
     """Return a client of the scheduler at an address; it is to be closed."""
-    from nlctl.errors import ParameterError
-
     try:
         from distributed import Client
     except ImportError:
@@ -386,6 +371,13 @@ def _dask_client(address: str) -> Any:
             f"cannot reach a Dask scheduler at '{address}' ({error}): give the address that it "
             "prints when it starts, such as --executor dask:tcp://127.0.0.1:8786"
         ) from None
+
+
+def exit_code(result: Result) -> int:
+    """Return the exit code by which a command says what a study has found."""
+    if not result.complete:
+        return INTERRUPTED if result.interrupted else INCOMPLETE
+    return {"refuted": FAILS, "not shown yet": OPEN}.get(result.answer, 0)
 
 
 def _show(result: Result, json: bool) -> None:

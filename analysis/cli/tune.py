@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nlctl.errors import UsageError
+
 from .memory import TO_BEGIN, check_memory
 from .printing import say
-from .report import Force, Open, check_report_options, finish_report
-from .studies import (
-    EXIT_CODES,
-    INCOMPLETE,
-    INTERRUPTED,
-    Trust,
-    check_study_path,
-    exit_codes,
-    run_folder,
-)
-from .study_report import report_study
+from .report import Force, Interactive, Open, Pdf
+from .studies import Trust, check_study_path, exit_code, exit_codes, run_folder
+from .written_page import PageOptions, check_report_options, finish_report
 
 if TYPE_CHECKING:
     from ..studies.finding import Finding
@@ -40,10 +34,8 @@ def tune_command(
     ] = None,
     jobs: Annotated[int, typer.Option(min=0, help="Threads; 0: one per core.")] = 0,
     open_: Open = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to report.pdf.")] = False,
-    interactive: Annotated[
-        bool, typer.Option("--interactive", help="Add charts to zoom in and to read values from.")
-    ] = False,
+    pdf: Pdf = False,
+    interactive: Interactive = False,
     force: Force = False,
     trust: Trust = False,
 ) -> None:
@@ -52,39 +44,33 @@ def tune_command(
     The study has an analysis of kind 'tuning', which says what is tuned within which bounds; what
     is found is validated on fresh samples.  Its code is run.  Exit 1 if a claim of it fails.
     """
+    options = PageOptions(
+        out=out, threads=jobs or None, pdf=pdf, interactive=interactive, force=force, trust=trust
+    )
     with exit_codes(json=False):
-        code = _tuned(
-            study, out, jobs, open_=open_, pdf=pdf, interactive=interactive, force=force,
-            trust=trust,
-        )  # fmt: skip
-        if code:
+        if code := _tuned(study, options, open_=open_):
             raise typer.Exit(code)
 
 
-def _tuned(study: Path, out: Path | None, jobs: int, *, open_: bool, **how: Any) -> int:
+def _tuned(study: Path, options: PageOptions, *, open_: bool) -> int:
     """Tune the gains of a study, write its page, print both; return the exit code."""
     check_memory(TO_BEGIN)
     check_study_path(study)
     _check_asks(study)
-    from .progress import sweep_bar
+    from .study_report import report_study
 
-    pdf = how.pop("pdf")
-    check_report_options(out or run_folder(study), pdf=pdf, force=how["force"])
-    page, result = report_study(study, out, threads=jobs or None, watch=sweep_bar, **how)
+    check_report_options(options.out or run_folder(study), pdf=options.pdf, force=options.force)
+    page, result = report_study(study, options)
     say(result.verdict)
     for finding in result.findings:
         if finding.kind == _KIND:
             _tell(finding)
-    finish_report(page, pdf=pdf, open_=open_)
-    if result.complete:
-        return EXIT_CODES.get(result.answer, 0)
-    return INTERRUPTED if result.interrupted else INCOMPLETE
+    finish_report(page, pdf=options.pdf, open_=open_)
+    return exit_code(result)
 
 
 def _check_asks(study: Path) -> None:
     """Refuse a study in which nothing is tuned."""
-    from nlctl.errors import UsageError
-
     from ..studies.file.toml import read_toml
 
     try:

@@ -1,20 +1,8 @@
 """What is only about Lv et al. (2017): its reproduction, loops, controllers, page."""
 
-from .cases import BOUND, CASES, HORIZON, METRICS, TAIL, Case
+from .cases import BOUND, CASES, HORIZON, METRICS, TAIL, Case, sample_times
 from .controllers import compared_controllers
-from .reproduction import (
-    CaseRun,
-    Check,
-    Expectation,
-    checks,
-    compile_cases_ahead,
-    expectations,
-    measured,
-    numerics,
-    run_all,
-    run_case,
-    sample_times,
-)
+from .reproduction import Expectation, checks, expectations, numerics
 
 __all__ = [
     "BOUND",
@@ -23,16 +11,10 @@ __all__ = [
     "METRICS",
     "TAIL",
     "Case",
-    "CaseRun",
-    "Check",
     "Expectation",
     "checks",
     "compared_controllers",
-    "compile_cases_ahead",
     "expectations",
-    "measured",
     "numerics",
-    "run_all",
-    "run_case",
     "sample_times",
 ]

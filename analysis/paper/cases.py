@@ -2,38 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import field
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from nlctl import actuators, paper
 from nlctl.annotations import as_annotated
+from nlctl.arguments import number
 from nlctl.attributes import described_record
 
 from ..metrics import Metric, final, highest, lowest, peak, rms
+from ..reproductions.cases import PaperCase
 
 HORIZON = 20.0
 TAIL = HORIZON / 2
 BOUND = 0.15  # of |e₁| from TAIL on: a sixth of the reference; the paper names none
+_RTOL = 1e-9
 
 _number = partial(Metric, unit="1")
+_late = partial(_number, start=TAIL)
 METRICS = (
-    _number(
-        key="tail_max_e", signal="e", meaning="max |e₁| for t ≥ 10 s", function=peak, start=TAIL
-    ),
-    _number(
-        key="tail_rms_e", signal="e", meaning="RMS of e₁ for t ≥ 10 s", function=rms, start=TAIL
-    ),
+    _late(key="tail_max_e", signal="e", meaning="max |e₁| for t ≥ 10 s", function=peak),
+    _late(key="tail_rms_e", signal="e", meaning="RMS of e₁ for t ≥ 10 s", function=rms),
     _number(key="rms_e", signal="e", meaning="RMS of e₁", function=rms),
     _number(key="max_u", signal="u", meaning="max |u|", function=peak),
     _number(key="zeta_min", signal="zeta", meaning="min ζ", function=lowest),
     _number(key="zeta_max", signal="zeta", meaning="max ζ", function=highest),
     _number(key="zeta_end", signal="zeta", meaning="ζ(20 s)", function=final),
     _number(key="max_r", signal="r", meaning="max |r|", function=peak),
-    _number(
-        key="tail_max_r", signal="r", meaning="max |r| for t ≥ 10 s", function=peak, start=TAIL
-    ),
+    _late(key="tail_max_r", signal="r", meaning="max |r| for t ≥ 10 s", function=peak),
     _number(key="max_delta_hat", signal="delta_hat", meaning="max δ̂", function=highest),
     _number(key="max_W", signal="W_norm", meaning="max ‖Ŵ‖", function=highest),
     _number(key="x1_end", signal="x1", meaning="x₁(20 s)", function=final),
@@ -42,63 +40,69 @@ METRICS = (
 
 
 @as_annotated
-@described_record
-class Case:
+def sample_times(horizon: float = HORIZON) -> np.ndarray:
+    """Return output times (s): 0.2 ms apart in the first half second, then 5 ms.
+
+    The largest control input is a peak of a few milliseconds in the first half second.
+
+    Parameters
+    ----------
+    horizon : float, optional
+        End (s).
+
+    Returns
+    -------
+    ndarray of shape (m,)
+        From 0 to the horizon (s).
+
+    Raises
+    ------
+    ParameterError
+        If the horizon does not lie beyond the first half second.
+    """
+    horizon = number("sample_times", "horizon", horizon, above=0.5, at_most=1e6)
+    early = np.linspace(0, 0.5, 2501)
+    return np.concatenate(
+        [early, np.linspace(0.5, horizon, round((horizon - 0.5) / 0.005) + 1)[1:]]
+    )
+
+
+@described_record(eq=False)
+class Case(PaperCase):
     """One closed loop of the paper, or of a choice that the paper leaves open."""
 
-    key: str
     title: str
     example: int  # 1 or 2.
-    # Keyword arguments of `nlctl.paper.example_1` or `example_2`.
-    arguments: Mapping[str, Any] = field(default_factory=dict)
-    group: str = "choice"  # ``"published"``, ``"choice"`` or ``"exchange"``.
-    rtol: float = 1e-9  # Relative tolerance of the integrator.
+    group: str  # ``"published"``, ``"choice"`` or ``"exchange"``.
 
-    @property
-    def diagram(self) -> Any:
-        """The diagram of this case."""
-        return paper.EXAMPLES[f"example_{self.example}"](**self.arguments)
 
-    @property
-    def call(self) -> str:
-        """The Python call that makes the diagram."""
-        arguments = ", ".join(f"{k}={v!r}" for k, v in self.arguments.items())
-        return f"nlctl.paper.example_{self.example}({arguments})"
+def _case(key: str, title: str, group: str = "choice", **arguments: Any) -> Case:
+    """Return a case of the example that its key begins with."""
+    example = int(key[0])
+    return Case(
+        key=key,
+        title=title,
+        example=example,
+        group=group,
+        make=partial(paper.EXAMPLES[f"example_{example}"], **arguments),
+        times=sample_times(),
+        rtol=_RTOL,
+        atol=1e-2 * _RTOL,
+        metrics=METRICS,
+    )
 
 
 CASES = (
-    Case(key="1", title="as published, diagonal centres", example=1, group="published"),
-    Case(key="1-3x9", title="centres on a 3×9 grid", example=1, arguments={"centres": "3x9"}),
-    Case(key="1-9x3", title="centres on a 9×3 grid", example=1, arguments={"centres": "9x3"}),
-    Case(
-        key="1-integral",
-        title="forcing phase ∫w dt instead of w(t) t",
-        example=1,
-        arguments={"phase": "integral"},
-    ),
-    Case(key="1-p1", title="p₁ = +0.2 instead of −0.2", example=1, arguments={"p1": 0.2}),
-    Case(
-        key="1-backlash",
-        title="Example 2's backlash",
-        example=1,
-        arguments={"actuator": actuators.Backlash()},
-        group="exchange",
-    ),
-    Case(key="2", title="as published, 3×3×3 centres", example=2, group="published"),
-    Case(key="2-diagonal", title="diagonal centres", example=2, arguments={"centres": "diagonal"}),
-    Case(
-        key="2-lambdas",
-        title="r = 2e₁ + e₂ + e₃ instead of e₁ + 2e₂ + e₃",
-        example=2,
-        arguments={"lambdas": (1.0, 2.0)},
-    ),
-    Case(key="2-v0-low", title="v(0) = −0.6", example=2, arguments={"v0": -0.6}),
-    Case(key="2-v0-high", title="v(0) = 0.72", example=2, arguments={"v0": 0.72}),
-    Case(
-        key="2-dead-zone",
-        title="Example 1's dead zone",
-        example=2,
-        arguments={"actuator": actuators.DeadZone()},
-        group="exchange",
-    ),
+    _case("1", "as published, diagonal centres", "published"),
+    _case("1-3x9", "centres on a 3×9 grid", centres="3x9"),
+    _case("1-9x3", "centres on a 9×3 grid", centres="9x3"),
+    _case("1-integral", "forcing phase ∫w dt instead of w(t) t", phase="integral"),
+    _case("1-p1", "p₁ = +0.2 instead of −0.2", p1=0.2),
+    _case("1-backlash", "Example 2's backlash", "exchange", actuator=actuators.Backlash()),
+    _case("2", "as published, 3×3×3 centres", "published"),
+    _case("2-diagonal", "diagonal centres", centres="diagonal"),
+    _case("2-lambdas", "r = 2e₁ + e₂ + e₃ instead of e₁ + 2e₂ + e₃", lambdas=(1.0, 2.0)),
+    _case("2-v0-low", "v(0) = −0.6", v0=-0.6),
+    _case("2-v0-high", "v(0) = 0.72", v0=0.72),
+    _case("2-dead-zone", "Example 1's dead zone", "exchange", actuator=actuators.DeadZone()),
 )

@@ -7,23 +7,10 @@ from typing import Any
 
 import control as ct
 
-from nlctl import paper
+from nlctl import controllers, paper
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
-from nlctl.controllers import (
-    PID,
-    AdaptiveWeights,
-    DeadZoneNussbaumLaw,
-    KnownSignLaw,
-    LeakyNussbaumLaw,
-    MonotoneNussbaumLaw,
-    RobustTerm,
-    SlidingModeLaw,
-    ablations,
-    replaced,
-    sliding_mode,
-)
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.references import BandLimitedNoise
 
 
@@ -96,23 +83,23 @@ def compared_controllers(example: str) -> dict[str, ct.InputOutputSystem]:
     published, gains = published_controller(example), GAINS[example]
     beta = part_of(published, "law").spec.beta
     laws = {
-        "dead zone in zeta'": DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
-        "leakage": LeakyNussbaumLaw(beta=beta),
-        "monotone zeta": MonotoneNussbaumLaw(beta=beta),
+        "dead zone in zeta'": controllers.DeadZoneNussbaumLaw(beta=beta, r_0=gains.r_0),
+        "leakage": controllers.LeakyNussbaumLaw(beta=beta),
+        "monotone zeta": controllers.MonotoneNussbaumLaw(beta=beta),
     }
     return {
         "paper": published,
-        **ablations(published, kappa=gains.reached),
+        **controllers.ablations(published, kappa=gains.reached),
         **baselines(example),
-        "certified": replaced(
+        "certified": controllers.replaced(
             published,
-            weights=AdaptiveWeights(
+            weights=controllers.AdaptiveWeights(
                 nodes=part_of(published, "weights").spec.nodes, **gains.weights
             ),
-            robust=RobustTerm(**gains.robust),
-            law=KnownSignLaw(**gains.law),
+            robust=controllers.RobustTerm(**gains.robust),
+            law=controllers.KnownSignLaw(**gains.law),
         ),
-        **{label: replaced(published, law=law) for label, law in laws.items()},
+        **{label: controllers.replaced(published, law=law) for label, law in laws.items()},
     }
 
 
@@ -123,29 +110,30 @@ def baselines(example: str) -> dict[str, Any]:
     # gain and have gains made for this plant; the paper's controller has neither.
     surface, gains = part_of(published_controller(example), "filtered_error").spec, GAINS[example]
     return {
-        "PID": PID(**gains.pid, u_max=100.0),
-        "sliding mode": sliding_mode(surface, SlidingModeLaw(**gains.sliding)),
+        "PID": controllers.PID(**gains.pid, u_max=100.0),
+        "sliding mode": controllers.sliding_mode(
+            surface, controllers.SlidingModeLaw(**gains.sliding)
+        ),
     }
 
 
 def sensor(example: str, rms: float = 0.01, seed: int = 0) -> BandLimitedNoise:
     """Return measurement noise on all states of an example, 0 to 50 rad/s."""
-    states = part_of(_build(example)(), "plant").spec.states
+    states = part_of(paper_example(example)(), "plant").spec.states
     return BandLimitedNoise(
         inputs=states, outputs=tuple(f"{x}_measured" for x in states), rms=rms, seed=seed
     )
 
 
-def _build(example: str) -> Callable[..., ct.InterconnectedSystem]:
+def paper_example(example: str) -> Callable[..., ct.InterconnectedSystem]:
     """Return what makes the diagram of an example."""
-    if example not in paper.EXAMPLES:
-        raise unknown("example", example, paper.EXAMPLES)
+    check_known("example", example, paper.EXAMPLES)
     return paper.EXAMPLES[example]
 
 
 def published_controller(example: str) -> ct.InterconnectedSystem:
     """Return the paper's controller of an example."""
-    return part_of(_build(example)(), "controller")
+    return part_of(paper_example(example)(), "controller")
 
 
 def part_of(diagram: ct.InterconnectedSystem, name: str) -> Any:

@@ -115,6 +115,9 @@ class FarRuns:
     burst: Burst | None = None  # Example 2 beyond its run, if it bursts.
 
 
+NO_FAR_RUNS = FarRuns()
+
+
 @contextmanager
 def far_runs_in_background(*, whole: bool = False) -> Iterator[Future[FarRuns]]:
     """Run `FAR_HORIZONS` in a thread while the body continues; an early exit ends the runs."""

@@ -24,15 +24,12 @@ from nlctl.plotting.axes import (
     stacked_axes,
 )
 
-from . import TAIL, CaseRun
+from ..reproductions.cases import PaperRun
+from . import TAIL
 from .burst import Burst
 
-SAMPLED_CONTROLLERS = (
-    "paper",
-    "sliding mode",
-    "PID",
-    "certified",
-)  # of the controllers on computers
+# of the controllers on computers
+SAMPLED_CONTROLLERS = ("paper", "sliding mode", "PID", "certified")
 
 
 def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figure:
@@ -43,7 +40,7 @@ def _one(time: np.ndarray, curves: Mapping[str, np.ndarray], label: str) -> Figu
     return figure
 
 
-def tracking(run: CaseRun) -> Figure:
+def tracking(run: PaperRun) -> Figure:
     """Output y against the reference yd."""
     figure, (ax,) = stacked_axes()
     ax.plot(run.time, run.signals["yd"], "--", color=GREY, linewidth=1.4, label="$y_d$")
@@ -53,7 +50,7 @@ def tracking(run: CaseRun) -> Figure:
     return figure
 
 
-def tracking_error(run: CaseRun) -> Figure:
+def tracking_error(run: PaperRun) -> Figure:
     """Tracking error e1, with the largest one of the last half marked."""
     figure, (ax,) = stacked_axes()
     bound = run.metrics["tail_max_e"]
@@ -71,20 +68,20 @@ def tracking_error(run: CaseRun) -> Figure:
     return figure
 
 
-def upper_states(run: CaseRun) -> Figure:
+def upper_states(run: PaperRun) -> Figure:
     """The states x2, ..., xn."""
     numbers = [i for i in range(2, 10) if f"x{i}" in run.signals]
     curves = {f"$x_{i}$": run.signals[f"x{i}"] for i in numbers}
     return _one(run.time, curves, "state " + ", ".join(curves))
 
 
-def control_input(run: CaseRun) -> Figure:
+def control_input(run: PaperRun) -> Figure:
     """Control input u and what the actuator makes of it, v."""
     curves = {"$u$": run.signals["u"], "$v$": run.signals["v"]}
     return _one(run.time, curves, "input $u$, actuator output $v$")
 
 
-def actuator_path(run: CaseRun) -> Figure:
+def actuator_path(run: PaperRun) -> Figure:
     """The part of the actuator's characteristic that was travelled: v over u."""
     figure = Figure(figsize=(4.6, 3.6), layout="constrained")
     ax = figure.subplots()
@@ -98,7 +95,7 @@ def actuator_path(run: CaseRun) -> Figure:
     return figure
 
 
-def nussbaum_gain(run: CaseRun) -> Figure:
+def nussbaum_gain(run: PaperRun) -> Figure:
     """The argument zeta, and the gain N(zeta) that it gives."""
     figure, (top, bottom) = stacked_axes(rows=2, height=1.9)
     zeta = run.signals["zeta"]
@@ -109,7 +106,7 @@ def nussbaum_gain(run: CaseRun) -> Figure:
     return figure
 
 
-def adaptation(run: CaseRun) -> Figure:
+def adaptation(run: PaperRun) -> Figure:
     """Norm of the network's weights, and the estimate delta_hat."""
     curves = {"$\\|\\hat W\\|$": run.signals["W_norm"], "$\\hat\\delta$": run.signals["delta_hat"]}
     return _one(run.time, curves, ", ".join(curves))
@@ -140,7 +137,7 @@ def after_burst(burst: Burst) -> Figure:
     return figure
 
 
-def error_comparison(runs: Sequence[CaseRun], labels: Sequence[str]) -> Figure:
+def error_comparison(runs: Sequence[PaperRun], labels: Sequence[str]) -> Figure:
     """Tracking errors of up to four runs above each other."""
     curves = dict(zip(labels, (run.signals["e"] for run in runs), strict=True))
     return _one(runs[0].time, curves, "tracking error $e_1$")

@@ -11,14 +11,13 @@ from typing import Any
 
 import control as ct
 
-from nlctl import paper
 from nlctl.actuators import Backlash, DeadZone, Gain, Saturation, cascade
 from nlctl.blocks import Spec
 from nlctl.diagrams import interconnect
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.sampling import sampled
 
-from .controllers import compared_controllers, sensor
+from .controllers import compared_controllers, paper_example, sensor
 
 _WIDE = 1e6  # a saturation beyond every |u| of a run that is worth keeping
 
@@ -53,10 +52,7 @@ def true_error(example: str = "example_1") -> ct.InterconnectedSystem:
     """An example with the output ``error``, y - yd of the plant itself."""
     # The output e is what the controller makes of its measurements: with a fault on one of them it
     # is not an error of the plant.
-    if example not in paper.EXAMPLES:
-        raise unknown("example", example, paper.EXAMPLES)
-    difference = ct.summing_junction(["y", "-yd"], "error", name="difference")
-    return interconnect([paper.EXAMPLES[example](), difference])
+    return _with_error(paper_example(example)())
 
 
 def on_a_computer(
@@ -65,14 +61,17 @@ def on_a_computer(
     """An example whose controller is a program, every 2 ms by Euler's method, 1 ms late."""
     # What may be varied are ``sampling.dt``, ``sampling.delay``, ``sampling.jitter``, and, from 0
     # on, ``sampling.input_quantum`` and ``sampling.output_quantum``.
-    if example not in paper.EXAMPLES:
-        raise unknown("example", example, paper.EXAMPLES)
+    make = paper_example(example)
     program = sampled(
         _controller(example, controller), 0.002, method="euler", delay=0.001, waiting=waiting,
         input_quantum=0.0, output_quantum=0.0,
     )  # fmt: skip
+    return _with_error(make(controller=program))
+
+
+def _with_error(loop: ct.InterconnectedSystem) -> ct.InterconnectedSystem:
     difference = ct.summing_junction(["y", "-yd"], "error", name="difference")
-    return interconnect([paper.EXAMPLES[example](controller=program), difference])
+    return interconnect([loop, difference])
 
 
 def _controller(example: str, controller: Spec) -> Any:
@@ -80,8 +79,7 @@ def _controller(example: str, controller: Spec) -> Any:
     if not isinstance(controller, str):
         return controller
     known = compared_controllers(example)
-    if controller not in known:
-        raise unknown("controller", controller, known)
+    check_known("controller", controller, known)
     return known[controller]
 
 
@@ -89,7 +87,7 @@ def _loop(
     example: str, body: Any, controller: Spec, gain: float, limit: float, noise: float | None
 ) -> ct.InterconnectedSystem:
     stages = {"saturation": Saturation(limit=limit), "gain": Gain(k=gain), "body": body}
-    return paper.EXAMPLES[example](
+    return paper_example(example)(
         controller=_controller(example, controller),
         actuator=cascade(stages),
         sensor=None if noise is None else sensor(example, noise),

@@ -14,12 +14,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from nlctl import paper
+from nlctl import native, paper
 
 from ..pages.study.histories import loop_again, rows_again
 from ..pages.study.report import study_part
 from ..report.document import Section
 from ..report.svg import draw_ahead
+from ..reproductions.cases import PaperRun, simulate_cases
 from ..reproductions.page import Composed, ProgressWatch, unwatched
 from ..robustness import prepare
 from ..robustness.runs.experiment import compile_experiment_ahead as compile_experiment
@@ -31,8 +32,7 @@ from .cases import CASES, HORIZON
 from .page.proof import lyapunov_sections
 from .page.report import paper_report, paper_sections
 from .page.text import PUBLISHED
-from .reproduction import CaseRun, checks, numerics, run_all
-from .reproduction import compile_cases_ahead as compile_cases
+from .reproduction import checks, numerics
 from .rivals import checked_rivals
 from .sampling_limits import checked_record
 
@@ -56,16 +56,17 @@ class _Here(Executor):
 def reproduction(watch: ProgressWatch = unwatched) -> list[Section]:
     """Run both examples, and return the report's first part: their figures and numbers."""
     with watch("simulating", len(CASES)) as advance:
-        runs = run_all(CASES, done=lambda _: advance(1))
+        runs = simulate_cases(CASES, advance)
     return paper_sections(runs)
 
 
 def proof(
-    horizon: float = HORIZON, far: proofs.FarRuns | None = None, watch: ProgressWatch = unwatched
+    horizon: float = HORIZON,
+    far: proofs.FarRuns = proofs.NO_FAR_RUNS,
+    watch: ProgressWatch = unwatched,
 ) -> list[Section]:
     """Check the proof for both examples, and return the report's second part."""
-    far = far or proofs.FarRuns()
-    return lyapunov_sections(_proved(horizon, watch), far.runs, far.burst)
+    return lyapunov_sections(_proved(horizon, watch), far)
 
 
 def robustness(
@@ -101,9 +102,8 @@ def compose(
         runs, waiting = _runs(other, folder, studies, threads, watch)
         proved = _proved(horizon, watch)
         with watch("running far beyond 20 s, and the studies", 2) as advance:
-            far_away = long_runs.result()
+            shown: Any = {"proofs": proved, "far": long_runs.result()}
             advance(1)
-            shown: Any = {"proofs": proved, "far": far_away.runs, "burst": far_away.burst}
             sections = paper_sections(runs, **shown)
             drawn = draw_ahead(sections, until=waiting[-1].done)
             *_, record, numbers = (task.result() for task in (*ahead, *waiting))
@@ -118,7 +118,7 @@ def compose(
         sampling=record,
         rivals=checked_rivals(),
     )
-    return Composed(report=report, drawn=drawn, passed=all(c.passed for c in checks(runs)))
+    return Composed(report=report, drawn=drawn, passed=all(c.holds for c in checks(runs)))
 
 
 def clear(folder: Path, studies: Sequence[str] = QUICK, *, force: bool = False) -> None:
@@ -144,7 +144,7 @@ def _far_away(far: bool, whole: bool) -> Iterator[Future[proofs.FarRuns]]:
         with proofs.far_runs_in_background(whole=whole) as long_runs:
             yield long_runs
     else:
-        yield _Here().submit(proofs.FarRuns)
+        yield _Here().submit(lambda: proofs.NO_FAR_RUNS)
 
 
 def _runs(
@@ -153,19 +153,19 @@ def _runs(
     studies: Sequence[str],
     threads: int | None,
     watch: ProgressWatch,
-) -> tuple[dict[str, CaseRun], list[Future[Any]]]:
+) -> tuple[dict[str, PaperRun], list[Future[Any]]]:
     """Run the paper's cases; return them, and what runs in the other process meanwhile."""
     # That is the studies, lines of the record on sampling, and last the numerics. Both processes
     # need the integrators: where nothing is compiled yet only this one compiles them, while the
     # other does what needs none.
     with watch("simulating", len(CASES)) as advance:
-        runs = run_all(CASES[:1], done=lambda _: advance(1))
+        runs = simulate_cases(CASES[:1], advance)
         waiting = [
             beside.submit(_run_shipped, studies, folder, threads),
             beside.submit(checked_record),
             beside.submit(numerics),
         ]
-        runs |= run_all(CASES[1:], done=lambda _: advance(1))  # machine code: in this process
+        runs |= simulate_cases(CASES[1:], advance)  # machine code: in this process
     return runs, waiting
 
 
@@ -180,6 +180,7 @@ def _compile_ahead(studies: Sequence[str]) -> None:
     """Compile what is needed besides the integrators, first what the other process needs late."""
     proofs.compile_evidence_ahead(paper.example_1())
     proofs.compile_evidence_ahead(paper.example_2())
-    compile_cases(CASES)  # by now the other process has the first two
+    for case in CASES:  # by now the other process has the first two
+        native.compile_ahead(native.compile(case.make()))
     for name in studies:
         compile_experiment(prepare(read_study(shipped(name)).experiment))

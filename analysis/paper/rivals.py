@@ -12,6 +12,7 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -24,19 +25,17 @@ from nlctl.actuators import Backlash, DeadZone, Gain, Saturation
 from nlctl.blocks import Spec
 from nlctl.controllers import (
     PID,
-    AdaptiveWeights,
     DynamicSurface,
     FunnelControl,
     NussbaumLaw,
     PrescribedPerformance,
-    RobustTerm,
     SlidingModeLaw,
     SuperTwistingLaw,
     dynamic_surface_control,
     replaced,
     sliding_mode,
 )
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 from ..loop_record import loop_facts, loop_values
 from ..studies import shipped
@@ -60,68 +59,67 @@ KNOWLEDGE = {
 """What each controller has to know."""
 
 
-def _tuple(gains: Mapping[str, float], name: str) -> tuple[float, ...]:
+def _of(gains: Mapping[str, float], part: str) -> dict[str, float]:
+    """Return the gains of a part of a controller, by their names there."""
+    return {
+        key.removeprefix(f"{part}."): value
+        for key, value in gains.items()
+        if key.startswith(f"{part}.")
+    }
+
+
+def _vector(gains: Mapping[str, float], name: str) -> tuple[float, ...]:
     """Return the elements ``name[0]``, ``name[1]``, ... of a vector."""
     return tuple(value for key, value in gains.items() if key.startswith(f"{name}["))
 
 
+def _part(example: str, name: str) -> Any:
+    """Return the record of a part of the paper's controller."""
+    return part_of(published_controller(example), name).spec
+
+
 def _paper(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    published = published_controller(example)
-    old = {key: part_of(published, key).spec for key in ("weights", "robust")}
     return replaced(
-        published,
-        weights=AdaptiveWeights(
-            nodes=old["weights"].nodes, sigma_1=old["weights"].sigma_1, Gamma=gains["weights.Gamma"]
-        ),
-        robust=RobustTerm(
-            gamma=gains["robust.gamma"], sigma_2=old["robust"].sigma_2, tau=old["robust"].tau
-        ),
+        published_controller(example),
+        weights=replace(_part(example, "weights"), **_of(gains, "weights")),
+        robust=replace(_part(example, "robust"), **_of(gains, "robust")),
         law=NussbaumLaw(beta=gains["law.beta"]),
     )
 
 
 def _pid(example: str, gains: Mapping[str, float]) -> PID:
-    return PID(
-        **{key.removeprefix("controller."): value for key, value in gains.items()}, u_max=100
-    )
+    return PID(**_of(gains, "controller"), u_max=100)
 
 
 def _sliding(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    surface = part_of(published_controller(example), "filtered_error").spec
-    return sliding_mode(surface, SlidingModeLaw(K=gains["law.K"], phi=gains["law.phi"]))
+    return sliding_mode(_part(example, "filtered_error"), SlidingModeLaw(**_of(gains, "law")))
 
 
 def _twisting(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    surface = part_of(published_controller(example), "filtered_error").spec
-    law = {key.removeprefix("law."): value for key, value in gains.items()}
-    return sliding_mode(surface, SuperTwistingLaw(**law))
+    return sliding_mode(_part(example, "filtered_error"), SuperTwistingLaw(**_of(gains, "law")))
 
 
 def _dynamic_surface(example: str, gains: Mapping[str, float]) -> ct.InterconnectedSystem:
-    published = published_controller(example)
-    basis, old = (part_of(published, key).spec for key in ("basis", "weights"))
     return dynamic_surface_control(
-        DynamicSurface(c=_tuple(gains, "surface.c"), tau=_tuple(gains, "surface.tau")),
-        basis=basis,
-        weights=AdaptiveWeights(nodes=old.nodes, sigma_1=old.sigma_1, Gamma=gains["weights.Gamma"]),
+        DynamicSurface(c=_vector(gains, "surface.c"), tau=_vector(gains, "surface.tau")),
+        basis=_part(example, "basis"),
+        weights=replace(_part(example, "weights"), **_of(gains, "weights")),
     )
 
 
 def _prescribed(example: str, gains: Mapping[str, float]) -> PrescribedPerformance:
-    k, rho_inf = _tuple(gains, "controller.k"), _tuple(gains, "controller.rho_inf")
+    k, rho_inf = _vector(gains, "controller.k"), _vector(gains, "controller.rho_inf")
     rho_0, decay = (3.0, 6.0, 12.0)[: len(k)], (gains["controller.decay[0]"], 0.7, 0.7)[: len(k)]
     return PrescribedPerformance(k=k, rho_0=rho_0, rho_inf=rho_inf, decay=decay)
 
 
 @functools.cache
 def _order(example: str) -> int:
-    return part_of(published_controller(example), "filtered_error").spec.plant_order
+    return _part(example, "filtered_error").plant_order
 
 
 def _funnel(example: str, gains: Mapping[str, float]) -> FunnelControl:
-    order = _order(example)
-    settings = {key.removeprefix("controller."): value for key, value in gains.items()}
-    return FunnelControl(order=order, rho_0=5.0, **settings)
+    return FunnelControl(order=_order(example), rho_0=5.0, **_of(gains, "controller"))
 
 
 _MAKERS: dict[str, Callable[[str, Mapping[str, float]], Any]] = {
@@ -204,14 +202,12 @@ def rival_controller(example: str, label: str) -> Any:
     gains = _gains(example)
     if label == "paper":
         return published_controller(example)
-    if label not in gains:
-        raise unknown("controller", label, ("paper", *gains))
+    check_known("controller", label, ("paper", *gains))
     return made_with(example, label, gains[label])
 
 
 def _gains(example: str) -> dict[str, dict[str, float]]:
-    if example not in RIVAL_GAINS:
-        raise unknown("example", example, RIVAL_GAINS)
+    check_known("example", example, RIVAL_GAINS)
     return RIVAL_GAINS[example]
 
 
@@ -233,8 +229,7 @@ def rival_actuators(example: str) -> dict[str, Any]:
 
 def behind(example: str, actuator: str) -> dict[str, str]:
     """Return ``{controller: pair}`` for one actuator: the options of a comparison."""
-    if actuator not in rival_actuators(example):
-        raise unknown("actuator", actuator, rival_actuators(example))
+    check_known("actuator", actuator, rival_actuators(example))
     return {label: f"{label} / {actuator}" for label in ("paper", *_gains(example))}
 
 
@@ -244,8 +239,7 @@ def rival_loop(
     """An example with one controller behind one actuator."""
     label, _, actuator = pair.partition(" / ")
     controller, actuators = rival_controller(example, label), rival_actuators(example)
-    if actuator not in actuators:
-        raise unknown("actuator", actuator, actuators)
+    check_known("actuator", actuator, actuators)
     return example_with(example, controller, actuators[actuator], noise)
 
 
@@ -253,8 +247,7 @@ def example_with(
     example: str, controller: Spec, actuator: Spec, noise: float = 0.0
 ) -> ct.InterconnectedSystem:
     """Return an example with a controller and an actuator."""
-    make = {"example_1": loops.example_1, "example_2": loops.example_2}[example]
-    return make(controller=controller, actuator=actuator, noise=noise)
+    return getattr(loops, example)(controller=controller, actuator=actuator, noise=noise)
 
 
 RIVALS_RECORD = Path(__file__).with_name("rivals.csv")
@@ -297,10 +290,8 @@ def checked_rivals(path: Path = RIVALS_RECORD) -> pd.DataFrame:
                 f"the record of rivals in '{example}' is of another study than "
                 f"reports/rivals-{example[-1]}.toml: {again}"
             )
-    asked = ["example", "controller", "actuator"]
-    for example, controller, actuator, held, rates in record[[*asked, *KEY]].itertuples(
-        index=False
-    ):
+    lines = record[["example", "controller", "actuator", *KEY]].itertuples(index=False)
+    for example, controller, actuator, held, rates in lines:
         now = loop_key(example, controller, actuator)
         if now[0] != held or not math.isclose(now[1], rates, rel_tol=1e-5):
             raise ValueError(

@@ -83,8 +83,8 @@ def named_paper(name: str) -> Reproduction:
     Examples
     --------
     >>> from nlctl.analysis.papers import named_paper
-    >>> named_paper("tabuada-2007").paper.cases
-    1
+    >>> [case.key for case in named_paper("tabuada-2007").paper.cases]
+    ['1']
     """
     reproduction: Reproduction = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
     return reproduction

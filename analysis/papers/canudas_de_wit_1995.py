@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import canudas_de_wit_1995 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import paths_figure, rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
@@ -269,11 +269,6 @@ def _draw_hunting(runs: PaperRuns) -> MatplotlibFigure:
     )
 
 
-_CITATION = (
-    "C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky: A new model for control of systems "
-    "with friction. IEEE Transactions on Automatic Control 40(3), 1995, pp. 419–425. "
-    "doi 10.1109/9.376053."
-)
 _MODEL = (
     Paragraph(text="Bristles that bend and slip, at the relative velocity v:"),
     Equation(
@@ -296,7 +291,11 @@ _PAPER = Paper(
     key="canudas_de_wit_1995",
     title="The LuGre model of friction, reproduced",
     question="does the model show what its figures show, with the parameters of its Table I?",
-    citation=_CITATION,
+    citation=(
+        "C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky: A new model for control of "
+        "systems with friction. IEEE Transactions on Automatic Control 40(3), 1995, pp. 419–425. "
+        "doi 10.1109/9.376053."
+    ),
     model=_MODEL,
     parts=(
         Part(
@@ -368,11 +367,8 @@ _PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, _CASES),
-    cases=len(_CASES),
-    statements=lambda: [
-        *_on_figure_2_and_4(), *_on_figure_3(), *_on_figure_6(), *_on_figure_8()
-    ],
+    cases=_CASES,
+    statements=(*_on_figure_2_and_4(), *_on_figure_3(), *_on_figure_6(), *_on_figure_8()),
     reproduced="Figs. 2, 3, 4, 6 and 8: presliding, lag, break-away, stick-slip, hunting",
     not_reproduced=(
         "the article's own pictures, which could not be read (numbers are read off a "
@@ -408,7 +404,6 @@ _PAPER = Paper(
     limits=(
         "The model's behaviour is reproduced, not that of friction: nothing here was measured.",
     ),
-    references=(_CITATION,),
     lead=PaperFigure(
         key="lead", draw=_draw_hunting,
         caption="Under PID control the mass hunts about the position that is wanted.",

@@ -11,7 +11,7 @@ from scipy.linalg import solve_continuous_lyapunov
 from nlctl.papers import chowdhary_2010 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
@@ -142,10 +142,6 @@ def _learned(runs: PaperRuns) -> MatplotlibFigure:
     return figure
 
 
-_CITATION = (
-    "G. Chowdhary, E. Johnson: Concurrent learning for convergence in adaptive control without "
-    "persistency of excitation. 49th IEEE Conference on Decision and Control, 2010, p. 3674."
-)
 _MODEL = (
     Paragraph(text="A plant like an inverted pendulum, and a model that it shall follow:"),
     Equation(
@@ -168,7 +164,10 @@ _PAPER = Paper(
     key="chowdhary_2010",
     title="Concurrent learning without persistent excitation, reproduced",
     question="do weights that learn from recorded points come to their true values?",
-    citation=_CITATION,
+    citation=(
+        "G. Chowdhary, E. Johnson: Concurrent learning for convergence in adaptive control without "
+        "persistency of excitation. 49th IEEE Conference on Decision and Control, 2010, p. 3674."
+    ),
     model=_MODEL,
     parts=(
         Part(
@@ -199,9 +198,8 @@ _PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, _CASES),
-    cases=len(_CASES),
-    statements=_statements,
+    cases=_CASES,
+    statements=tuple(_statements()),
     reproduced="weights with and without a record, on the first author's uncertain pendulum",
     not_reproduced=(
         "the article's figures, which could not be read; its rule that trains on present data "
@@ -236,7 +234,6 @@ _PAPER = Paper(
         "The acceleration is measured, as in the program.",
     ),
     limits=("One run from one start; there is no noise on the acceleration.",),
-    references=(_CITATION,),
     lead=PaperFigure(
         key="lead", draw=_learned,
         caption="With a record the weights come to their true values (dotted).",

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.papers import karason_1994 as printed
 
 from ..report.document import Equation, Paragraph
-from ..reproductions.cases import PaperCase, PaperRun, simulate_cases
+from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
 from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
@@ -170,10 +170,6 @@ def _estimates(runs: PaperRuns) -> MatplotlibFigure:
     return rows_over_time(rows)
 
 
-_CITATION = (
-    "S. P. Karason, A. M. Annaswamy: Adaptive control in the presence of input constraints. IEEE "
-    "Transactions on Automatic Control 39(11), 1994, pp. 2325–2330. doi 10.1109/9.333787."
-)
 _MODEL = (
     Paragraph(text="Plant, reference model, and a law whose output is limited:"),
     Equation(
@@ -199,7 +195,10 @@ _PAPER = Paper(
     key="karason_1994",
     title="Adaptive control with a constrained input, reproduced",
     question="does an unstable plant at the edge of what its input can hold track in the end?",
-    citation=_CITATION,
+    citation=(
+        "S. P. Karason, A. M. Annaswamy: Adaptive control in the presence of input constraints. "
+        "IEEE Transactions on Automatic Control 39(11), 1994, pp. 2325–2330. doi 10.1109/9.333787."
+    ),
     model=_MODEL,
     parts=(
         Part(
@@ -237,9 +236,8 @@ _PAPER = Paper(
             ),
         ),
     ),
-    simulate=partial(simulate_cases, _CASES),
-    cases=len(_CASES),
-    statements=_statements,
+    cases=_CASES,
+    statements=tuple(_statements()),
     reproduced="both runs of its scalar example, and the balance of its Lyapunov function",
     not_reproduced=(
         "what the post says of seven seconds, with its program's command; the article's own gains "
@@ -278,7 +276,6 @@ _PAPER = Paper(
         "Two runs from one start. Beyond |x| = 10 no input of at most 10 brings the plant back, "
         "whatever the law.",
     ),
-    references=(_CITATION,),
     lead=PaperFigure(
         key="lead", draw=_states_and_inputs,
         caption="The plant comes back from the edge, and follows its model.",

@@ -1,4 +1,4 @@
-"""Cases of a paper: a diagram, a start, an input, and how they ended."""
+"""Cases of a paper: a diagram, a start, an input, and what was found of their runs."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from nlctl.attributes import described_record
 from nlctl.diagrams import state_names
 from nlctl.response import input_output_response
 
+from ..metrics import Metric, over
+
 
 @described_record(eq=False)
 class PaperCase:
@@ -26,16 +28,18 @@ class PaperCase:
     start: Mapping[str, float] = field(default_factory=dict)
     rtol: float = 1e-8
     atol: float = 1e-10
+    metrics: tuple[Metric, ...] = ()  # Numbers that are taken of its run.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PaperRun:
-    """A simulated case: times (s), outputs and states by name, events."""
+    """A simulated case: times (s), outputs and states by name, events, metrics by key."""
 
-    case: PaperCase
+    case: Any  # A `PaperCase`, or what a paper derives from it.
     time: np.ndarray
     signals: Mapping[str, np.ndarray]
-    events: pd.DataFrame
+    events: pd.DataFrame = field(default_factory=pd.DataFrame)
+    metrics: Mapping[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a signal by name."""
@@ -53,9 +57,16 @@ def simulate_case(case: PaperCase, engine: str = "auto") -> PaperRun:
     states = np.reshape(response.states, (len(state_names(loop)), -1))
     signals = dict(zip(loop.output_labels, outputs, strict=True))
     signals |= dict(zip(state_names(loop), states, strict=True))
-    return PaperRun(
-        case=case, time=np.asarray(response.time), signals=signals, events=response.events
-    )
+    time = np.asarray(response.time)
+    metrics = numbers_of(case, time, signals)
+    return PaperRun(case=case, time=time, signals=signals, events=response.events, metrics=metrics)
+
+
+def numbers_of(
+    case: PaperCase, time: np.ndarray, signals: Mapping[str, np.ndarray]
+) -> dict[str, float]:
+    """Return the metrics of a case by key, whatever simulated it."""
+    return {m.key: m.function(*over(time, signals[m.signal], m.start, m.end)) for m in case.metrics}
 
 
 def simulate_cases(

@@ -14,6 +14,7 @@ from nlctl.wording import some_of
 
 from ..report.document import Claim, Figure, Report, Section, versions
 from ..report.svg import Drawn
+from .cases import simulate_cases
 from .paper import FoundNumber, Paper, PaperRuns
 from .sections import (
     drawn_figure,
@@ -85,7 +86,7 @@ def report_of(
 
 def paper_page(paper: Paper, runs: PaperRuns) -> Report:
     """Compose the page of a paper from its runs."""
-    checked = found_numbers(paper, runs)
+    checked = found_numbers(paper.statements, runs)
     parts = [s for part in paper.parts for s in part_sections(paper, part, runs, checked)]
     sections = [model_section(paper), *parts, open_section(paper), source_section(paper)]
     numbers = {f"{f.statement.case}: {f.statement.quantity}": f.value for f in checked}
@@ -151,8 +152,8 @@ def compose_paper(
     # Threads and a second process are of no use to runs of seconds.
     if whole:
         raise UsageError(f"{paper.key} has no runs beyond its examples: leave --far out")
-    with watch("simulating", paper.cases) as advance:
-        runs = paper.simulate(advance)
+    with watch("simulating", len(paper.cases)) as advance:
+        runs = simulate_cases(paper.cases, advance)
     report = paper_page(paper, runs)
     passed = all(claim.holds or claim.by for claim in report.claims)
     return Composed(report=report, drawn={}, passed=passed)

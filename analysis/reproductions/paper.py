@@ -12,8 +12,9 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.attributes import described_record
 
 from ..report.document import Item
+from .cases import PaperCase, PaperRun
 
-PaperRuns = Mapping[str, Any]
+PaperRuns = Mapping[str, PaperRun]
 """Simulated cases of a paper by key."""
 
 
@@ -68,93 +69,51 @@ class FoundNumber:
         return self.error <= self.statement.tolerance
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class PaperFigure:
-    """A figure of the page: its anchor, its caption, and how it is drawn from the runs.
+    """A figure of the page, and how it is drawn from the runs."""
 
-    Attributes
-    ----------
-    description : str or callable
-        For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The
-        caption where it is empty.
-    folded : bool
-        Whether it stands behind a heading that is opened.
-    """
-
-    key: str
+    key: str  # Its anchor.
     caption: str
     draw: Callable[[PaperRuns], MatplotlibFigure]
+    # For those who cannot see it; ``description(runs) -> str`` for one with numbers.  The caption
+    # where it is empty.
     description: str | Callable[[PaperRuns], str] = ""
-    folded: bool = False
+    folded: bool = False  # Whether it stands behind a heading that is opened.
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class MovedLoop:
-    """What the reader of a page that runs may move of an example.
+    """What the reader of a page that runs may move of an example."""
 
-    Attributes
-    ----------
-    make : callable
-        Returns the diagram, with faults that may be switched on.
-    call : str
-        The Python that makes it.
-    until, step : float
-        Of the run (s).
-    names : tuple of str
-        Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
-    signals : tuple of str or of lists of str
-        What is drawn, a row each; all outputs where it is empty.
-    requirements : tuple of (str, str)
-        What the page watches, as study files have it, and what it means.
-    """
-
-    make: Callable[[], Any]
-    call: str
-    until: float
-    step: float = 0.01
+    make: Callable[[], Any]  # Returns the diagram, with faults that may be switched on.
+    call: str  # The Python that makes it.
+    until: float  # End of the run (s).
+    step: float = 0.01  # Of its samples (s).
+    # Sliders, see `nlctl.analysis.loop_report`; a sensible few where it is empty.
     names: tuple[str, ...] = ()
-    signals: tuple[str | list[str], ...] = ()
+    signals: tuple[str | list[str], ...] = ()  # What is drawn, a row each; else all outputs.
+    # What the page watches, as study files have it, and what it means.
     requirements: tuple[tuple[str, str], ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Part:
-    """One example of a paper on its page.
+    """One example of a paper on its page."""
 
-    Attributes
-    ----------
-    key, title : str
-        Its anchor and its heading.
-    make : callable
-        Returns the diagram.
-    blocks : tuple of str
-        Blocks whose equations stand on the page.
-    number : str
-        In front of each equation; empty for none.
-    picture : str
-        Caption of the diagram.
-    figures : tuple of PaperFigure
-    more : str
-        Heading of the figures that are folded.
-    parameters : tuple of (str, str, str, str)
-        Name, as printed, as used, remark; the third is filled in from the blocks by name.
-    items : callable, optional
-        ``items(runs)``, what else stands behind its figures.
-    moved : MovedLoop, optional
-        What a page that runs moves.
-    """
-
-    key: str
-    title: str
-    make: Callable[[], Any]
-    blocks: tuple[str, ...]
-    number: str = ""
-    picture: str = "The loop as simulated."
+    key: str  # Its anchor.
+    title: str  # Its heading.
+    make: Callable[[], Any]  # Returns the diagram.
+    blocks: tuple[str, ...]  # Blocks whose equations stand on the page.
+    number: str = ""  # In front of each equation; empty for none.
+    picture: str = "The loop as simulated."  # Caption of the diagram.
     figures: tuple[PaperFigure, ...] = ()
-    more: str = "More figures"
+    more: str = "More figures"  # Heading of the figures that are folded.
+    # Name, as printed, as used, remark; the third is filled in from the blocks by name.
     parameters: tuple[tuple[str, str, str, str], ...] = ()
+    # ``items(runs)``, what else stands behind its figures.
     items: Callable[[PaperRuns], Sequence[Item]] | None = None
-    moved: MovedLoop | None = None
+    moved: MovedLoop | None = None  # What a page that runs moves.
 
 
 @described_record(eq=False)
@@ -166,10 +125,8 @@ class Paper:
     question: str  # What the page answers.
     citation: str  # Where the paper appeared.
     parts: tuple[Part, ...]
-    # ``simulate(done) -> runs``; ``done(amount)`` is called as cases are finished.
-    simulate: Callable[[Callable[[float], object]], PaperRuns]
-    cases: int  # How many are simulated.
-    statements: Callable[[], Sequence[Statement]]  # Returns them; it is called once per page.
+    cases: tuple[PaperCase, ...]  # What is simulated.
+    statements: tuple[Statement, ...]
     reproduced: str  # In a few words each, for the table of papers and the verdict.
     not_reproduced: str
     heading: str = "What the paper has"  # Of the section that says what the paper has.
@@ -179,7 +136,7 @@ class Paper:
     open_points: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()  # Paragraphs, as those of a `Report`.
     limits: tuple[str, ...] = ()
-    references: tuple[str, ...] = ()
+    others_cited: tuple[str, ...] = ()  # Behind the paper itself, in the list of references.
     lead: PaperFigure | None = None  # The picture at the top.
     # Heading and caption of the tables of numbers.
     numbers_title: str = "{count} numbers, as printed or required, and as found"
@@ -192,3 +149,8 @@ class Paper:
     command: str = ""  # What makes the page again; ``nlctl report KEY`` where it is empty.
     # Packages whose versions stand on the page next to those of every report.
     packages: tuple[str, ...] = field(default=())
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The paper, and what else its page cites."""
+        return (self.citation, *self.others_cited)

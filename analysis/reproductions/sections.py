@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import control as ct
 
@@ -10,12 +10,12 @@ from nlctl.diagrams import leaves
 
 from ..pages.diagram import diagram_figure, equations_of
 from ..report.document import Figure, Item, Paragraph, Section, Table
-from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part
+from .paper import FoundNumber, Paper, PaperFigure, PaperRuns, Part, Statement
 
 
-def found_numbers(paper: Paper, runs: PaperRuns) -> list[FoundNumber]:
-    """Return every statement of a paper with the value that the runs give it."""
-    return [FoundNumber(statement=s, value=float(s.value(runs))) for s in paper.statements()]
+def found_numbers(statements: Iterable[Statement], runs: PaperRuns) -> list[FoundNumber]:
+    """Return every statement with the value that the runs give it."""
+    return [FoundNumber(statement=s, value=float(s.value(runs))) for s in statements]
 
 
 def model_section(paper: Paper) -> Section:

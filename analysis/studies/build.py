@@ -14,7 +14,7 @@ import numpy as np
 
 from nlctl.errors import ParameterError
 from nlctl.faults import Fault
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 from ..metrics import Metric
 from ..robustness import (
@@ -59,8 +59,7 @@ def choice(name: str, choices: Choices, build: Callable[..., Any], folder: Path)
 def labels(name: str, choices: Choices) -> Choice:
     """Return a choice with its options as the file has them."""
     for label in choices.weights:
-        if label not in choices.options:
-            raise unknown("option", label, choices.options, f"in the weights of '{name}'")
+        check_known("option", label, choices.options, f"in the weights of '{name}'")
     weights = tuple(choices.weights.get(label, 0.0) for label in choices.options)
     return Choice(
         name=name,
@@ -130,8 +129,7 @@ def inputs_of(study: Study, diagrams: Iterable[ct.InputOutputSystem]) -> tuple[f
     labels = [list(diagram.input_labels) for diagram in diagrams]
     for names in labels:
         for name in study.inputs:
-            if name not in names:
-                raise unknown("input", name, names)
+            check_known("input", name, names)
         for name in names:
             if name not in study.inputs:
                 raise ParameterError(

@@ -44,7 +44,7 @@ from .origin import plain_study
 from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
 from .reading.written import from_toml
 from .resolve import uncertain
-from .result import Result
+from .result import Result, described
 from .sealed import (
     ANEW,
     RunFolderError,
@@ -59,7 +59,6 @@ from .sealed import (
 
 _OWN = ("study.toml", "run.json", "results.json", CONTENTS, "rows", ".lock", ".owner")
 _OWN += ("index.html", "report.json", "signals.json", "report.pdf")
-METRIC_COLUMNS = ("key", "signal", "unit", "meaning")
 
 
 def save_finding(folder: Path, finding: Finding, origin: str) -> None:
@@ -214,12 +213,9 @@ def _put_together(
     folder: Path, study: Study, content: Mapping[str, Any], origin: Mapping[str, Any]
 ) -> Result:
     """Return the result that the files of a folder make."""
-    quantities = pd.DataFrame(content["quantities"]).set_index("name")
-    requirements = pd.DataFrame(content["requirements"]).set_index("key")
-    metrics = pd.DataFrame(content["metrics"], columns=METRIC_COLUMNS).set_index("key")
-    key, rows, findings = origin_key(origin), None, []
+    tables, key, rows, findings = described(content), origin_key(origin), None, []
     if study.runs is not None:
-        design = main_design(study.runs, _space(study, quantities), study.study.seed)
+        design = main_design(study.runs, _space(study, tables["quantities"]), study.study.seed)
         rows = load_rows(folder, key, design)
     for asked in content["findings"]:
         finding = load_finding(folder, asked["key"], key)
@@ -232,9 +228,7 @@ def _put_together(
     return Result(
         folder=folder,
         study=study,
-        quantities=quantities,
-        requirements=requirements,
-        metrics=metrics,
+        **tables,
         rows=rows,
         findings=tuple(findings),
         complete=content["complete"],

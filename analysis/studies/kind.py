@@ -73,22 +73,15 @@ class Setup:
 
 
 @described_record(eq=False, made_by="Kind")
-class Ground:
+class Ground(Setup):
     """What an analysis uses while it runs."""
 
-    study: Study
-    folder: Path  # What paths in the study are relative to.
     prepared: Prepared  # The study's experiment.
     rows: Sweep | None  # The main table, with its design.
     # Runs rows here, see `nlctl.analysis.robustness.search.evaluation.Evaluate`; what a table
     # leaves out is nominal.
     simulate: Callable[[pd.DataFrame], pd.DataFrame]
     run_design: RunDesign
-
-    @property
-    def setup(self) -> Setup:
-        """What was known before."""
-        return Setup(study=self.study, folder=self.folder, experiment=self.prepared.experiment)
 
     @property
     def seed(self) -> int:
@@ -293,7 +286,7 @@ def column(rows: Sweep, name: str) -> np.ndarray:
 
 @as_annotated
 def finding_of(asked: Asked, sentence: str, **parts: Any) -> Finding:
-    """Return a finding, whose key and title `answer` fills in.
+    """Return a finding, whose key and title are filled in when it is kept.
 
     Parameters
     ----------
@@ -325,18 +318,10 @@ def finding_of(asked: Asked, sentence: str, **parts: Any) -> Finding:
     return Finding(key="", kind=asked.kind, title="", sentence=sentence, **parts)
 
 
-def answer(key: str, asked: Asked, ground: Ground) -> Finding | None:
-    """Run one analysis."""
-    finding = asked.definition.run(asked, ground)
-    if finding is None:
-        return None
-    return _headed(key, asked, finding)
-
-
-def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Finding:
+def unanswered(asked: Asked, error: UsageError, runs: int = 0) -> Finding:
     """Return what replaces an analysis that its `runs` or the loop do not admit."""
     # What the study claims of it is neither shown nor refuted.
-    finding = finding_of(
+    return finding_of(
         asked,
         f"Not answered: {error}.",
         claim=asked.claim or "the analysis has an answer",
@@ -345,8 +330,8 @@ def unanswered(key: str, asked: Asked, error: UsageError, runs: int = 0) -> Find
         runs=runs,
         is_answered=False,
     )
-    return _headed(key, asked, finding)
 
 
-def _headed(key: str, asked: Asked, finding: Finding) -> Finding:
+def headed(key: str, asked: Asked, finding: Finding) -> Finding:
+    """Return a finding with its key, and with the heading that the study or the key gives it."""
     return replace(finding, key=key, title=asked.title or key.replace("-", " ").capitalize())

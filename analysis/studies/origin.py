@@ -22,7 +22,7 @@ from ..loop_record import (
 )
 from ..robustness import Prepared, diagrams
 from ..robustness.runs.identity import differences_of, experiment_facts, labels_text
-from .file.schema import Study, keyed
+from .file.schema import Study, keyed, study_data
 from .kind import Setup
 
 
@@ -87,7 +87,7 @@ def diagram_differences(origin: Mapping[str, Any], diagram: Any) -> str:
 
 def plain_study(study: Study) -> dict[str, Any]:
     """Return a study as a record has it."""
-    return from_json(as_json(study.model_dump(mode="json", exclude_unset=True, exclude_none=True)))
+    return from_json(as_json(study_data(study)))
 
 
 def version_differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from scipy import stats
 
 from nlctl.errors import ParameterError, UnknownNameError, UsageError
 from nlctl.host.former_name import present_name, warn_of_it
-from nlctl.names import unknown
+from nlctl.names import check_known, unknown
 from nlctl.paper import named_example
 
 from ..catalogue import named_block
@@ -180,13 +180,11 @@ def uncertain(name: str, law: Law) -> Uncertain:
 def _frozen(name: str, law: str, parameters: Mapping[str, float]) -> Any:
     generic = stats.rv_continuous | stats.rv_discrete
     laws = {key: thing for key, thing in vars(stats).items() if isinstance(thing, generic)}
-    if law not in laws:
-        raise unknown("law", law, laws, "of scipy.stats")
+    check_known("law", law, laws, "of scipy.stats")
     shapes = [part.strip() for part in (laws[law].shapes or "").split(",") if part.strip()]
     allowed = [*shapes, "loc", *(["scale"] if isinstance(laws[law], stats.rv_continuous) else [])]
     for key in parameters:
-        if key not in allowed:
-            raise unknown("parameter", key, allowed, f"of the law {law}")
+        check_known("parameter", key, allowed, f"of the law {law}")
     missing = [shape for shape in shapes if shape not in parameters]
     if missing:
         raise ParameterError(f"'{name}': the law {law} needs {', '.join(missing)} as well")

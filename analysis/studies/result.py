@@ -11,7 +11,7 @@ import pandas as pd
 
 from nlctl.attributes import described_record
 from nlctl.host.notebook import table_html
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted, some_of
 
 from ..robustness.runs.sweep import Sweep
@@ -21,6 +21,19 @@ from .sealed import as_json, origin_key
 
 LISTED = 400
 """Lines of a table that ``report.json`` holds as well; longer ones are files next to it."""
+
+
+_COLUMNS = {  # of tables; None: those that their rows have
+    "quantities": None,
+    "requirements": None,
+    "metrics": ("key", "signal", "unit", "meaning"),
+}
+
+
+def described(rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a study varies, requires and measures as tables, from the rows of each."""
+    tables = {name: pd.DataFrame(rows[name], columns=names) for name, names in _COLUMNS.items()}
+    return {name: table.set_index(table.columns[0]) for name, table in tables.items()}
 
 
 @described_record(eq=False, made_by="run")
@@ -101,8 +114,7 @@ class Result:
     def __getitem__(self, key: str) -> Finding:
         """Return the finding with this key."""
         findings = {finding.key: finding for finding in self.findings}
-        if key not in findings:
-            raise unknown("finding", key, findings)
+        check_known("finding", key, findings)
         return findings[key]
 
     def plain(self) -> dict[str, Any]:
@@ -113,10 +125,7 @@ class Result:
         dict
             Title, verdict, notes and findings.
         """
-        tables = {
-            name: getattr(self, name).reset_index().to_dict("records")
-            for name in ("quantities", "requirements", "metrics")
-        }
+        tables = {name: getattr(self, name).reset_index().to_dict("records") for name in _COLUMNS}
         rows = None if self.rows is None else {"done": self.rows.done}
         return as_json(
             {

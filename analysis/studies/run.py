@@ -16,17 +16,19 @@ from nlctl.annotations import as_annotated
 from nlctl.errors import UsageError
 from nlctl.host.files import replace_file
 
-from ..robustness import Design, Prepared, evaluate, nominal, prepare
+from ..robustness import Design, Experiment, Prepared, evaluate, nominal, prepare
 from ..robustness.runs.parquet import parquet
 from ..robustness.runs.progress import Progress
 from ..robustness.runs.store import StoreError, locked
 from ..robustness.runs.sweep import Sweep, load, sweep
 from .build import main_design
-from .file.schema import Study, keyed
+from .code.record import study_digest
+from .code.rule import remember_code
+from .file.schema import Study, keyed, study_data
 from .finding import Finding
-from .folder import METRIC_COLUMNS, checked, load_finding, load_run, load_study, save_finding
+from .folder import checked, load_finding, load_run, load_study, save_finding
 from .intact.contents import seal, unseal
-from .kind import Ground, Setup, answer, unanswered
+from .kind import Ground, Setup, headed, unanswered
 from .origin import (
     compared_differences,
     loop_differences,
@@ -35,16 +37,12 @@ from .origin import (
     version_differences,
 )
 from .reading.parse import StudyFile, read_study
-from .reading.written import remember_run, to_toml
-from .result import Result
+from .reading.written import to_toml
+from .result import Result, described
 from .sealed import RunFolderError, origin_key, write_json
 
-_OWN = (
-    ".lock",
-    ".owner",
-    "..owner.",
-    ".study.toml.",
-)  # what `locked` makes, and a killed run leaves
+# what `locked` makes, and a killed run leaves
+_OWN = (".lock", ".owner", "..owner.", ".study.toml.")
 
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], object] | None]]
 """``watch(title)`` is entered around every sweep and gives its `progress`."""
@@ -55,13 +53,16 @@ def _unwatched(title: str) -> AbstractContextManager[None]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Way:
-    """How rows are run, and what they are computed from."""
+class _Run:
+    """A study that is run in a folder: what, how, and from what its results follow."""
 
+    file: Setup
+    folder: Path
+    prepared: Prepared
+    origin: Mapping[str, Any]
     executor: Executor | None
     threads: int | None
     watch: Watch
-    origin: Mapping[str, Any]
 
     @property
     def key(self) -> str:
@@ -152,27 +153,35 @@ def run(
         _claim(file, folder, resume, force)
         prepared = prepare(file.experiment)
         origin = _stamped(file, prepared, folder)
-        remember_run(file.study, file.folder)
-        way = _Way(executor=executor, threads=threads, watch=watch, origin=origin)
+        remember_code(file.study, study_digest(study_data(file.study)), file.folder)
+        going = _Run(
+            file=file,
+            folder=folder,
+            prepared=prepared,
+            origin=origin,
+            executor=executor,
+            threads=threads,
+            watch=watch,
+        )
         before = unseal(folder)
-        result = _through(file, prepared, folder, way)
-        seal(result, way.key, before)
+        result = _through(going)
+        seal(result, going.key, before)
     return result
 
 
-def _through(setup: Setup, prepared: Prepared, folder: Path, way: _Way) -> Result:
+def _through(run: _Run) -> Result:
     """Run the main table, then every analysis that is not done yet."""
-    study, every = setup.study, keyed(setup.study)
-    rows, notes, findings = None, unseen_notes(way.origin), []
+    study, folder, every = run.file.study, run.folder, keyed(run.file.study)
+    rows, notes, findings = None, unseen_notes(run.origin), []
     complete, interrupted = True, False
     if study.runs is not None:
-        rows = _main_rows(setup, every, prepared, folder, way)
+        rows = _main_rows(run, every)
         notes += rows.notes
         complete, interrupted = rows.complete or bool(rows.decided), rows.interrupted
     for key, asked in every.items() if complete else ():
-        finding, sweeps = load_finding(folder, key, way.key), []
+        finding, sweeps = load_finding(folder, key, run.key), []
         if finding is None and not interrupted:
-            ground = _ground(setup, prepared, rows, folder / key, way, sweeps)
+            ground = _ground(run, rows, key, sweeps)
             try:
                 finding = _answered(key, asked, ground, sweeps)
             except KeyboardInterrupt:
@@ -180,70 +189,71 @@ def _through(setup: Setup, prepared: Prepared, folder: Path, way: _Way) -> Resul
             notes += [note for done in sweeps for note in done.notes]
             interrupted = interrupted or any(done.interrupted for done in sweeps)
             if finding is not None:
-                save_finding(folder, finding, way.key)
+                save_finding(folder, finding, run.key)
         if finding is None:
             complete = False
             break
         findings.append(finding)
-    return _result(
-        study, prepared, folder, rows, findings, complete, interrupted, notes, way.origin
+    return Result(
+        folder=folder,
+        study=study,
+        **described(_rows_of(run.prepared.experiment)),
+        rows=rows,
+        findings=tuple(findings),
+        complete=complete,
+        interrupted=interrupted,
+        notes=tuple(notes),
+        origin=run.origin,
     )
 
 
 def _answered(key: str, asked: Any, ground: Ground, sweeps: Sequence[Sweep]) -> Finding | None:
     """Run one analysis; what it may not be made of costs it alone, not what others have found."""
     try:
-        return answer(key, asked, ground)
+        finding = asked.definition.run(asked, ground)
     except (StoreError, RunFolderError):
         raise
     except UsageError as error:
-        return unanswered(key, asked, error, sum(done.done for done in sweeps))
+        finding = unanswered(asked, error, sum(done.done for done in sweeps))
+    return None if finding is None else headed(key, asked, finding)
 
 
-def _main_rows(
-    setup: Setup, every: Mapping[str, Any], prepared: Prepared, folder: Path, way: _Way
-) -> Sweep:
+def _main_rows(run: _Run, every: Mapping[str, Any]) -> Sweep:
     """Run the main table, or as much of it as the analyses need."""
-    study = setup.study
+    study = run.file.study
     assert study.runs is not None
-    design = main_design(study.runs, prepared.experiment.space, study.study.seed)
+    design = main_design(study.runs, run.prepared.experiment.space, study.study.seed)
     users = [(key, a) for key, a in every.items() if a.definition.needs_rows]
     key, only = users[0] if len(users) == 1 else ("", None)
-    if only is not None and (stop := only.definition.stop) is not None:
-        if load_finding(folder, key, way.key) is not None:
-            return replace(load(folder / "rows", design), decided=True)
-        ends = stop(only, design)
-        return _swept(prepared, design, folder / "rows", way, "rows", stop=ends)
-    return _swept(prepared, design, folder / "rows", way, "rows")
+    stop = None
+    if only is not None and only.definition.stop is not None:
+        if load_finding(run.folder, key, run.key) is not None:
+            return replace(load(run.folder / "rows", design), decided=True)
+        stop = only.definition.stop(only, design)
+    return _swept(run, run.prepared, design, stop=stop)
 
 
-def _ground(
-    setup: Setup,
-    prepared: Prepared,
-    rows: Sweep | None,
-    folder: Path,
-    way: _Way,
-    sweeps: list[Sweep],
-) -> Ground:
-    middle = nominal(prepared.experiment.space)
+def _ground(run: _Run, rows: Sweep | None, part: str, sweeps: list[Sweep]) -> Ground:
+    middle = nominal(run.prepared.experiment.space)
 
     def simulate(table: pd.DataFrame) -> pd.DataFrame:
         fixed = {name: value for name, value in middle.items() if name not in table.columns}
-        return evaluate(prepared, table.assign(**fixed), threads=way.threads)
+        return evaluate(run.prepared, table.assign(**fixed), threads=run.threads)
 
     def run_design(design: Design, of: Prepared | None = None) -> Sweep:
-        if of is not None and (change := compared_differences(way.origin, folder.name, of)):
+        if of is not None and (change := compared_differences(run.origin, part, of)):
             raise RunFolderError(
-                f"the loops of '{folder.name}' have changed since the run began ({change}): put "
+                f"the loops of '{part}' have changed since the run began ({change}): put "
                 "them back as they were and continue with --resume"
             )
-        sweeps.append(_swept(of or prepared, design, folder / "rows", way, folder.name))
+        sweeps.append(_swept(run, of or run.prepared, design, part))
         return sweeps[-1]
 
     return Ground(
-        study=setup.study,
-        folder=setup.folder,
-        prepared=prepared,
+        study=run.file.study,
+        folder=run.file.folder,
+        experiment=run.prepared.experiment,
+        prepared=run.prepared,
         rows=rows,
         simulate=simulate,
         run_design=run_design,
@@ -251,24 +261,24 @@ def _ground(
 
 
 def _swept(
+    run: _Run,
     prepared: Prepared,
     design: Design,
-    folder: Path,
-    way: _Way,
-    title: str,
+    part: str = "",
     stop: Callable[[Progress], Any] | None = None,
 ) -> Sweep:
-    with way.watch(title) as progress:
+    """Run rows into the folder of a part; of none: into that of the main table."""
+    with run.watch(part or "rows") as progress:
         return sweep(
             prepared,
             design,
-            folder,
-            executor=way.executor,
-            threads=way.threads,
+            run.folder / part / "rows",
+            executor=run.executor,
+            threads=run.threads,
             progress=progress,
             resume=True,
             stop=stop,
-            identity={"origin": way.key},
+            identity={"origin": run.key},
         )
 
 
@@ -330,14 +340,6 @@ def _refuse_another_loop(folder: Path, before: Mapping[str, Any], now: Mapping[s
         )
 
 
-def rerun_file(folder: Path, *, trust: bool = False) -> StudyFile:
-    """Return the study of a run folder, validated against the loop of today; see `reopened`."""
-    checked(folder)
-    place = load_run(folder)["study_folder"]
-    load_study(folder)
-    return read_study(folder / "study.toml", folder=folder / place, trust=trust, received=True)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reopened:
     """A run whose loop is the one that its results were computed from."""
@@ -349,31 +351,27 @@ class Reopened:
 
 def reopened(folder: Path, *, trust: bool = False) -> Reopened:
     """Return the study of a run with its loop, to draw from it."""
-    file, before = rerun_file(folder, trust=trust), load_run(folder)["origin"]
+    checked(folder)
+    before = load_run(folder)
+    load_study(folder)
+    home = folder / before["study_folder"]
+    file = read_study(folder / "study.toml", folder=home, trust=trust, received=True)
     prepared = prepare(file.experiment)
     now = origin_of(file, prepared)
-    _refuse_another_loop(folder, before, now)
-    return Reopened(file=file, prepared=prepared, versions=version_differences(before, now))
+    _refuse_another_loop(folder, before["origin"], now)
+    versions = version_differences(before["origin"], now)
+    return Reopened(file=file, prepared=prepared, versions=versions)
 
 
-def _result(
-    study: Study,
-    prepared: Prepared,
-    folder: Path,
-    rows: Sweep | None,
-    findings: Sequence[Finding],
-    complete: bool,
-    interrupted: bool,
-    notes: Sequence[str],
-    origin: Mapping[str, Any],
-) -> Result:
-    experiment, space = prepared.experiment, prepared.experiment.space
-    quantities = [
+def _rows_of(experiment: Experiment) -> dict[str, list[dict[str, Any]]]:
+    """Return what an experiment varies, requires and measures, a row each, as files have it."""
+    space = experiment.space
+    numbers = [
         {"name": q.name, "law": q.law_text, "low": q.box[0], "high": q.box[1], "unit": q.unit}
         | {"nominal": q.nominal}
         for q in space.quantities
     ]
-    quantities += [
+    choices = [
         {"name": c.name, "law": space.laws[c.name], "nominal": c.nominal} for c in space.choices
     ]
     requirements = [
@@ -384,16 +382,4 @@ def _result(
         {"key": m.key, "signal": ", ".join(m.signals), "unit": m.unit, "meaning": m.meaning}
         for m in experiment.metrics
     ]
-    return Result(
-        folder=folder,
-        study=study,
-        quantities=pd.DataFrame(quantities).set_index("name"),
-        requirements=pd.DataFrame(requirements).set_index("key"),
-        metrics=pd.DataFrame(metrics, columns=METRIC_COLUMNS).set_index("key"),
-        rows=rows,
-        findings=tuple(findings),
-        complete=complete,
-        interrupted=interrupted,
-        notes=tuple(notes),
-        origin=origin,
-    )
+    return {"quantities": numbers + choices, "requirements": requirements, "metrics": metrics}

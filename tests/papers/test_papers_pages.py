@@ -8,6 +8,7 @@ from places import ROOT
 
 import nlctl
 from nlctl.analysis.papers import named_paper, paper_names
+from nlctl.analysis.reproductions.cases import simulate_cases
 from nlctl.analysis.reproductions.page import compose_paper, paper_page
 from nlctl.analysis.reproductions.paper import FoundNumber, Statement
 from nlctl.analysis.reproductions.sections import found_numbers
@@ -26,7 +27,7 @@ def runs():
 
     def of(name):
         if name not in made:
-            made[name] = named_paper(name).paper.simulate(lambda amount: None)
+            made[name] = simulate_cases(named_paper(name).paper.cases)
         return made[name]
 
     return of
@@ -37,7 +38,7 @@ def runs():
 def test_every_number_is_reached_but_those_that_are_refuted(name, runs):
     """And what is refuted says whose statement it is, and stands under what does not reproduce."""
     paper = named_paper(name).paper
-    found = found_numbers(paper, runs(name))
+    found = found_numbers(paper.statements, runs(name))
     missed = {f.statement.quantity for f in found if not f.holds}
     assert missed == REFUTED.get(name, set())
     assert all(f.statement.by for f in found if not f.holds)
@@ -62,7 +63,7 @@ def test_a_record_names_what_it_has(name):
     """Statements are of its parts and of its sources, and a number is a number."""
     paper = named_paper(name).paper
     parts, sources = {p.key for p in paper.parts}, {s.key for s in paper.sources}
-    statements = paper.statements()
+    statements = paper.statements
     assert paper.key == name
     assert {s.part for s in statements} <= parts
     assert {s.read for s in statements} - {""} <= sources
@@ -76,7 +77,7 @@ def test_what_could_not_be_read_is_said(name):
     """No article was read: each page says so, and where its numbers were."""
     paper = named_paper(name).paper
     assert "could not be read" in " ".join(paper.open_points)
-    assert {s.read for s in paper.statements()} & {source.key for source in paper.sources}
+    assert {s.read for s in paper.statements} & {source.key for source in paper.sources}
 
 
 def test_what_is_found_of_a_bound():

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as MatplotlibFigure
 
-from nlctl.analysis.paper import CASES, METRICS, TAIL, CaseRun, expectations
+from nlctl.analysis.paper import CASES, METRICS, TAIL, expectations
 from nlctl.analysis.paper.page.report import paper_report
 from nlctl.analysis.report import (
     Claim,
@@ -26,6 +26,7 @@ from nlctl.analysis.report import (
     render_json,
     write_report,
 )
+from nlctl.analysis.reproductions.cases import PaperRun
 from nlctl.host.files import replace_file
 
 
@@ -35,10 +36,10 @@ def made_up_runs():
     wanted = {(e.case, e.metric): e.value for e in expectations()}
     runs = {}
     for case in CASES:
-        names = case.diagram.output_labels
+        names = case.make().output_labels
         signals = {name: np.sin(t + i) for i, name in enumerate(names)} | {"zeta": 1 + t / 40}
         metrics = {m.key: wanted.get((case.key, m.key), 0.1) for m in METRICS}
-        runs[case.key] = CaseRun(case=case, time=t, signals=signals, metrics=metrics)
+        runs[case.key] = PaperRun(case=case, time=t, signals=signals, metrics=metrics)
     return runs
 
 
@@ -196,7 +197,7 @@ def test_a_missed_figure_is_the_first_sentence(runs):
     report = paper_report(spoiled)
     assert report.verdict == (
         f"Not reproduced: 1 of {len(expectations())} numbers is off, most of all max |u| of "
-        "case 1 (13 instead of 12.052217)."
+        "Example 1, as published, diagonal centres (13 instead of 12.052217)."
     )
     assert [c.holds for c in report.claims] == [True, True, True, True, False]
     assert 'class="badge fail"' in render_html(report)

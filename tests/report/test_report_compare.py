@@ -12,12 +12,8 @@ from hypothesis import strategies as st
 from rows import each_row
 from test_report_page import HOSTILE, Reader
 
-from nlctl.analysis.cli.report import (
-    check_report_options,
-    compare_reports,
-    finish_report,
-    write_gallery_of,
-)
+from nlctl.analysis.cli.report import compare_reports, write_gallery_of
+from nlctl.analysis.cli.written_page import check_report_options, finish_report
 from nlctl.analysis.report import (
     Claim,
     Report,

@@ -22,7 +22,7 @@ from nlctl.analysis.pages import proof as ledger_text
 from nlctl.analysis.pages.notation import formulas
 from nlctl.analysis.paper import BOUND
 from nlctl.analysis.paper.burst import through_the_burst
-from nlctl.analysis.paper.evidence import evidence, far_runs_in_background
+from nlctl.analysis.paper.evidence import FarRuns, evidence, far_runs_in_background
 from nlctl.analysis.paper.figures import after_burst
 from nlctl.analysis.paper.page import proof_text as text
 from nlctl.analysis.paper.page.proof import lyapunov_sections
@@ -283,7 +283,7 @@ def test_a_long_run_predicts_from_its_beginning_alone():
 def test_the_burst_is_at_the_top_of_the_part():
     """First the sentence with its time, then the figure with the time and what was predicted."""
     run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2)
-    first = lyapunov_sections(found(), {"2": run})[0]
+    first = lyapunov_sections(found(), FarRuns(runs={"2": run}))[0]
     words, figure, *_ = first.items
     assert isinstance(words, Paragraph)
     assert f"t = {run.burst:.1f} s" in words.text
@@ -299,7 +299,7 @@ def test_without_a_burst_none_is_claimed():
     run = dataclasses.replace(
         long_run(nlctl.paper.example_2(), 20.0), predictions=(found()[2].slow_drift,)
     )
-    first = lyapunov_sections(found(), {"2": run})[0]
+    first = lyapunov_sections(found(), FarRuns(runs={"2": run}))[0]
     assert first.items[0].text.startswith("No burst within 20 s")
     assert "proof-burst" not in {i.key for i in first.items if isinstance(i, Figure)}
 
@@ -380,7 +380,9 @@ def carried():
 def test_the_verdict_and_the_claims_say_what_becomes_of_the_loop():
     """The proof is refuted; that signals stay bounded is open, whatever the burst looks like."""
     run = read_record(long_run(nlctl.paper.example_2(), 210.0))
-    report = paper_report(made_up_runs(), proofs=found(), far={"2": run}, burst=carried())
+    report = paper_report(
+        made_up_runs(), proofs=found(), far=FarRuns(runs={"2": run}, burst=carried())
+    )
     assert f"keeps |e₁| ≤ {BOUND:g} from 10 s on" in report.verdict
     assert "Whether all signals stay bounded for all time is open" in report.verdict
     assert f"loses the sign of its gain at {run.burst:.0f} s" in report.verdict
@@ -425,7 +427,7 @@ def test_following_is_a_bound_of_the_error(key):
 def test_nothing_is_called_unbounded():
     """What a run shows is that it was given up: every sentence of the part is worded so."""
     run = dataclasses.replace(burst(), predictions=(found()[2].slow_drift,) * 2)
-    first = lyapunov_sections(found(), {"2": run}, carried())[0]
+    first = lyapunov_sections(found(), FarRuns(runs={"2": run}, burst=carried()))[0]
     words = [i.text for i in first.items if isinstance(i, Paragraph)]
     words += [i.caption for i in first.items if isinstance(i, Figure | Table)]
     told = " ".join(words)
@@ -442,7 +444,7 @@ def test_every_forecast_is_marked():
     still = long_run(nlctl.paper.example_2(), 210.0)
     failed = dataclasses.replace(still.predictions[0], rest=1.5, rest_range=(1.4, 1.6))
     far = {"2": run, "1": dataclasses.replace(still, predictions=(failed, *still.predictions))}
-    first = lyapunov_sections(found(), far)[0]
+    first = lyapunov_sections(found(), FarRuns(runs=far))[0]
     (table,) = (t for t in tables([first]) if t.caption == text.FORECASTS)
     assert table.status == "outcome"
     outcomes = [row[-1] for row in table.rows]

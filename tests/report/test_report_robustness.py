@@ -20,6 +20,7 @@ from studies_example import LOOP
 
 from nlctl.analysis import figures as figures
 from nlctl.analysis.cli.study_report import report_study
+from nlctl.analysis.cli.written_page import PageOptions
 from nlctl.analysis.figures.labels import plain
 from nlctl.analysis.pages.study.claims import claims, refusal, verdict
 from nlctl.analysis.pages.study.histories import histories
@@ -32,7 +33,7 @@ from nlctl.analysis.robustness import Space, Uncertain, confidence_sequence, ind
 from nlctl.analysis.robustness.search.radius import size_of
 from nlctl.analysis.robustness.stl.spec import FAILED
 from nlctl.analysis.studies import load_result, read_study, run
-from nlctl.analysis.studies.kind import unanswered
+from nlctl.analysis.studies.kind import headed, unanswered
 from nlctl.analysis.studies.kinds import KINDS
 from nlctl.analysis.studies.page.deviations import deviations_table
 from nlctl.analysis.studies.page.running import running
@@ -350,7 +351,7 @@ def test_an_analysis_without_an_answer_says_why(result):
     """
     of = dict(zip((f.key for f in result.findings), result.study.analysis, strict=True))
     error = UsageError("the rows do not admit it")
-    lost = {key: unanswered(key, asked, error) for key, asked in of.items()}
+    lost = {k: headed(k, asked, unanswered(asked, error)) for k, asked in of.items()}
     for gone in ({*lost}, {"sobol", "probability"}):
         findings = tuple(lost[f.key] if f.key in gone else f for f in result.findings)
         part = replace(result, findings=findings)
@@ -638,11 +639,11 @@ def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     """From a study file, which is run first and taken up again, or from a folder, loop or not."""
     monkeypatch.chdir(tmp_path)
     path = written(tmp_path, '[runs]\nsize = 20\n[[analysis]]\nkind = "probability"\n')
-    page, found = report_study(path)
+    page, found = report_study(path, PageOptions())
     assert page.parent == found.folder == (tmp_path / "reports" / "study").relative_to(tmp_path)
     first = page.read_text(encoding="utf-8")
     assert f"nlctl report {path}" in first
-    page, again = report_study(found.folder, tmp_path / "page")
+    page, again = report_study(found.folder, PageOptions(out=tmp_path / "page"))
     assert page == tmp_path / "page" / "index.html"
     listed = json.loads((tmp_path / "page" / "report.json").read_text(encoding="utf-8"))["files"]
     assert listed
@@ -653,7 +654,7 @@ def test_commands_write_the_report(tmp_path, monkeypatch, capsys):
     assert is_same
     assert "nlctl report reports/study" in after
     path.with_name("loop.py").unlink()
-    page, _ = report_study(found.folder, tmp_path / "page")
+    page, _ = report_study(found.folder, PageOptions(out=tmp_path / "page"))
     assert "study_fans" not in page.read_text(encoding="utf-8")
     assert "the report has no fans" in capsys.readouterr().err
 

@@ -12,6 +12,7 @@ from rows import each_row
 
 from nlctl import DeadZone
 from nlctl.analysis.cli.study_report import report_study
+from nlctl.analysis.cli.written_page import PageOptions
 from nlctl.analysis.pages.study.report import study_part, study_report
 from nlctl.analysis.report.document import Figure, Paragraph, Table
 from nlctl.analysis.studies import Asked, Kind, StudyError, load_result, plan, read_study, run
@@ -229,7 +230,7 @@ def test_the_report_has_its_section_claim_method_and_source(folder, result):
     assert "plant.py:Clip" in asked.items[0].text
     (found,) = (item for item in study_part([(result, None)])[1].items if isinstance(item, Table))
     assert ("Spread of a column", result["spread"].sentence) in found.rows
-    page, _ = report_study(folder / "run")
+    page, _ = report_study(folder / "run", PageOptions())
     assert result["spread"].sentence.replace("'", "&#39;") in page.read_text(encoding="utf-8")
 
 

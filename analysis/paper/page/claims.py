@@ -8,33 +8,37 @@ import numpy as np
 
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Claim
-from .. import BOUND, HORIZON, TAIL, CaseRun, Check
+from ...reproductions.cases import PaperRun
+from ...reproductions.paper import FoundNumber, PaperRuns
+from .. import BOUND, HORIZON, TAIL
 from ..burst import Burst
-from ..evidence import Evidence
+from ..evidence import Evidence, FarRuns
 
 PAPER = "the paper"
 ACTUATED = ("1", "2", "1-backlash", "2-dead-zone")  # cases: both examples, both actuators
 
 
 def paper_verdict(
-    runs: Mapping[str, CaseRun], compared: Sequence[Check], far: Mapping[str, LongRun]
+    runs: PaperRuns, compared: Sequence[FoundNumber], far: Mapping[str, LongRun]
 ) -> str:
     """Return the report's first sentence, and how the loops end far beyond 20 s."""
     total = len(compared)
-    missed = [c for c in compared if not c.passed]
+    missed = [c for c in compared if not c.holds]
     if missed:
-        apart = [np.nan_to_num(c.error / c.expectation.tolerance, nan=np.inf) for c in missed]
+        apart = [np.nan_to_num(c.error / c.statement.tolerance, nan=np.inf) for c in missed]
         worst = missed[int(np.argmax(apart))]
         are = "is" if len(missed) == 1 else "are"
         return (
             f"Not reproduced: {len(missed)} of {total} numbers {are} off, most of all "
-            f"{worst.metric.meaning} of case {worst.expectation.case} "
-            f"({worst.value:.8g} instead of {worst.expectation.printed})."
+            f"{worst.statement.quantity} of {_titled(worst.statement.part)}, "
+            f"{worst.statement.case} ({worst.value:.8g} instead of {worst.statement.printed})."
         )
     reproduced = (
         f"{_tracking(runs)}, and all {total} numbers agree with an independent computation."
     )
-    bursts = [f"{_loop(run)} loses the sign of its gain at {run.burst:.0f} s" for run in _lost(far)]
+    bursts = [
+        f"{_titled(run.loop)} loses the sign of its gain at {run.burst:.0f} s" for run in _lost(far)
+    ]
     if not bursts:
         return reproduced
     return (
@@ -44,7 +48,7 @@ def paper_verdict(
     )
 
 
-def _tracking(runs: Mapping[str, CaseRun]) -> str:
+def _tracking(runs: PaperRuns) -> str:
     """Return what the errors of the paper's loops are, behind both actuators."""
     loose = [runs[key] for key in ACTUATED if not _tracks(runs[key])]
     if loose:
@@ -56,7 +60,7 @@ def _tracking(runs: Mapping[str, CaseRun]) -> str:
     )
 
 
-def paper_claims(runs: Mapping[str, CaseRun]) -> list[Claim]:
+def paper_claims(runs: PaperRuns) -> list[Claim]:
     """Return what the paper claims and these runs can show, with what was found."""
     asked = (
         ("1", "Example 1: the output tracks the reference despite the dead zone"),
@@ -78,9 +82,9 @@ def paper_claims(runs: Mapping[str, CaseRun]) -> list[Claim]:
     ]
 
 
-def number_claims(compared: Sequence[Check]) -> list[Claim]:
+def number_claims(compared: Sequence[FoundNumber]) -> list[Claim]:
     """Return our own claim: that what is found here is what another computation finds."""
-    reached = sum(c.passed for c in compared)
+    reached = sum(c.holds for c in compared)
     return [
         Claim(
             text="All numbers agree with an independent computation",
@@ -92,11 +96,11 @@ def number_claims(compared: Sequence[Check]) -> list[Claim]:
     ]
 
 
-def _tracks(run: CaseRun) -> bool:
+def _tracks(run: PaperRun) -> bool:
     return run.metrics["tail_max_e"] <= BOUND
 
 
-def _error(run: CaseRun) -> str:
+def _error(run: PaperRun) -> str:
     """Return the largest late error; all its digits are among the numbers to reach."""
     return f"max |e₁| = {run.metrics['tail_max_e']:.3f} for t ≥ {TAIL:g} s"
 
@@ -105,16 +109,14 @@ def _lost(far: Mapping[str, LongRun]) -> list[LongRun]:
     return [run for run in far.values() if np.isfinite(run.burst)]
 
 
-def _loop(run: LongRun) -> str:
-    return run.loop.replace("_", " ").capitalize()
+def _titled(name: str) -> str:
+    return name.replace("_", " ").replace("-", " ").capitalize()
 
 
-def theorem_claims(
-    proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None = None
-) -> list[Claim]:
+def theorem_claims(proofs: Mapping[int, Evidence], far: FarRuns) -> list[Claim]:
     """Return what the paper claims for all time."""
     claims = [_theorem()] if proofs else []
-    return claims + [_bounded(run, burst) for run in _lost(far)]
+    return claims + [_bounded(run, far.burst) for run in _lost(far.runs)]
 
 
 def proof_claims(proofs: Mapping[int, Evidence]) -> list[Claim]:
@@ -165,7 +167,7 @@ def _bounded(run: LongRun, burst: Burst | None) -> Claim:
         carried = f"; averaged, |r| peaks at {peak:.2g} and the loop tracks again at ζ = "
         carried += f"{burst.rest:.2f}"
     return Claim(
-        text=f"{_loop(run)}: all signals stay bounded for all time",
+        text=f"{_titled(run.loop)}: all signals stay bounded for all time",
         measured=f"the gain loses its sign at {run.burst:.0f} s{carried}",
         limit="bounded for all t",
         holds=False,

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from ...report.document import Paragraph, Section, Table
-from .. import HORIZON, METRICS, TAIL, CaseRun
+from ...reproductions.cases import PaperRun
+from .. import HORIZON, METRICS, TAIL
 
-_Runs = Mapping[str, CaseRun]
+_Runs = Mapping[str, PaperRun]
 
 
 def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[Section]:
@@ -18,7 +19,7 @@ def closing_sections(runs: _Runs, numerics: pd.DataFrame | None = None) -> list[
     return [_choices(runs), _numerics(runs, numerics), _limits(runs)]
 
 
-def metric_table(caption: str, cases: Sequence[CaseRun]) -> Table:
+def metric_table(caption: str, cases: Sequence[PaperRun]) -> Table:
     """Return the headline metrics of some runs, one row each."""
     keys = ("tail_max_e", "tail_rms_e", "max_u", "max_r", "zeta_end", "max_W", "max_delta_hat")
     by_key = {m.key: m for m in METRICS}
@@ -52,7 +53,7 @@ def _choices(runs: _Runs) -> Section:
     )
 
 
-def _same_verdict(shown: Sequence[CaseRun]) -> bool:
+def _same_verdict(shown: Sequence[PaperRun]) -> bool:
     """Whether every reading tracks as well as the default, to a quarter of its error."""
     base = {r.case.example: r.metrics["tail_max_e"] for r in shown if r.case.group == "published"}
     return all(r.metrics["tail_max_e"] <= 1.25 * base[r.case.example] for r in shown)
@@ -113,5 +114,5 @@ def _limits(runs: _Runs) -> Section:
     )
 
 
-def _drift(run: CaseRun) -> float:
+def _drift(run: PaperRun) -> float:
     return float(run.signals["zeta"][-1] - run.signals["zeta"][run.time >= TAIL][0])

@@ -12,31 +12,25 @@ from ...pages.notation import formulas
 from ...pages.proof import ledger_section
 from ...report.document import Figure, Item, Paragraph, Section, Table, captioned
 from ..burst import Burst
-from ..evidence import FAR_HORIZONS, LOOK, Evidence
+from ..evidence import FAR_HORIZONS, LOOK, NO_FAR_RUNS, Evidence, FarRuns
 from ..figures import after_burst
 from . import proof_text as text
 
 
-def lyapunov_sections(
-    proofs: Mapping[int, Evidence],
-    far: Mapping[str, LongRun] | None = None,
-    burst: Burst | None = None,
-) -> list[Section]:
+def lyapunov_sections(proofs: Mapping[int, Evidence], far: FarRuns = NO_FAR_RUNS) -> list[Section]:
     """Compose the part from what was found."""
     if not proofs:
         return []
     parts = [section for number, one in proofs.items() for section in _example(number, one)]
-    return [_finding(proofs, far or {}, burst), _lemma(), *parts]
+    return [_finding(proofs, far), _lemma(), *parts]
 
 
-def _finding(
-    proofs: Mapping[int, Evidence], far: Mapping[str, LongRun], burst: Burst | None
-) -> Section:
+def _finding(proofs: Mapping[int, Evidence], far: FarRuns) -> Section:
     return Section(
         key="proof",
         title="The stability proof, and simulations far beyond 20 s",
         items=[
-            *_burst(far, burst),
+            *_burst(far.runs, far.burst),
             _slow_drift_table(proofs),
             *(Paragraph(text=words, code=command) for words, command in text.COMMANDS),
         ],
@@ -144,29 +138,19 @@ def _lemma() -> Section:
 
 
 def _example(number: int, one: Evidence) -> list[Section]:
-    key = f"proof-{number}"
+    key, name = f"proof-{number}", f"Example {number}"
+    folded = (
+        ("bound", "V, its bounds, and their conservatism", _bound(key, one)),
+        ("steps", "margins of all steps over time", _margins(key, one)),
+        ("constants", "constants of the proof", [_constants(one)]),
+    )
     return [
-        ledger_section(one.ledger, key, f"Example {number}: the proof line by line", level=3),
-        Section(
-            key=f"{key}-bound",
-            title=f"Example {number}: V, its bounds, and their conservatism",
-            level=3,
-            folded=True,
-            items=[*_bound(key, one)],
-        ),
-        Section(
-            key=f"{key}-steps",
-            title=f"Example {number}: margins of all steps over time",
-            level=3,
-            folded=True,
-            items=[*_margins(key, one)],
-        ),
-        Section(
-            key=f"{key}-constants",
-            title=f"Example {number}: constants of the proof",
-            level=3,
-            folded=True,
-            items=[_constants(one)],
+        ledger_section(one.ledger, key, f"{name}: the proof line by line", level=3),
+        *(
+            Section(
+                key=f"{key}-{part}", title=f"{name}: {title}", level=3, folded=True, items=[*items]
+            )
+            for part, title, items in folded
         ),
     ]
 

@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from nlctl import paper
 from nlctl.faults import NEVER, Fault, with_faults
 
 from ...report.document import History, Paragraph
-from ...reproductions.paper import (
-    FoundNumber,
-    MovedLoop,
-    Paper,
-    PaperFigure,
-    PaperRuns,
-    Part,
-    Statement,
-)
-from .. import (
-    BOUND,
-    CASES,
-    HORIZON,
-    METRICS,
-    TAIL,
-    CaseRun,
-    Check,
-    Expectation,
-    expectations,
-    run_all,
-)
+from ...reproductions.cases import PaperRun
+from ...reproductions.paper import MovedLoop, Paper, PaperFigure, Part
+from .. import BOUND, CASES, HORIZON, TAIL, expectations
 from .. import figures as histories
+from ..reproduction import expected_statement
 from . import text as text
-
-_CASES = {case.key: case for case in CASES}
-_METRICS = {metric.key: metric for metric in METRICS}
 
 _PLOTS = (
     ("tracking", histories.tracking, r"Output \(y\) and reference \(y_d\)."),
@@ -67,28 +46,6 @@ _MOVED = {  # what |u| stays below without a fault, and sliders of the actuator
     2: (5.0, ("actuator.c_r", "actuator.c_l", "plant.a")),
 }
 _SHOWN = ("tracking", "input")  # the other figures are folded
-
-
-def found_of(check: Check) -> FoundNumber:
-    """Return a number that agrees or does not as a statement and its value."""
-    return FoundNumber(statement=_statement(check.expectation), value=check.value)
-
-
-def _statement(expected: Expectation) -> Statement:
-    case = _CASES[expected.case]
-    return Statement(
-        claim="All numbers agree with an independent computation",
-        part=f"example-{case.example}",
-        case=case.title,
-        quantity=_METRICS[expected.metric].meaning,
-        printed=expected.printed,
-        tolerance=expected.tolerance,
-        value=lambda runs: runs[expected.case].metrics.get(expected.metric, math.nan),
-    )
-
-
-def _simulate(done: Callable[[float], object]) -> PaperRuns:
-    return run_all(CASES, done=lambda _: done(1))
 
 
 def _part(number: int) -> Part:
@@ -135,7 +92,7 @@ def _figure(number: int, name: str, draw: Callable, caption: str) -> PaperFigure
     )
 
 
-def _summary(run: CaseRun) -> str:
+def _summary(run: PaperRun) -> str:
     m = run.metrics
     return (
         f"max |e₁| for t ≥ {TAIL:g} s is {m['tail_max_e']:.5g}, max |u| {m['max_u']:.5g}, "
@@ -143,7 +100,7 @@ def _summary(run: CaseRun) -> str:
     )
 
 
-def _interactive(number: int, run: CaseRun) -> History:
+def _interactive(number: int, run: PaperRun) -> History:
     names = ("y", "yd", "e", "u", "v", "zeta")
     return History(
         key=f"example-{number}-history",
@@ -169,13 +126,12 @@ LV_2017 = Paper(
         *text.CONTROLLER_PART,
     ),
     parts=(_part(1), _part(2)),
-    simulate=_simulate,
-    cases=len(CASES),
-    statements=lambda: [_statement(expected) for expected in expectations()],
+    cases=CASES,
+    statements=tuple(map(expected_statement, expectations())),
     reproduced="both examples over 20 s, with either actuator",
     not_reproduced="the theorem: the lemma on which its proof depends is false",
     methods=text.METHODS_TEXT,
-    references=text.REFERENCES,
+    others_cited=text.OTHERS_CITED,
     numbers_title="Comparison with {count} reference values",
     numbers_caption=(
         "Computed by nlctl's engine from the python-control diagrams; reference: converged digits "

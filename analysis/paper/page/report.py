@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -11,27 +12,27 @@ from ... import figures
 from ...lyapunov.nussbaum.long_run import LongRun
 from ...report.document import Figure, Paragraph, Report, Section, captioned
 from ...reproductions.page import report_of
+from ...reproductions.paper import PaperRuns
 from ...reproductions.sections import model_section, part_sections
-from .. import TAIL, CaseRun, checks
+from .. import TAIL, checks
 from .. import figures as histories
-from ..burst import Burst
+from ..evidence import NO_FAR_RUNS, Evidence, FarRuns
 from . import text as text
 from .claims import number_claims, paper_claims, paper_verdict, proof_claims, theorem_claims
 from .closing import closing_sections, metric_table
-from .proof import Evidence, lyapunov_sections
-from .record import LV_2017, found_of
+from .proof import lyapunov_sections
+from .record import LV_2017
 from .rivals import rivals_section
 from .sampling import sampling_section
 
-_Runs = Mapping[str, CaseRun]
+NO_PROOFS: Mapping[int, Evidence] = MappingProxyType({})
 
 
 def paper_report(
-    runs: _Runs,
+    runs: PaperRuns,
     *,
-    proofs: Mapping[int, Evidence] | None = None,
-    far: Mapping[str, LongRun] | None = None,
-    burst: Burst | None = None,
+    proofs: Mapping[int, Evidence] = NO_PROOFS,
+    far: FarRuns = NO_FAR_RUNS,
     studies: Sequence[Section] = (),
     numerics: pd.DataFrame | None = None,
     sampling: pd.DataFrame | None = None,
@@ -41,16 +42,16 @@ def paper_report(
     """Compose the reproduction report from the runs of `nlctl.analysis.paper.CASES`."""
     compared = checks(runs)
     if sections is None:
-        sections = paper_sections(runs, proofs=proofs, far=far, burst=burst)
+        sections = paper_sections(runs, proofs=proofs, far=far)
     return report_of(
         LV_2017,
-        verdict=paper_verdict(runs, compared, far or {}),
-        lead=_lead(runs, (far or {}).get("2")),
+        verdict=paper_verdict(runs, compared, far.runs),
+        lead=_lead(runs, far.runs.get("2")),
         claims=[
             *paper_claims(runs),
-            *theorem_claims(proofs or {}, far or {}, burst),
+            *theorem_claims(proofs, far),
             *number_claims(compared),
-            *proof_claims(proofs or {}),
+            *proof_claims(proofs),
         ],
         sections=[
             *sections,
@@ -64,27 +65,25 @@ def paper_report(
 
 
 def paper_sections(
-    runs: _Runs,
+    runs: PaperRuns,
     *,
-    proofs: Mapping[int, Evidence] | None = None,
-    far: Mapping[str, LongRun] | None = None,
-    burst: Burst | None = None,
+    proofs: Mapping[int, Evidence] = NO_PROOFS,
+    far: FarRuns = NO_FAR_RUNS,
 ) -> list[Section]:
     """Return the sections of `paper_report` up to those on studies; the arguments are the same."""
-    numbers = [found_of(check) for check in checks(runs)]
     return [
         model_section(LV_2017),
         *(
             section
             for part in LV_2017.parts
-            for section in part_sections(LV_2017, part, runs, numbers)
+            for section in part_sections(LV_2017, part, runs, checks(runs))
         ),
         _exchange(runs),
-        *lyapunov_sections(proofs or {}, far, burst),
+        *lyapunov_sections(proofs, far),
     ]
 
 
-def _lead(runs: _Runs, long: LongRun | None) -> Figure:
+def _lead(runs: PaperRuns, long: LongRun | None) -> Figure:
     """Return the picture at the top: Example 2 follows its reference, and zeta drifts."""
     run = runs["2"]
     caption = text.LEAD if long is None else f"{text.LEAD} {text.LEAD_DRIFT}"
@@ -98,7 +97,7 @@ def _lead(runs: _Runs, long: LongRun | None) -> Figure:
     )
 
 
-def _exchange(runs: _Runs) -> Section:
+def _exchange(runs: PaperRuns) -> Section:
     pairs = (("1", "1-backlash"), ("2", "2-dead-zone"))
     return Section(
         key="exchange",

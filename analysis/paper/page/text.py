@@ -38,8 +38,7 @@ METHODS_TEXT = (
     "The studies draw independent samples; their probabilities have exact binomial bounds "
     "(Clopper, Pearson).",
 )
-REFERENCES = (
-    CITATION,
+OTHERS_CITED = (
     CLOPPER,
     "F. Johansson: Arb: efficient arbitrary-precision midpoint-radius interval arithmetic. IEEE "
     "Transactions on Computers 66 (2017), pp. 1281–1292. doi 10.1109/TC.2017.2690633.",

@@ -155,6 +155,11 @@ class Study(Strict):
     analysis: tuple[SerializeAsAny[Asked], ...] = Field((), description="What is asked.")
 
 
+def study_data(study: Study) -> dict[str, Any]:
+    """Return the data of a file with this study; what is left to defaults is left out."""
+    return study.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+
+
 def keyed(study: Study) -> dict[str, Any]:
     """Return the analyses by key: their own, or their kind, numbered where it is not alone."""
     named: dict[str, Any] = {}

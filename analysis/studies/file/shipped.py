@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nlctl.annotations import as_annotated
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 # a checkout has them in reports/, a wheel carries copies in its package
 FOLDERS = (Path(__file__).parents[3] / "reports", Path(__file__).parents[1] / "reports")
@@ -40,6 +40,5 @@ def shipped(name: str) -> Path:
     nlctl.errors.UnknownNameError: unknown study 'example-1-quik'; nearest: 'example-1-quick', ...
     """
     studies = {path.stem: path for folder in FOLDERS for path in sorted(folder.glob("*.toml"))}
-    if name not in studies:
-        raise unknown("study", name, studies)
+    check_known("study", name, studies)
     return studies[name]

@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import Field
 
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted
 
 from ... import figures as figures
@@ -20,7 +20,6 @@ from ...report.document import Figure, Item, captioned
 from ...robustness import (
     Choice,
     Experiment,
-    Space,
     Spec,
     diagrams,
     from_table,
@@ -126,23 +125,23 @@ def _options(asked: Compare, setup: Setup) -> Choice:
     labels = asked.only or tuple(every.options)
     for named, labels_of in ((labels, every.options), (asked.better or (), labels)):
         for label in named:
-            if label not in labels_of:
-                raise unknown("option", label, labels_of)
+            check_known("option", label, labels_of)
     return Choice(name=asked.keyword, options={label: every.options[label] for label in labels})
 
 
 def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
     """Return the experiment with the options in its space, and the requirements that count."""
+    # The options take the place of a choice of the same name.
     # Metrics of signals that only some options have are left out.
     study, experiment = setup.study, setup.experiment
-    space = _with_options(experiment, options)
+    others = tuple(c for c in experiment.space.choices if c.name != options.name)
+    space = replace(experiment.space, choices=(*others, options))
     built = diagrams(space, experiment.build)
     inputs_of(study, [diagram for _, diagram in built])
     signals = frozenset.intersection(*(frozenset(d.output_labels) for _, d in built))
     counting = {r.key: r for r in experiment.spec.requirements}
     for key in asked.requirements:
-        if key not in counting:
-            raise unknown("requirement", key, counting)
+        check_known("requirement", key, counting)
     spec = Spec(requirements=tuple(counting[key] for key in asked.requirements or counting))
     for requirement in spec.requirements:
         lacking = [signal for signal in requirement.signals if signal not in signals]
@@ -155,12 +154,6 @@ def _widened(asked: Compare, setup: Setup, options: Choice) -> Experiment:
     return replace(experiment, space=space, spec=spec, metrics=metrics)
 
 
-def _with_options(experiment: Experiment, options: Choice) -> Space:
-    """Return the space with a choice more, which takes the place of one of its name."""
-    others = tuple(c for c in experiment.space.choices if c.name != options.name)
-    return Space(quantities=experiment.space.quantities, choices=(*others, options))
-
-
 def _experiment(asked: Compare, setup: Setup) -> Experiment:
     """Return what the rows of a comparison are run with."""
     return _widened(asked, setup, _options(asked, setup))
@@ -170,14 +163,13 @@ def _check(asked: Compare, setup: Setup) -> None:
     """Refuse metrics that not all options have."""
     columns = [metric.key for metric in _experiment(asked, setup).metrics]
     for metric in asked.metrics:
-        if metric not in columns:
-            raise unknown("metric", metric, columns, "of all options")
+        check_known("metric", metric, columns, "of all options")
 
 
 def _run(asked: Compare, ground: Ground) -> Finding | None:
     """Run every sample with every option; None if rows are missing."""
-    options = _options(asked, ground.setup)
-    experiment = _widened(asked, ground.setup, options)
+    options = _options(asked, ground)
+    experiment = _widened(asked, ground, options)
     prepared = prepare(experiment)
     space = prepared.experiment.space
     others = tuple(c for c in space.choices if c.name != options.name)
@@ -270,15 +262,13 @@ def _items(finding: Finding, result: Result, asked: Compare, key: str) -> Iterat
     titles = {c: titles.get(c) or c.replace("rank ", "mean rank ", 1) for c in ranking.columns}
     yield result_table(ranking, RANKING, titles)
     yield from _medians(t["differences"], result.metrics["unit"].to_dict(), key)
-    columns = {c: c.replace("_", " ") for c in t["differences"].columns} | {"p_holm": "p (Holm)"}
-    pairs, only = _with_first(t["differences"], f"{finding.key}/differences.parquet")
-    if "mean_trusted" in pairs:
-        pairs = pairs.assign(mean_trusted=np.where(pairs["mean_trusted"], "yes", "no"))
     words = _DIFFERENCES.format(confidence=confidence, rows=TRUSTED_ROWS, size=asked.runs)
-    yield result_table(pairs, words + only, columns)
-    columns = {c: c.replace("_", " ") for c in t["violations"].columns} | {"p_holm": "p (Holm)"}
-    pairs, only = _with_first(t["violations"], f"{finding.key}/violations.parquet")
-    yield result_table(pairs, MCNEMAR + only, columns)
+    for name, caption in (("differences", words), ("violations", MCNEMAR)):
+        pairs, only = _with_first(t[name], f"{finding.key}/{name}.parquet")
+        if "mean_trusted" in pairs:
+            pairs = pairs.assign(mean_trusted=np.where(pairs["mean_trusted"], "yes", "no"))
+        columns = {c: c.replace("_", " ") for c in pairs.columns} | {"p_holm": "p (Holm)"}
+        yield result_table(pairs, caption + only, columns)
     yield result_table(t["wins"], WINS, {c: c for c in t["wins"].columns})
 
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from nlctl.errors import ParameterError
 from nlctl.faults import NEVER, Fault, with_faults
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.native import Status
 from nlctl.wording import some_of
 
@@ -130,8 +130,7 @@ def _check(asked: Faults, setup: Setup) -> None:
         if not onset < end:
             raise ParameterError(f"'faults' needs onset < {end:g} s, the end, got {onset:g}")
     for name in asked.tolerates:
-        if name not in faults:
-            raise unknown("fault", name, faults)
+        check_known("fault", name, faults)
     taken = [requirement.key for requirement in setup.experiment.spec.requirements]
     detectors = _detectors(asked, setup.experiment)
     for name in {d.key for d in detectors} & set(taken):
@@ -141,8 +140,7 @@ def _check(asked: Faults, setup: Setup) -> None:
     diagram = _experiment(asked, setup).build()
     for detector in detectors:
         for signal in detector.signals:
-            if signal not in diagram.output_labels:
-                raise unknown("signal", signal, diagram.output_labels, f"of '{detector.key}'")
+            check_known("signal", signal, diagram.output_labels, f"of '{detector.key}'")
 
 
 def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
@@ -155,10 +153,10 @@ def _cases(asked: Faults, setup: Setup) -> list[tuple[tuple[str, ...], float]]:
 
 def _run(asked: Faults, ground: Ground) -> Finding | None:
     """Run the loop without a fault, with each, and with every two."""
-    setup, faults = ground.setup, _faults(ground.setup)
+    faults = _faults(ground)
     if not faults:
         raise ParameterError("no faults under [faults]")
-    prepared, cases = prepare(_experiment(asked, setup)), _cases(asked, setup)
+    prepared, cases = prepare(_experiment(asked, ground)), _cases(asked, ground)
     space = prepared.experiment.space
     onsets = dict(zip(faults, space.names[-len(faults) :], strict=True))
     rows = pd.DataFrame([nominal(space)] * len(cases))
@@ -178,7 +176,7 @@ def _run(asked: Faults, ground: Ground) -> Finding | None:
             "status": table["status"].astype(str).to_numpy(),
         }
     )
-    watched = (*setup.experiment.spec.requirements, *_detectors(asked, setup.experiment))
+    watched = (*ground.experiment.spec.requirements, *_detectors(asked, ground.experiment))
     effects = effects.join(_times(prepared, table, watched)).rename_axis("row")
     return _finding(asked, effects)
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from functools import partial
 
 from pydantic import Field
 
 from nlctl.wording import counted
 
-from ...report.document import Item
-from ...robustness import Design, decide, test_verdict
-from ...robustness.runs.progress import Progress, until_decided
+from ...robustness import decide, test_verdict
+from ...robustness.runs.progress import until_decided
 from ...robustness.statistics.guarantee import rounded_down, rounded_up
 from ..file.asked import Asked, Confidence
 from ..finding import Finding
 from ..kind import Ground, Kind, finding_of
 from ..page.running import running_items
-from ..result import Result
 from .context import HOWARD, ROBBINS, statement_numbers
 
 DECIDES_SEQUENCE = " The verdict rests on the band: it is reached where the limit leaves it."
@@ -46,11 +43,6 @@ def _run(asked: Sequential, ground: Ground) -> Finding:
     )
 
 
-def _stop(asked: Sequential, design: Design) -> Callable[[Progress], Any]:
-    """End the rows once it is decided on which side of the limit the probability lies."""
-    return until_decided(design, asked.limit, asked.confidence)
-
-
 def _measured(finding: Finding, asked: Sequential) -> dict[str, str]:
     n = finding.numbers
     return {
@@ -60,11 +52,6 @@ def _measured(finding: Finding, asked: Sequential) -> dict[str, str]:
         "limit": f"< {asked.limit:g}",
         "margin": f"{asked.limit - n['upper']:.3g}",
     }
-
-
-def _items(finding: Finding, result: Result, asked: Sequential, key: str) -> Iterator[Item]:
-    """Yield the estimate while the rows came in."""
-    yield from running_items(finding, result, asked, key, decides=DECIDES_SEQUENCE)
 
 
 SEQUENTIAL = Kind(
@@ -81,7 +68,7 @@ SEQUENTIAL = Kind(
     sources=(ROBBINS, HOWARD),
     needs_rows=True,
     is_statement=True,
-    stop=_stop,
+    stop=lambda asked, design: until_decided(design, asked.limit, asked.confidence),
     measured=_measured,
-    items=_items,
+    items=partial(running_items, decides=DECIDES_SEQUENCE),
 )

@@ -11,7 +11,7 @@ import pandas as pd
 from pydantic import Field
 
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.sensitivities import Tuned, tune
 from nlctl.wording import counted
 
@@ -109,8 +109,7 @@ def _check(asked: Tuning, setup: Setup) -> None:
 def _metric(asked: Tuning, experiment: Experiment) -> Any:
     """Return the metric to be lowered."""
     metrics = {metric.key: metric for metric in experiment.metrics}
-    if asked.lower not in metrics:
-        raise unknown("metric", asked.lower, metrics, "of 'lower'")
+    check_known("metric", asked.lower, metrics, "of 'lower'")
     return metrics[asked.lower]
 
 
@@ -121,7 +120,7 @@ def _runs(asked: Tuning, setup: Setup) -> int:
 
 def _run(asked: Tuning, ground: Ground) -> Finding | None:
     """Find gains, then run fresh rows with those of before and after."""
-    prepared = prepare(_experiment(asked, ground.setup))
+    prepared = prepare(_experiment(asked, ground))
     tuned = _tuned(asked, ground, prepared)
     space = prepared.experiment.space
     design = independent(ground.prepared.experiment.space, asked.runs, ground.seed)

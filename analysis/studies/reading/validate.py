@@ -13,7 +13,7 @@ import control as ct
 
 from nlctl.errors import ParameterError, UsageError
 from nlctl.faults import with_faults
-from nlctl.names import unknown
+from nlctl.names import check_known, unknown
 from nlctl.upstream.control_internals import is_system
 
 from ...metrics import Metric
@@ -221,15 +221,13 @@ def _check_names(
         if quantity is not None:
             alone = Space(quantities=(quantity,))
             notes.attempt(("space", name), resolved, alone, diagram)
+    labels = diagram.output_labels
     for asked in requirements:
         for signal in asked.signals:
-            if signal not in diagram.output_labels:
-                error = unknown("signal", signal, diagram.output_labels)
-                notes.add(("spec", asked.key), str(error))
+            notes.attempt(("spec", asked.key), check_known, "signal", signal, labels)
     for key in SIGNALS:
-        signal = getattr(study.metrics, key, None)
-        if signal and signal not in diagram.output_labels:
-            notes.add(("metrics", key), str(unknown("signal", signal, diagram.output_labels)))
+        if signal := getattr(study.metrics, key, None):
+            notes.attempt(("metrics", key), check_known, "signal", signal, labels)
 
 
 def _check_faults(diagram: ct.InputOutputSystem, signal: str, faulty: Faulty) -> None:
@@ -259,11 +257,9 @@ def _check_analyses(
         certain = tables["spec"] and metrics is not None
         named = _named(asked, asked.definition.columns) if certain else []
         for key, name in named:
-            if name not in columns:
-                notes.add(("analysis", i, key), str(unknown("column", name, columns)))
-        for key, name in _named(asked, asked.definition.quantities):
-            if tables["space"] and name not in tables["space"]:
-                notes.add(("analysis", i, key), str(unknown("quantity", name, tables["space"])))
+            notes.attempt(("analysis", i, key), check_known, "column", name, columns)
+        for key, name in _named(asked, asked.definition.quantities) if tables["space"] else ():
+            notes.attempt(("analysis", i, key), check_known, "quantity", name, tables["space"])
 
 
 def _too_large(study: Study, notes: _Notes) -> set[KeyPath]:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import tomli_w
 
 from nlctl.annotations import as_annotated
 
-from ..code.record import study_digest
-from ..code.rule import remember_code
-from ..file.schema import Study
+from ..file.schema import Study, study_data
 from ..file.toml import read_toml
 from ..kind import Kind
 from .own_kinds import model_of
@@ -44,12 +40,7 @@ def to_toml(study: Study) -> str:
     end = 20.0
     step = 0.01
     """
-    return tomli_w.dumps(_data(study))
-
-
-def _data(study: Study) -> dict[str, Any]:
-    """Return the text of a file with this study."""
-    return study.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    return tomli_w.dumps(study_data(study))
 
 
 @as_annotated
@@ -89,8 +80,3 @@ def from_toml(text: str, kinds: Mapping[str, Kind] | None = None) -> Study:
     1e-08
     """
     return model_of(kinds or {}).model_validate(read_toml(text))
-
-
-def remember_run(study: Study, folder: Path) -> None:
-    """Record that this user has run the code that a study names."""
-    remember_code(study, study_digest(_data(study)), folder)
