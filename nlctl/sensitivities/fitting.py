@@ -12,6 +12,7 @@ from scipy.stats import t as students_t
 
 from ..annotations import as_annotated
 from ..arguments import number
+from ..attributes import described_record
 from ..errors import DivergedError, ParameterError
 from ..native import Compiled
 from ..native import compile as compile_diagram
@@ -30,31 +31,9 @@ _SHARE = 0.1  # of such a direction: parameters with less are not in it
 _LOST = 1e6  # noises: what a run that does not reach its end is wrong by
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Fit:
     """Parameters that fit data, of `nlctl.fit`.
-
-    Attributes
-    ----------
-    names : tuple of str
-    values : ndarray of shape (k,)
-        The least squares.
-    covariance : ndarray of shape (k, k)
-        From the Fisher matrix; infinite for what data do not determine.
-    unidentifiable : tuple of str
-        Parameters that data do not determine, or not apart from each other.
-    noise : float
-        Standard deviation of the residuals, in units of `sigma`.
-    freedom : int
-        Number of data less that of parameters.
-    response : SensitivityResponse
-        The run with these parameters, at the times of the data.
-    residuals : dict
-        By signal: data less the run, over `sigma`; NaN in gaps.
-    success : bool
-        Whether the search has converged.
-    message : str
-        How it ended.
 
     Examples
     --------
@@ -70,15 +49,17 @@ class Fit:
     """
 
     names: tuple[str, ...]
-    values: np.ndarray
+    values: np.ndarray  # (k,): The least squares.
+    # (k, k): From the Fisher matrix; infinite for what data do not determine.
     covariance: np.ndarray
+    # Parameters that data do not determine, or not apart from each other.
     unidentifiable: tuple[str, ...]
-    noise: float
-    freedom: int
-    response: SensitivityResponse
-    residuals: Mapping[str, np.ndarray]
-    success: bool
-    message: str
+    noise: float  # Standard deviation of the residuals, in units of `sigma`.
+    freedom: int  # Number of data less that of parameters.
+    response: SensitivityResponse  # The run with these parameters, at the times of the data.
+    residuals: Mapping[str, np.ndarray]  # By signal: data less the run, over `sigma`; NaN in gaps.
+    success: bool  # Whether the search has converged.
+    message: str  # How it ended.
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
