@@ -16,9 +16,8 @@ from typing import Any
 
 from .arrays import Tracer, traced
 from .graph import Expr, Graph, Untraceable
-from .library.python import is_of_arrays
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
-from .operators import elementwise
+from .operators import elementwise, is_of_arrays
 from .source import Definition, Unreadable, definition
 
 _STEPS = {ast.Sub: (ast.Gt, ast.GtE), ast.Add: (ast.Lt, ast.LtE)}
