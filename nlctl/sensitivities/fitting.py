@@ -19,7 +19,7 @@ from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..params import as_numbers, checked_times
 from ..wording import counted
-from .names import VariedQuantity, varied_quantities
+from .names import VariedQuantity, parameters_and_states, varied_quantities
 from .record import SensitivityResponse
 from .response import sensitivity_response
 
@@ -271,14 +271,14 @@ class _Search:
     def response(self, x: np.ndarray) -> SensitivityResponse:
         """Return the run with some parameters."""
         if self._last is None or x.tobytes() != self._at:
-            params, start = dict(self.more["params"] or {}), self.more["initial_state"]
-            states = {n: v for n, v in zip(self.names, x, strict=True) if n.endswith("(0)")}
-            params |= {n: v for n, v in zip(self.names, x, strict=True) if n not in states}
+            params, states = parameters_and_states(dict(zip(self.names, x, strict=True)))
+            start = self.more["initial_state"]
             if states:
-                start = dict(start or {}) | {n.removesuffix("(0)"): v for n, v in states.items()}
+                start = dict(start or {}) | states
             self._last = sensitivity_response(
                 self.diagram, self.times, self.more["inputs"], start, of=list(self.data),
-                with_respect_to=list(self.names), params=params, rtol=self.more["rtol"],
+                with_respect_to=list(self.names),
+                params={**(self.more["params"] or {}), **params}, rtol=self.more["rtol"],
                 atol=self.more["atol"],
             )  # fmt: skip
             self._at = x.tobytes()

@@ -11,6 +11,7 @@ from ..annotations import as_annotated
 from ..attributes import described_record
 from ..names import unknown
 from ..wording import counted
+from .names import parameters_and_states
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,8 +51,7 @@ class Tuned:
     @property
     def params(self) -> dict[str, float]:
         """The gains, for ``params=`` of a run."""
-        rows = zip(self.names, map(float, self.values), strict=True)
-        return {name: value for name, value in rows if not name.endswith("(0)")}
+        return parameters_and_states(dict(zip(self.names, map(float, self.values), strict=True)))[0]
 
     @property
     def margin(self) -> float:
