@@ -38,10 +38,7 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
-        (
-            tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS),
-            _mapped_polynomial,
-        ),
+        (tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS), _mapped_polynomial),
     )
 
 
