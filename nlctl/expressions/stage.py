@@ -12,8 +12,8 @@ import enum
 import functools
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from types import BuiltinFunctionType, CellType, CodeType, FunctionType, MethodType, ModuleType
+from collections.abc import Callable
+from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
+from .source import codes_in
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
@@ -69,7 +70,8 @@ class Stage:
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
             copy.__kwdefaults__ = {k: self.instead(v) for k, v in keywords}
-            for name in _names(function.__code__):
+            inside = codes_in(function.__code__)
+            for name in (name for code in inside for name in code.co_names):
                 if name in function.__globals__:
                     names[name] = self.instead(function.__globals__[name])
             for cell, given in zip(cells, function.__closure__ or (), strict=True):
@@ -336,11 +338,3 @@ def _title(real: Any) -> str:
     module = (getattr(real, "__module__", None) or "").replace("numpy", "np")
     name = getattr(real, "__qualname__", None) or getattr(real, "__name__", repr(real))
     return f"{module}.{name}" if module and module != "builtins" else name
-
-
-def _names(code: CodeType) -> Iterator[str]:
-    """Yield the names that a function and those inside it may look up."""
-    yield from code.co_names
-    for constant_value in code.co_consts:
-        if isinstance(constant_value, CodeType):
-            yield from _names(constant_value)

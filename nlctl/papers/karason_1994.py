@@ -8,10 +8,17 @@ from __future__ import annotations
 
 import control as ct
 
-from .. import controllers
 from ..actuators import Gain
 from ..annotations import as_annotated
 from ..arguments import one_of
+from ..controllers import (
+    AdaptiveWeights,
+    ConstrainedError,
+    ConstrainedLaw,
+    ModelError,
+    ReferenceModel,
+    mrac,
+)
 from ..diagrams import interconnect
 from ..equations import equation
 from ..plants import PureFeedback
@@ -68,14 +75,14 @@ def example_1(
     ['x1', 'xm1', 'u', 'e', 'r', 'W_norm']
     """
     errors = {
-        "controllable": controllers.ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0),
-        "all": controllers.ModelError(K=(1.0,), Q=(2.0,)),
+        "controllable": ConstrainedError(K=(1.0,), Q=(2.0,), gamma_d=1.0),
+        "all": ModelError(K=(1.0,), Q=(2.0,)),
     }
-    controller = controllers.mrac(
-        controllers.ReferenceModel(a=(1.0,), b=1.0),
+    controller = mrac(
+        ReferenceModel(a=(1.0,), b=1.0),
         error=errors[one_of("example_1", "learns_from", learns_from, errors)],
-        weights=controllers.AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
-        law=controllers.ConstrainedLaw(u_max=10.0),
+        weights=AdaptiveWeights(nodes=2, Gamma=0.1, sigma_1=0.0),
+        law=ConstrainedLaw(u_max=10.0),
     )
     blocks = {
         "command": SumOfSines(order=0, amplitudes=(amplitude,), frequencies=(0.5,), phases=(0.0,)),

@@ -51,6 +51,15 @@ class Still:
         return lambda t: self.y
 
 
+def diverged(system: System, time: float) -> DivergedError:
+    """Return the error of a run that has no finite state from a time on."""
+    return DivergedError(
+        f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
+        "simulate up to then to see how",
+        float(time),
+    )
+
+
 class Driver:
     """A run in python-control's equations and one of SciPy's integrators."""
 
@@ -319,11 +328,7 @@ class Driver:
         """
         self._repeated = self._repeated + 1 if t == self.reached else 0
         if self._repeated > _STANDSTILL or not np.all(np.isfinite(x)):
-            raise DivergedError(
-                f"'{self.system.name}' diverged: no finite state after t = {self.reached:.6g} s; "
-                "simulate up to then to see how",
-                self.reached,
-            )
+            raise diverged(self.system, self.reached)
         self.reached = float(t)
         if self.progress is not None:
             self.progress(self.reached)

@@ -22,7 +22,7 @@ from ...native.integrate.state import LANE, Status
 from ...native.run import Run
 from ...native.settings import Settings
 from ...responses.arguments import input_array, state_array
-from ..words import check_written_out, digest, parameter_values
+from ..words import check_written_out, digest, parameter_values, refuse_if_any
 from .here import carried_out
 from .host import HOST, HOST_FUNCTIONS
 from .linking import PROVIDED, check_linker, linked
@@ -157,18 +157,15 @@ def _check(compiled: native.Compiled, what: str) -> None:
         "has transport delays, whose past has no bound on a page": bool(compiled.schedule.lines),
         "has no states": not compiled.nstates,
     }
-    for reason, holds in reasons.items():
-        if holds:
-            raise CompileError(f"'{what}' cannot run on a page: it {reason}")
+    refuse_if_any(what, reasons, "run on a page")
 
 
 def _check_library(text: str, what: str) -> None:
     """Refuse functions of the C library that JavaScript has not."""
     called = set(re.findall(r"^declare double @(\w+)\(double", text, re.MULTILINE))
-    if lacking := sorted(called - PROVIDED):
-        raise CompileError(
-            f"'{what}' cannot run on a page: it calls '{lacking[0]}', which JavaScript has not"
-        )
+    lacking = sorted(called - PROVIDED)
+    reasons = {f"calls '{name}', which JavaScript has not": True for name in lacking}
+    refuse_if_any(what, reasons, "run on a page")
 
 
 def _laid_out(

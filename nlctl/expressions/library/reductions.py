@@ -184,19 +184,14 @@ def prod(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
     return folded(graph, values, axis, keepdims, of_row)
 
 
-def _is_true(graph: Graph, e: Expr) -> Expr:
-    return e if e.kind == "b" else graph.op("ne", e, graph.const(0.0))
-
-
 def _of_truths(name: str, start: bool) -> Callable[..., Any]:
     def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
         if isinstance(values, Masked):
             values = values.filled(start)
 
         def of_row(row: Sequence[Expr]) -> Expr:
-            truths = [_is_true(graph, e) for e in row]
-            return functools.reduce(lambda a, b: graph.op(name, a, b), truths or [
-                graph.const(start)])  # fmt: skip
+            truths = list(map(graph.truth, row)) or [graph.const(start)]
+            return functools.reduce(functools.partial(graph.op, name), truths)
 
         return folded(graph, values, axis, keepdims, of_row)
 

@@ -12,7 +12,7 @@ from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .surfaces import surface
 from .table import enter
-from .tables import MOST_PIECES, constant_cells, interval_choice, piecewise, polynomial
+from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
 
 
 def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
@@ -80,7 +80,7 @@ def piecewise_polynomial(
         raise Untraceable("a piecewise polynomial with too many pieces")
 
     def at(e: Expr) -> Expr:
-        value = piecewise(graph, e, breaks, coefficients.T)
+        value = interval_polynomial(graph, e, breaks, coefficients.T)
         nan = graph.const(np.nan)
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
@@ -167,7 +167,7 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
         raise Untraceable("a table with several values")
     if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
         lines = np.stack([np.diff(values) / np.diff(thing.x), values[:-1]], axis=1)
-        rule = lambda e: piecewise(graph, e, thing.x, lines)  # noqa: E731
+        rule = lambda e: interval_polynomial(graph, e, thing.x, lines)  # noqa: E731
     elif hasattr(thing, "_spline"):
         spline = _of_one_value(thing._spline)
         rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731

@@ -45,7 +45,9 @@ def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequ
     return graph.op("select", below, low, high)
 
 
-def piecewise(graph: Graph, x: Expr, breaks: Any, pieces: Iterable[Iterable[Any]]) -> Expr:
+def interval_polynomial(
+    graph: Graph, x: Expr, breaks: Any, pieces: Iterable[Iterable[Any]]
+) -> Expr:
     """Return the polynomial in x - start of the interval of x, the highest power first."""
 
     def expr(c: Any) -> Expr:
@@ -88,7 +90,7 @@ def _linear(
         for (a, b), width in zip(pairwise(values), np.diff(places), strict=True)
     )
     pieces = zip(slopes, values, strict=False)
-    value = piecewise(graph, x, places, pieces) if places.size > 1 else values[0]
+    value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else values[0]
     value = op("select", op("eq", x, const(float(places[-1]))), values[-1], value)
     value = op("select", op("gt", x, const(float(places[-1]))), right, value)
     return op("select", op("lt", x, const(float(places[0]))), left, value)
