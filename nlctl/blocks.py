@@ -23,12 +23,7 @@ from .params import (
 )
 from .probing import probed
 from .supplied import Supplied, supplied_now
-from .upstream.control_internals import (
-    Around,
-    OwnParameters,
-    current_parameters,
-    set_parameters,
-)
+from .upstream.control_internals import Around, OwnParameters, current_parameters, set_parameters
 from .upstream.systems import System
 
 _Signals = str | Sequence[str] | Mapping[str, str] | None  # other names of inputs or outputs

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from .annotations import as_annotated
 from .arguments import ATOL, RTOL, number
+from .attributes import described_record
 from .diagrams import initial_state, interconnect, known_system
 from .errors import DivergedError, ParameterError
 from .native import Compiled
@@ -158,30 +158,17 @@ def _settled(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="limit_cycles")
 class LimitCycle:
-    """A limit cycle that a describing function predicts, and what the loop does.
+    """A limit cycle that a describing function predicts, and what the loop does."""
 
-    Attributes
-    ----------
-    predicted_amplitude, predicted_omega : float
-        Of the first harmonic of the nonlinearity's input, and in rad/s.
-    amplitude, omega : float
-        Half of the peak-to-peak value of that signal in the simulated loop, and 2 pi over its
-        period; NaN where the oscillation dies out, grows without bound, or does not settle.
-    found : str
-        How the run ended, in words.
-
-    Examples
-    --------
-    See `limit_cycles`.
-    """
-
-    predicted_amplitude: float
+    predicted_amplitude: float  # Of the first harmonic of the nonlinearity's input, and in rad/s.
     predicted_omega: float
+    # Half of the peak-to-peak value of that signal in the simulated loop, and 2 pi over its period;
+    # NaN where the oscillation dies out, grows without bound, or does not settle.
     amplitude: float
     omega: float
-    found: str
+    found: str  # How the run ended, in words.
 
 
 @as_annotated

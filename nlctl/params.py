@@ -125,20 +125,12 @@ def param(
         ndim = np.ndim(default)
     except ValueError as error:  # rows of different lengths
         raise ParameterError(f"param needs numbers for default, got {default!r}") from error
-    for name, bound in zip(("above", "below", "at_least", "at_most"),
-                           (above, below, at_least, at_most), strict=True):  # fmt: skip
+    bounds = {"above": above, "below": below, "at_least": at_least, "at_most": at_most}
+    for name, bound in bounds.items():
         if bound is not None and (as_numbers(bound) is None or np.ndim(bound)):
             raise ParameterError(f"param needs a number for {name}, got {bound!r}")
     declared = Param(
-        unit=unit,
-        meaning=meaning,
-        above=above,
-        below=below,
-        at_least=at_least,
-        at_most=at_most,
-        ndim=ndim,
-        symbol=symbol,
-        may_be_empty=may_be_empty,
+        unit=unit, meaning=meaning, **bounds, ndim=ndim, symbol=symbol, may_be_empty=may_be_empty
     )
     return dataclasses.field(default=default, metadata={_KEY: declared})
 

@@ -12,16 +12,9 @@ import numpy as np
 
 from ..equations import equation
 from ..params import Floats, param, record
+from . import prandtl_ishlinskii
 from .backlash import check_gap
 from .memories import FromUToV, Remembering, relaxation
-from .prandtl_ishlinskii import (
-    Plays,
-    check_weights,
-    unit_contact,
-    unit_play,
-    weighted_band,
-    weighted_plays,
-)
 from .relay import check_sides, moving_side
 
 
@@ -156,7 +149,7 @@ class BacklashInverse(Remembering):
 
 
 @record
-class PrandtlIshlinskiiInverse(Plays):
+class PrandtlIshlinskiiInverse(prandtl_ishlinskii.Plays):
     """Inverse of a Prandtl-Ishlinskii operator, which is one as well.
 
         v = W_0 u + sum_i W_i H_i,   H_i = min(max(H_i(t-), u - R_i), u + R_i)
@@ -208,7 +201,7 @@ class PrandtlIshlinskiiInverse(Plays):
     def check(self) -> None:
         """The operator has an increasing loading curve, and as many memories as thresholds."""
         super().check()
-        check_weights(self, "so that the operator has an inverse")
+        prandtl_ishlinskii.check_weights(self, "so that the operator has an inverse")
 
     def derived(self) -> dict[str, Any]:
         """Weights W_0, W and thresholds R of the inverse."""
@@ -218,19 +211,19 @@ class PrandtlIshlinskiiInverse(Plays):
 
     @equation
     def output(t, x, u, p):
-        return (weighted_plays(u[0], x, p.W_0, p.W, p.R),)
+        return (prandtl_ishlinskii.weighted_plays(u[0], x, p.W_0, p.W, p.R),)
 
     @equation
     def commit(t, x, u, p):
-        return unit_play(u[0], x, p.R)
+        return prandtl_ishlinskii.unit_play(u[0], x, p.R)
 
     update = relaxation(commit)
 
     @equation
     def switching(t, x, u, p):
         """Contact of each play with either side of its gap."""
-        return np.concatenate(unit_contact(u[0], x, p.R))
+        return np.concatenate(prandtl_ishlinskii.unit_contact(u[0], x, p.R))
 
     @equation
     def band(t, u, p):
-        return weighted_band(u, p.W_0, p.W, p.R)
+        return prandtl_ishlinskii.weighted_band(u, p.W_0, p.W, p.R)

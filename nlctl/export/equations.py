@@ -10,9 +10,8 @@ import control as ct
 from .. import native
 from ..annotations import as_annotated
 from ..diagrams import initial_state as state_of
-from ..errors import CompileError
 from .records import ExportedEquations
-from .words import c_name, check_written_out, digest, parameter_values
+from .words import c_name, check_written_out, digest, parameter_values, refuse_if_any
 
 
 @as_annotated
@@ -74,12 +73,9 @@ def export_equations(
 
 def _check_continuous(compiled: native.Compiled, what: str) -> None:
     """Refuse what three functions cannot say."""
-    reasons = {
+    refuse_if_any(what, {
         "is in discrete time": not ct.isctime(compiled),
         "has sampled blocks: export each with its block": bool(compiled.program.clocks),
         "has resets": bool(compiled.program.guards),
         "has transport delays": bool(compiled.schedule.lines),
-    }
-    for reason, holds in reasons.items():
-        if holds:
-            raise CompileError(f"'{what}' cannot be exported: it {reason}")
+    })  # fmt: skip

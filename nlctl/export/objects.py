@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import llvmlite.binding as llvm
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..errors import CompileError
 from ..names import unknown
 from ..native.codegen.ir.program import COPY, program_text
@@ -19,16 +19,9 @@ from ..native.machine.finish import program_code
 from .records import ExportedController
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class Target:
     """A machine that object code is made for.
-
-    Attributes
-    ----------
-    cpu, features, abi : str
-        As LLVM calls them.
-    meaning : str
-        What has it.
 
     Examples
     --------
@@ -36,9 +29,9 @@ class Target:
     'cortex-m7'
     """
 
-    cpu: str
-    meaning: str
-    features: str = ""
+    cpu: str  # As LLVM calls it.
+    meaning: str  # What has it.
+    features: str = ""  # As LLVM calls them.
     abi: str = ""
 
 

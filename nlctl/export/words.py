@@ -70,10 +70,15 @@ def check_written_out(compiled: Compiled, what: str) -> None:
     """Refuse functions that are called, and algebraic loops that are searched."""
     for reason in compiled.lowered.opaque.values():
         raise CompileError(f"'{what}' cannot be exported: a function of it is called ({reason})")
-    if compiled.lowered.solvers:
-        raise CompileError(
-            f"'{what}' cannot be exported: it has an algebraic loop, whose signals are searched for"
-        )
+    searched = bool(compiled.lowered.solvers)
+    refuse_if_any(what, {"has an algebraic loop, whose signals are searched for": searched})
+
+
+def refuse_if_any(what: str, reasons: Mapping[str, bool], purpose: str = "be exported") -> None:
+    """Refuse a diagram for the first reason that holds."""
+    for reason, holds in reasons.items():
+        if holds:
+            raise CompileError(f"'{what}' cannot {purpose}: it {reason}")
 
 
 def digest(text: str, parameters: Mapping[str, float], start: np.ndarray, more: Any = ()) -> str:

@@ -408,10 +408,7 @@ def leaf_vector(
             raise Untraceable("a large matrix")
         return Tracer(graph, mapped(lambda i: graph.leaf(array, int(i), None, kind), numbers))
     moved = np.moveaxis(numbers, long[0], -1)
-    step = int(moved.reshape(-1)[1] - moved.reshape(-1)[0]) if moved.ndim == 1 else int(
-        moved[0, 1] - moved[0, 0]
-    )  # fmt: skip
-    size = moved.shape[-1]
+    step, size = int(moved.flat[1] - moved.flat[0]), moved.shape[-1]
 
     def column(i: int) -> Expr:
         where = (array, int(i), step)

@@ -14,9 +14,8 @@ from .edges import domain_edges, have_edges, is_positive, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
-_OF_SIGNS = ("absolute", "sign", "heaviside")
+_OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
 _OF_SECONDS = ("copysign",)
-_OF_FIRSTS = ("arctan2",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
 _ROOTS = ("sqrt", "hypot")
 _INVERSE = {"exp": math.log, "log": math.exp, "tanh": math.atanh}
@@ -41,8 +40,7 @@ def _switches(node: Expr) -> bool:
         moves = any(arg.varies for arg in node.args)
         return moves and not _of_truths(node) and not _is_of_infinity(node)
     return (
-        node.op in _OF_SIGNS
-        or node.op in _OF_FIRSTS
+        node.op in _OF_FIRSTS
         or _rooted(node) is not None
         or (at_integers(node) and not _is_quotient(node.args[0]))
         or (node.op in _OF_SECONDS and node.args[1].varies)
@@ -106,7 +104,7 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
         return reduce(lambda a, b: graph.op("minimum", a, b), edges, graph.const(1.0))
     if op in _OF_DIFFERENCES:
         return _difference(graph, *args)
-    if op in _OF_SIGNS or op in _OF_FIRSTS:
+    if op in _OF_FIRSTS:
         return args[0]
     if op in _OF_SECONDS:
         return args[1]

@@ -124,7 +124,7 @@ class _Reader:
         def read(seed: Callable[[Expr], Expr | None], of_solution: Expr | None) -> list[Any]:
             solution = {node: of_solution}
             reader = _Reader(self.graph, seed, self.fixed_points, solution, self.differences)
-            return [scalar(self.graph, self._zero_if_none(e)) for e in reader.read(points)]
+            return [scalar(self.graph, e or self._zero) for e in reader.read(points)]
 
         units = [self.graph.table(row) for row in np.eye(n).tolist()]
         columns = [read(lambda _: None, unit) for unit in units]
@@ -135,8 +135,9 @@ class _Reader:
         parts = [scalar(self.graph, where(is_regular, c, np.nan).only) for c in changes]
         return self.graph.joined([(part.only, 1) for part in parts])
 
-    def _zero_if_none(self, tangent: Expr | None) -> Expr:
-        return self.graph.const(0.0) if tangent is None else tangent
+    @property
+    def _zero(self) -> Expr:
+        return self.graph.const(0.0)
 
     def _mul(self, node: Expr, a: Expr | None, b: Expr | None) -> Expr | None:
         left = self.graph.op("mul", a, node.args[1]) if a else None
@@ -149,13 +150,12 @@ class _Reader:
         return self.graph.op("div", change, node.args[1])
 
     def _select(self, node: Expr, _: Expr | None, a: Expr | None, b: Expr | None) -> Expr:
-        yes, no = self._zero_if_none(a), self._zero_if_none(b)
-        return self.graph.op("select", node.args[0], yes, no)
+        return self.graph.op("select", node.args[0], a or self._zero, b or self._zero)
 
     def _lu_solve(self, node: Expr, matrix: Expr | None, *right: Expr | None) -> Expr:
         """X' = A^-1 (B' - A' X)."""
         sizes = node.data[1][1:]
-        pieces = [(self._zero_if_none(part), n) for part, n in zip(right, sizes, strict=True)]
+        pieces = [(part or self._zero, n) for part, n in zip(right, sizes, strict=True)]
         return changed_solution(self.graph, node, matrix, pieces)
 
     def _lu_det(self, node: Expr, matrix: Expr) -> Expr:

@@ -252,13 +252,11 @@ class Graph:
     def _kinds(self, name: str, args: tuple[Expr, ...]) -> tuple[str, tuple[Expr, ...]]:
         """Return the kind of a result, and the arguments in the kinds that it takes."""
         if name in LOGIC:
-            return "b", tuple(
-                a if a.kind == "b" else self.op("ne", a, self.const(0.0)) for a in args
-            )
+            return "b", tuple(map(self.truth, args))
         if name == "select":
             kinds = {a.kind for a in args[1:]}
             kind = kinds.pop() if len(kinds) == 1 else "f"
-            condition = args[0] if args[0].kind == "b" else self.op("ne", args[0], self.const(0.0))
+            condition = self.truth(args[0])
             rest = args[1:] if kind in "bi" else tuple(self.number(a) for a in args[1:])
             return kind, (condition, *rest)
         return "b" if name in COMPARISONS else "f", tuple(self.number(a) for a in args)
@@ -310,6 +308,10 @@ class Graph:
         if a.op == "const":
             return a if a.kind == "f" else self.const(float(a.data))
         return self.op("select", a, self.const(1.0), self.const(0.0)) if a.kind == "b" else a
+
+    def truth(self, a: Expr) -> Expr:
+        """Return an expression as a truth value."""
+        return a if a.kind == "b" else self.op("ne", a, self.const(0.0))
 
     def _simplified(self, name: str, *args: Expr) -> Expr | None:
         """Return what is the same and simpler; at most the sign of a zero differs."""

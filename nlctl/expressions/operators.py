@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Special, Tracer, as_array, is_complex, mapped, python_number, scalar, traced
-from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable
+from .graph import SMALL, Ambiguous, Expr, Graph, Namespace, Untraceable, needed
 
 _Range = tuple[float, float]
 _EVERYTHING = (-math.inf, math.inf)
@@ -180,20 +180,17 @@ def _invert(self: Tracer) -> Tracer:
     """Return the negation of NumPy's truth values; of Python's own ~True is -2."""
     if any(e.kind != "b" for e in self.cells.flat):
         raise Untraceable("~ of numbers")
-    if not all(map(_is_of_arrays, self.cells.flat)):
+    if not all(map(is_of_arrays, self.cells.flat)):
         raise Ambiguous("takes ~ of a truth value, and ~True is -2 in Python: write not")
     return elementwise(self.graph, "not", self)
 
 
-def _is_of_arrays(condition: Expr) -> bool:
-    """Whether a condition is one of NumPy's: it depends on states or inputs."""
-    waiting = [condition]
-    while waiting:
-        expr = waiting.pop()
-        if expr.op in ("call", "solve") or (expr.op == "leaf" and expr.data[0] in ("x", "u")):
-            return True
-        waiting.extend(expr.args)
-    return False
+def is_of_arrays(expr: Expr) -> bool:
+    """Whether a number is one of NumPy's: it depends on states or inputs."""
+    return any(
+        node.op in ("call", "solve") or (node.op == "leaf" and node.data[0] in ("x", "u"))
+        for node in needed([expr])
+    )
 
 
 def _integer(self: Tracer) -> int:

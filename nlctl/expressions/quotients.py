@@ -58,10 +58,6 @@ def _of_difference(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
     return graph.op("sub", _quotient(graph, a), _quotient(graph, b)) if a.quotient else negated
 
 
-def _of_negative(graph: Graph, a: _Quantity) -> Expr:
-    return graph.op("neg", _quotient(graph, a))
-
-
 def _of_product(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
     """a b - a0 b0 = a (b - b0) + b0 (a - a0); nothing is asked of a factor that meets 0."""
     for one, other in ((a, b), (b, a)):
@@ -85,7 +81,7 @@ def _of_division(graph: Graph, a: _Quantity, b: _Quantity) -> Expr:
 _RULES: dict[str, Callable[..., Expr]] = {
     "add": _of_sum,
     "sub": _of_difference,
-    "neg": _of_negative,
+    "neg": lambda graph, a: graph.op("neg", _quotient(graph, a)),
     "mul": _of_product,
     "div": _of_division,
 }

@@ -13,13 +13,14 @@ import enum
 import functools
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from types import BuiltinFunctionType, CellType, CodeType, FunctionType, MethodType, ModuleType
+from collections.abc import Callable
+from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
 
 from ..upstream.numba_internals import CPUDispatcher
+from . import staged
 from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
@@ -31,17 +32,7 @@ from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
-from .staged import (
-    LIBRARIES,
-    StagedModule,
-    StagedObject,
-    StagedParent,
-    StagedType,
-    Ufunc,
-    holds_tracers,
-    is_of_a_library,
-    settled,
-)
+from .source import codes_in
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
@@ -57,9 +48,9 @@ class Stage:
         self._copies: dict[int, tuple[Any, Any]] = {}
         self.classes: dict[type, type] = {}
         self._objects: dict[int, tuple[Any, Any]] = {}
-        self.numpy = StagedModule(np, self._library)
-        self.math = StagedModule(math, self._math_function)
-        self.cmath = StagedModule(cmath, self._library)
+        self.numpy = staged.StagedModule(np, self._library)
+        self.math = staged.StagedModule(math, self._math_function)
+        self.cmath = staged.StagedModule(cmath, self._library)
         self._builtins = Builtins(self).namespace(self._import)
 
     def copied(self, function: Any) -> Any:
@@ -73,14 +64,15 @@ class Stage:
             names["__name__"] = function.__module__  # of classes that are defined inside
             cells = tuple(CellType() for _ in function.__closure__ or ())
             defaults = tuple(map(self.instead, function.__defaults__ or ()))
-            is_users = not is_of_a_library(function)
+            is_users = not staged.is_of_a_library(function)
             code = followable_code(function, self.merging) if is_users else function.__code__
             names.update(names_for(self.graph))
             copy = FunctionType(code, names, function.__name__, defaults, cells)
             self._copies[id(function)] = (function, copy)  # before what may refer back to it
             keywords = (function.__kwdefaults__ or {}).items()
             copy.__kwdefaults__ = {k: self.instead(v) for k, v in keywords}
-            for name in _names(function.__code__):
+            inside = codes_in(function.__code__)
+            for name in (name for code in inside for name in code.co_names):
                 if name in function.__globals__:
                     names[name] = self.instead(function.__globals__[name])
             for cell, given in zip(cells, function.__closure__ or (), strict=True):
@@ -90,7 +82,7 @@ class Stage:
     def called_object(self, thing: object) -> Any:
         """Return what calls a method, a `functools.partial`, or an object."""
         if isinstance(thing, MethodType):
-            if is_of_a_library(thing.__func__):
+            if staged.is_of_a_library(thing.__func__):
                 return self.for_numbers(thing)
             return functools.partial(self.copied(thing.__func__), self.instead(thing.__self__))
         if isinstance(thing, functools.partial):
@@ -98,7 +90,7 @@ class Stage:
             first = map(self.instead, thing.args)
             return functools.partial(self.instead(thing.func), *first, **keywords)
         call = inspect.getattr_static(type(thing), "__call__", None)
-        if is_of_a_library(thing) and callable(thing):
+        if staged.is_of_a_library(thing) and callable(thing):
             return self._call_of_a_library(thing)
         if isinstance(call, FunctionType):
             return functools.partial(self.copied(call), self.instead(thing))
@@ -108,8 +100,8 @@ class Stage:
         of_numbers = self.for_numbers(thing)
 
         def function(*arguments: Any, **options: Any) -> Any:
-            given = settled(arguments)
-            if not holds_tracers([*given, *options.values()]):
+            given = staged.settled(arguments)
+            if not staged.holds_tracers([*given, *options.values()]):
                 return of_numbers(*given, **options)
             return called_object(self.graph, thing, *arguments, **options)
 
@@ -120,8 +112,10 @@ class Stage:
         if value is np or value is math or value is cmath:
             return self.numpy if value is np else self.math if value is math else self.cmath
         if isinstance(value, ModuleType):
-            inside = value.__name__.partition(".")[0] in LIBRARIES
-            return StagedModule(value, self._library if inside else lambda _, v: self.instead(v))
+            inside = value.__name__.partition(".")[0] in staged.LIBRARIES
+            return staged.StagedModule(
+                value, self._library if inside else lambda _, v: self.instead(v)
+            )
         if type(value) is np.ndarray:
             return self.fresh(value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
@@ -175,21 +169,21 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value is dataclasses.dataclass:  # it looks at types and defaults alone
                 return value
-            return self.for_numbers(value) if is_of_a_library(value) else self.copied(value)
+            return self.for_numbers(value) if staged.is_of_a_library(value) else self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
             return type(value)._make(map(self.instead, value))  # pyright: ignore[reportAttributeAccessIssue]
         if type(value).__module__ in _OPERATORS:
             return value  # itemgetter and its kind
-        if is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
+        if staged.is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
             return self.for_numbers(value)  # a function of NumPy
         if type(value).__module__.startswith("scipy.spatial.transform") and (
             type(value) is enter_rotations()
         ):
             return turn_of(self.graph, value)
         if id(value) not in self._objects:  # one and the same: it may be asked with `is`
-            self._objects[id(value)] = (value, StagedObject(value, self))
+            self._objects[id(value)] = (value, staged.StagedObject(value, self))
         return self._objects[id(value)][1]
 
     def _vectorized(self, value: Any) -> Any:
@@ -200,7 +194,7 @@ class Stage:
 
     def parent(self, thing: Any, cls: type) -> Any:
         """Return what ``super()`` is in a method of somebody's object."""
-        return StagedParent(thing, self, cls)
+        return staged.StagedParent(thing, self, cls)
 
     def _import(self, name: str, *rest: Any) -> Any:
         return self.instead(builtins.__import__(name, *rest))
@@ -210,7 +204,7 @@ class Stage:
     def _library(self, name: str, real: Any) -> Any:
         """Return a function or module of a library: its own version here, or for constants."""
         if isinstance(real, ModuleType):
-            return StagedModule(real, self._library)
+            return staged.StagedModule(real, self._library)
         if isinstance(real, type):
             return self._type(real)
         if real is np.r_ or real is np.c_:
@@ -220,7 +214,7 @@ class Stage:
         if isinstance(real, np.ufunc):
             self._is_known(real)
             is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
-            return Ufunc(self.graph, real, self.for_numbers(real)) if is_written else (
+            return staged.Ufunc(self.graph, real, self.for_numbers(real)) if is_written else (
                 self.for_numbers(real)
             )  # fmt: skip
         return self._written(real) if self._is_known(real) else self.for_numbers(real)
@@ -230,7 +224,7 @@ class Stage:
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
 
         def function(*arguments: Any, **options: Any) -> Any:
-            if makes or holds_tracers([*arguments, *options.values()]):
+            if makes or staged.holds_tracers([*arguments, *options.values()]):
                 options = {k: unwrapped(v) for k, v in options.items()}
                 return written(self.graph, *map(unwrapped, arguments), **options)
             return of_numbers(*arguments, **options)
@@ -241,10 +235,13 @@ class Stage:
         """Return a function that takes constants, and refuses tracers."""
 
         def function(*arguments: Any, **options: Any) -> Any:
-            every, named = settled(arguments), {k: settled(v) for k, v in options.items()}
-            if holds_tracers([*every, *named.values()]):
+            every, named = (
+                staged.settled(arguments),
+                {k: staged.settled(v) for k, v in options.items()},
+            )
+            if staged.holds_tracers([*every, *named.values()]):
                 function = inspect.unwrap(real) if callable(real) else real
-                unwrapped = isinstance(function, FunctionType) and is_of_a_library(function)
+                unwrapped = isinstance(function, FunctionType) and staged.is_of_a_library(function)
                 written = function if unwrapped else None
                 if written is None:
                     raise Untraceable(f"{_title(real)} is not known here")
@@ -269,7 +266,7 @@ class Stage:
                 return value
         if type(value) in (list, tuple):
             return type(value)([self.fresh(v) for v in value])
-        is_plain = isinstance(value, (*_RAW, np.ndarray, type)) or not is_of_a_library(value)
+        is_plain = isinstance(value, (*_RAW, np.ndarray, type)) or not staged.is_of_a_library(value)
         return value if is_plain else self._instead_of_object(value)
 
     def _math_function(self, name: str, real: Any) -> Any:
@@ -279,7 +276,7 @@ class Stage:
         count = numpy_function(operation).nin
 
         def function(*arguments: Any) -> Any:
-            if not holds_tracers(arguments):
+            if not staged.holds_tracers(arguments):
                 return of_numbers(*arguments)
             if len(arguments) != count:
                 raise Untraceable(f"{operation} with other arguments")
@@ -312,8 +309,8 @@ class Stage:
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
-        if is_of_a_library(cls):
-            return StagedType(cls, self)
+        if staged.is_of_a_library(cls):
+            return staged.StagedType(cls, self)
         if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "functools",
                                                 "itertools", "operator", "_operator", "numbers",
                                                 "control", "nlctl"):  # fmt: skip
@@ -370,11 +367,3 @@ def _title(real: Any) -> str:
     module = (getattr(real, "__module__", None) or "").replace("numpy", "np")
     name = getattr(real, "__qualname__", None) or getattr(real, "__name__", repr(real))
     return f"{module}.{name}" if module and module != "builtins" else name
-
-
-def _names(code: CodeType) -> Iterator[str]:
-    """Yield the names that a function and those inside it may look up."""
-    yield from code.co_names
-    for constant_value in code.co_consts:
-        if isinstance(constant_value, CodeType):
-            yield from _names(constant_value)

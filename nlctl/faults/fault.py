@@ -15,17 +15,7 @@ from ..arguments import integer, number, text
 from ..delays import TransportDelay
 from ..errors import ParameterError
 from ..names import unknown
-from .effects import (
-    Bias,
-    DriftFault,
-    Latch,
-    Late,
-    LockInPlace,
-    LossOfEffectiveness,
-    Noise,
-    Outage,
-    StuckAt,
-)
+from . import effects
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 NAME = r"[A-Za-z_][\w.]*(?:\[\d+\])?"
@@ -52,34 +42,25 @@ def parse_condition(text: str) -> Condition:
             f"Fault needs a condition such as when='|e| > 0.5' or when='plant.y < -1', got {text!r}"
         )
     return Condition(
-        signal=match[2],
-        level=float(match[5]),
-        is_magnitude=bool(match[1]),
+        signal=match[2], level=float(match[5]), is_magnitude=bool(match[1]),
         is_below=match[4].startswith("<"),
-    )
+    )  # fmt: skip
 
 
-FAULT_KINDS: Mapping[str, Any] = MappingProxyType(
-    {
-        "stuck": StuckAt,
-        "bias": Bias,
-        "drift": DriftFault,
-        "gain": LossOfEffectiveness,
-        "noise": Noise,
-        "delay": Late,
-        "dropout": Outage,
-        "disconnection": Outage,
-    }
-)
+FAULT_KINDS: Mapping[str, Any] = MappingProxyType({
+    "stuck": effects.StuckAt,
+    "bias": effects.Bias,
+    "drift": effects.DriftFault,
+    "gain": effects.LossOfEffectiveness,
+    "noise": effects.Noise,
+    "delay": effects.Late,
+    "dropout": effects.Outage,
+    "disconnection": effects.Outage,
+})  # fmt: skip
 """The record of each kind; ``stuck`` without a value is `effects.LockInPlace`."""
 
-NEEDS = {
-    "bias": "offset",
-    "drift": "rate in 1/s",
-    "gain": "factor",
-    "noise": "RMS",
-    "delay": "time in s",
-}
+NEEDS = {"bias": "offset", "drift": "rate in 1/s", "gain": "factor", "noise": "RMS",
+         "delay": "time in s"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -162,7 +143,7 @@ class Fault:
         """A kind has a value, or none."""
         if self.value is not None:
             number(self._who, "value", self.value)
-            if FAULT_KINDS[self.kind] is Outage:
+            if FAULT_KINDS[self.kind] is effects.Outage:
                 raise ParameterError(f"{self._who} takes no value, it is 0, got {self.value!r}")
         elif self.kind in NEEDS:
             raise ParameterError(f"{self._who} needs a value, its {NEEDS[self.kind]}, got none")
@@ -189,9 +170,8 @@ class Fault:
                 raise ParameterError(
                     f"{self._who} needs until > at, got {self.until:g} s and {self.onset:g} s"
                 )
-        if (self.kind == "dropout") != (self.until is not None) and FAULT_KINDS[
-            self.kind
-        ] is Outage:
+        is_outage = FAULT_KINDS[self.kind] is effects.Outage
+        if is_outage and (self.kind == "dropout") != (self.until is not None):
             what = "needs" if self.kind == "dropout" else "takes no"
             other = "disconnection" if self.kind == "dropout" else "dropout"
             raise ParameterError(
@@ -220,9 +200,8 @@ class Fault:
             given["value"] = self.value
         if self.kind == "noise":
             given |= {"low": self.low, "high": self.high, "seed": self.seed}
-        record = (
-            LockInPlace if self.kind == "stuck" and self.value is None else FAULT_KINDS[self.kind]
-        )
+        remembers = self.kind == "stuck" and self.value is None
+        record = effects.LockInPlace if remembers else FAULT_KINDS[self.kind]
         try:
             return record(**given)
         except ParameterError as error:
@@ -236,9 +215,9 @@ class Fault:
         return TransportDelay(inputs=("signal",), outputs=("late",), delay=self.value)
 
     @property
-    def latch(self) -> Latch | None:
+    def latch(self) -> effects.Latch | None:
         """The record of the block that watches its condition."""
         if self.condition is None:
             return None
         c = self.condition
-        return Latch(level=c.level, is_magnitude=c.is_magnitude, is_below=c.is_below)
+        return effects.Latch(level=c.level, is_magnitude=c.is_magnitude, is_below=c.is_below)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import control as ct
@@ -15,8 +16,9 @@ from .running import Running
 
 def in_model_exchange(of: Described, running: Running) -> Any:
     """Return a record with the equations of an FMU in Model Exchange."""
-    n, fields = len(of.states), _fields(of)
-    begins = dict(zip(_names(of), _start(of, running), strict=True))
+    n, names, fields = len(of.states), _identifiers(of.states), _identifiers(of.parameters)
+    running.go_to(0.0, [float(v.start) for v in of.parameters])
+    begins = dict(zip(names, running.states(), strict=True))
 
     def put(t: float, x: Any, u: Any, p: Any) -> list[float]:
         values = [getattr(p, field) for field in fields]
@@ -49,7 +51,7 @@ def in_model_exchange(of: Described, running: Running) -> Any:
             for field, v in zip(fields, of.parameters, strict=True)
         },
         "inputs": tuple(v.name for v in of.inputs), "outputs": tuple(v.name for v in of.outputs),
-        "states": (*_names(of), "inner_state"), "initial": begins,
+        "states": (*names, "inner_state"), "initial": begins,
         "feedthrough": bool(of.inputs and of.outputs),
         "__annotations__": dict.fromkeys(fields, float), "__module__": __name__, **made,
         "__doc__": f"The FMU '{of.path.name}' in Model Exchange.",
@@ -77,26 +79,11 @@ def in_co_simulation(of: Described, running: Running, name: str, dt: float) -> A
     )  # fmt: skip
 
 
-def _start(of: Described, running: Running) -> tuple[float, ...]:
-    """Return its continuous states where it begins."""
-    running.go_to(0.0, [float(v.start) for v in of.parameters])
-    return running.states()
-
-
-def _names(of: Described) -> list[str]:
-    """Return its continuous states as names of a record's states."""
-    return _identifiers([v.name for v in of.states])
-
-
-def _fields(of: Described) -> list[str]:
-    """Return its parameters as names of a record's fields."""
-    return _identifiers([v.name for v in of.parameters])
-
-
-def _identifiers(names: list[str]) -> list[str]:
+def _identifiers(variables: Sequence[Any]) -> list[str]:
+    """Return what a record calls variables, such as states or parameters."""
     found: list[str] = []
-    for name in names:
-        made = re.sub(r"\W+", "_", name).strip("_")
+    for variable in variables:
+        made = re.sub(r"\W+", "_", variable.name).strip("_")
         made = f"p_{made}" if not made.isidentifier() else made
         found.append(made if made not in found else f"{made}_{len(found)}")
     return found

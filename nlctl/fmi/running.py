@@ -24,19 +24,12 @@ _GETTERS = {"Real": "getReal", "Integer": "getInteger", "Boolean": "getBoolean",
 
 
 class Running:
-    """An instance of an FMU.
-
-    Parameters
-    ----------
-    of : Described
-    start : float
-        When it begins (s).
-    """
+    """An instance of an FMU."""
 
     def __init__(self, of: Described, start: float) -> None:
         import fmpy
 
-        self.of, self.start = of, start
+        self.of, self.start = of, start  # when it begins (s)
         self.folder = tempfile.mkdtemp()
         weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         fmpy.extract(str(of.path), unzipdir=self.folder)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..actuators import LuGre
 from ..annotations import as_annotated
+from ..attributes import with_parameters_of
 from ..blocks import block
 from ..diagrams import interconnect
 from ..equations import equation
@@ -80,13 +81,9 @@ _OUTPUTS = ["position", "velocity", "force"]
 
 
 @as_annotated
+@with_parameters_of(interconnect)
 def example_1(*, name: str = "example_1") -> ct.InterconnectedSystem:
     """A mass of 1 kg on friction, pushed: presliding, and the force at which it breaks away.
-
-    Parameters
-    ----------
-    name : str, optional
-        Name of the diagram.
 
     Returns
     -------
@@ -108,6 +105,7 @@ def example_1(*, name: str = "example_1") -> ct.InterconnectedSystem:
 
 
 @as_annotated
+@with_parameters_of(interconnect)
 def example_2(*, omega: float = 1.0, name: str = "example_2") -> ct.InterconnectedSystem:
     """Friction at a velocity 1 mm/s (1.5 + cos(omega t)): it lags behind.
 
@@ -115,8 +113,6 @@ def example_2(*, omega: float = 1.0, name: str = "example_2") -> ct.Interconnect
     ----------
     omega : float, optional
         Frequency (rad/s); printed are 1, 10 and 25.
-    name : str, optional
-        Name of the diagram.
 
     Returns
     -------
@@ -141,13 +137,9 @@ def example_2(*, omega: float = 1.0, name: str = "example_2") -> ct.Interconnect
 
 
 @as_annotated
+@with_parameters_of(interconnect)
 def example_3(*, name: str = "example_3") -> ct.InterconnectedSystem:
     """The mass, pulled at 0.1 m/s by the end of a spring of 2 N/m: it sticks and slips.
-
-    Parameters
-    ----------
-    name : str, optional
-        Name of the diagram.
 
     Returns
     -------
@@ -168,13 +160,9 @@ def example_3(*, name: str = "example_3") -> ct.InterconnectedSystem:
 
 
 @as_annotated
+@with_parameters_of(interconnect)
 def example_4(*, name: str = "example_4") -> ct.InterconnectedSystem:
     """The mass under PID control to a position of 1 m: friction makes it hunt.
-
-    Parameters
-    ----------
-    name : str, optional
-        Name of the diagram.
 
     Returns
     -------

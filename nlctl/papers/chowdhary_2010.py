@@ -8,16 +8,9 @@ from __future__ import annotations
 import control as ct
 import numpy as np
 
+from .. import controllers
 from ..actuators import Gain
 from ..annotations import as_annotated
-from ..controllers import (
-    AdaptiveWeights,
-    ConcurrentWeights,
-    HistoryStack,
-    ModelError,
-    ModelReferenceLaw,
-    ReferenceModel,
-)
 from ..controllers.rbf import regressor_names
 from ..diagrams import interconnect
 from ..equations import equation
@@ -162,19 +155,20 @@ def example_1(
     >>> print(loop.nstates)  # of plant, model and weights
     7
     """
-    weights, record_ = AdaptiveWeights(nodes=3, Gamma=3.5, sigma_1=0.0), {}
+    weights, record_ = controllers.AdaptiveWeights(nodes=3, Gamma=3.5, sigma_1=0.0), {}
     if concurrent:
-        weights = ConcurrentWeights(nodes=3, Gamma=3.5)
-        record_ = {"stack": sampled(HistoryStack(nodes=3, points=points, novelty=0.2), 0.01)}
+        weights = controllers.ConcurrentWeights(nodes=3, Gamma=3.5)
+        stack = controllers.HistoryStack(nodes=3, points=points, novelty=0.2)
+        record_ = {"stack": sampled(stack, 0.01)}
     blocks = {
         "command": FunctionReference(order=0, function=pulse),
         "plant": Pendulum(),
         "actuator": Gain(),
-        "model": ReferenceModel(a=(1.0, 2.0), b=1.0),
-        "error": ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
+        "model": controllers.ReferenceModel(a=(1.0, 2.0), b=1.0),
+        "error": controllers.ModelError(K=(1.5, 1.3), Q=(1.0, 1.0)),
         "basis": PendulumRegressor(),
         "weights": weights,
-        "law": ModelReferenceLaw(gain=1.0),
+        "law": controllers.ModelReferenceLaw(gain=1.0),
         **record_,
     }
     return interconnect(blocks, outputs=["y", "xm1", "e", "u", "W_norm"], name=name)

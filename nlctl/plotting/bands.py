@@ -54,15 +54,8 @@ def bands(
                     time[nodes], *band, color=BLUE, alpha=opacity, linewidth=0, label=inside
                 )
         for k, (label, line) in enumerate(lines.items()):
-            style = LINES[k % len(LINES)]
-            ax.plot(
-                time,
-                np.clip(line[name], low, high),
-                style,
-                color=TEXT_INK,
-                linewidth=1.2,
-                label=label,
-            )
+            style, shown = LINES[k % len(LINES)], np.clip(line[name], low, high)
+            ax.plot(time, shown, style, color=TEXT_INK, linewidth=1.2, label=label)
         for value, start, end in bounds:
             ax.hlines(value, start, end, color=ORANGE, linewidth=1.6, alpha=0.8, label=LIMIT)
         unit = units.get(name, "")

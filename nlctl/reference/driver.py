@@ -51,50 +51,40 @@ class Still:
         return lambda t: self.y
 
 
+def diverged(system: System, time: float) -> DivergedError:
+    """Return the error of a run that has no finite state from a time on."""
+    return DivergedError(
+        f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
+        "simulate up to then to see how",
+        float(time),
+    )
+
+
 class Driver:
-    """A run in python-control's equations and one of SciPy's integrators.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-        In continuous time, with the parameters of the run.
-    inputs : callable
-        ``inputs(t)``: those of the diagram.
-    wanted : ndarray of shape (k,), or None
-        Times of the response (s); None for the integrator's own steps.
-    stops, jumps, known : Stops, Jumps, Past
-    method : type
-        A `scipy.integrate.OdeSolver`.
-    settings : mapping
-        Its arguments: rtol, atol, max_step and so on.
-    progress : callable, optional
-        ``progress(t)`` after every accepted step.
-
-    Attributes
-    ----------
-    rows : list of tuple
-        Of each time of the response that was reached: time, outputs, states.
-    reached : float
-        Time of the last accepted step (s).
-    happened : list of tuple
-        Time (s), block, which and direction of each event.
-    """
+    """A run in python-control's equations and one of SciPy's integrators."""
 
     def __init__(
-        self, system: System, inputs: Any, wanted: Any, *, stops: Stops, jumps: Jumps, known: Past,
-        method: Any, settings: Any, progress: Any = None,
+        self,
+        system: System,  # in continuous time, with the parameters of the run
+        inputs: Any,  # ``inputs(t)``: those of the diagram
+        wanted: Any,  # times of the response (s); None for the integrator's own steps
+        *, stops: Stops, jumps: Jumps, known: Past,
+        method: Any,  # a `scipy.integrate.OdeSolver`
+        settings: Any,  # its arguments: rtol, atol, max_step and so on
+        progress: Any = None,  # ``progress(t)`` after every accepted step
     ) -> None:  # fmt: skip
         self.system, self.inputs, self.wanted = system, inputs, wanted
         self.stops, self.jumps, self.known = stops, jumps, known
         self.method = method if system.nstates else Still
         self.settings, self.progress = settings, progress
+        # of each time of the response that was reached: time, outputs, states
         self.rows: list[tuple[float, np.ndarray, np.ndarray]] = []
         self._held = np.zeros(0)
-        self.happened = jumps.happened
+        self.happened = jumps.happened  # time (s), block, which and direction of each event
 
     def run(self, begin: float, end: float, x: np.ndarray) -> None:
         """Go from the first time to the last; `rows` grow on the way."""
-        self.reached, self._span = begin, end - begin
+        self.reached, self._span = begin, end - begin  # the time of the last accepted step (s)
         self.jumps.span = self._span
         tolerances = self.settings["rtol"], self.settings["atol"]
         self._switches = Switches(self.system.name, self.jumps.label, (begin, end), tolerances)
@@ -348,11 +338,7 @@ class Driver:
         """
         self._repeated = self._repeated + 1 if t == self.reached else 0
         if self._repeated > _STANDSTILL or not np.all(np.isfinite(x)):
-            raise DivergedError(
-                f"'{self.system.name}' diverged: no finite state after t = {self.reached:.6g} s; "
-                "simulate up to then to see how",
-                self.reached,
-            )
+            raise diverged(self.system, self.reached)
         self.reached = float(t)
         if self.progress is not None:
             self.progress(self.reached)

@@ -27,20 +27,14 @@ from ..sampling.system import happening
 from ..sliding.relay import SLIDING
 from ..upstream.control_internals import rates_now
 from ..upstream.systems import System
-from .driver import Driver
+from .driver import Driver, diverged
 from .jumps import Jumps
 from .known import Known
 from .past import Past
 from .stops import Stops
 
-SOLVE_IVP_METHODS = (
-    "LSODA",
-    "RK23",
-    "RK45",
-    "DOP853",
-    "Radau",
-    "BDF",
-)  # of scipy.integrate.solve_ivp
+# of scipy.integrate.solve_ivp
+SOLVE_IVP_METHODS = ("LSODA", "RK23", "RK45", "DOP853", "Radau", "BDF")
 _KEYWORDS = ("rtol", "atol", "max_step", "min_step", "first_step")  # and those of its Jacobian
 _JACOBIAN = ("jac", "jac_sparsity", "lband", "uband")
 
@@ -118,7 +112,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
     try:
         driver.run(begin, end, np.array(x0, dtype=float))
         if not all(np.all(np.isfinite(y)) for _, y, _ in driver.rows):
-            raise _diverged(system, driver.reached)
+            raise diverged(system, driver.reached)
     except DivergedError as error:
         message = str(error)
         if not run.ignore_errors:
@@ -127,7 +121,7 @@ def _driven(run: RunArguments, given: Any, how: Any, known: Any) -> Response:
         # python-control takes a NaN signal for an algebraic loop: it never equals itself
         if not (driver.reached > begin or _overflows(system, begin, x0, at(begin))):
             raise
-        failed = _diverged(system, driver.reached)
+        failed = diverged(system, driver.reached)
         message = str(failed)
         if not run.ignore_errors:
             raise failed from error
@@ -171,10 +165,10 @@ def _by_python_control(run: RunArguments, inputs: Any, x0: Any, wanted: Any, how
         )  # fmt: skip
     except RuntimeError as error:
         if _overflows(system, float(run.times[0]), x0, np.zeros(system.ninputs or 0)):
-            raise _diverged(system, float(run.times[0])) from error
+            raise diverged(system, float(run.times[0])) from error
         raise
     if not np.all(np.isfinite(found.y)):
-        raise _diverged(system, float(run.times[0]))
+        raise diverged(system, float(run.times[0]))
     return as_response(found, run.system)
 
 
@@ -188,11 +182,3 @@ def _overflows(system: System, t: float, x: Any, u: np.ndarray) -> bool:
     except RuntimeError:
         return False
     return False
-
-
-def _diverged(system: System, time: float) -> DivergedError:
-    return DivergedError(
-        f"'{system.name}' diverged: no finite state after t = {time:.6g} s; "
-        "simulate up to then to see how",
-        float(time),
-    )

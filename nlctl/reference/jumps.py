@@ -33,37 +33,21 @@ class _Part(NamedTuple):
 
 
 class Jumps:
-    """The jumps of a diagram.
-
-    Parameters
-    ----------
-    system : control.InputOutputSystem
-    inputs : callable
-        ``inputs(t)``: those of the diagram.
-    conditions : Known
-        What changes its sign where conditions of the diagram's equations change.
-    watched : tuple
-        Functions of the run, and the overrides that they get.
-    leaving : callable
-        ``leaving(t)``: what leaves transport delays.
-
-    Attributes
-    ----------
-    sampled : dict
-        The sampled block of a state, by the state's place.
-    memories, still : ndarray of int
-        Places of the states that are memories, and of all that no equation moves.
-    """
+    """The jumps of a diagram."""
 
     def __init__(
-        self, system: Any, inputs: Callable[[float], Any], conditions: Known,
-        watched: tuple[tuple[Watched, ...], Any], leaving: Callable[[float], np.ndarray],
-    ) -> None:  # fmt: skip
+        self,
+        system: Any,
+        inputs: Callable[[float], Any],  # those of the diagram at a time
+        conditions: Known,  # what changes its sign where conditions of the equations change
+        watched: tuple[tuple[Watched, ...], Any],  # functions, and the overrides that they get
+        leaving: Callable[[float], np.ndarray],  # what leaves transport delays at a time
+    ) -> None:
         self.watched, self._overrides = watched
         self.system, self.inputs, self.conditions = system, inputs, conditions
         self.crossings, self._leaving = conditions.crossings, leaving
         self.happened: list[tuple[float, str, str, str]] = []
-        parts, self.sampled = [], {}
+        parts, self.sampled = [], {}  # the sampled block of a state, by the state's place
         for number, leaf in enumerate(leaves(system)):
             rows = leaf.state_offset + np.arange(leaf.system.nstates or 0)
             if isinstance(leaf.system, Sampled):
@@ -79,6 +63,7 @@ class Jumps:
             "commit": self._remembering,
         }
         places = [_memory_rows(one) for one in self._remembering]
+        # places of the states that are memories, and of all that no equation moves
         self.memories = np.concatenate([np.zeros(0, dtype=int), *places])
         self.still = np.concatenate([self.memories, np.array(list(self.sampled), dtype=int)])
         self.kinds: tuple[int, int] = (0, 0)

@@ -31,38 +31,17 @@ _ASIDE = 1e-9  # part of a step: what lies so close to its end is read from insi
 
 
 class Past:
-    """What is known of delayed signals while a run goes on.
-
-    Parameters
-    ----------
-    blocks : list of Block
-        The transport delays, with the parameters of the run.
-    begin, end : float
-        First and last time of the run (s).
-    tolerances : tuple of float
-        rtol and atol, to which polynomials settle.
-
-    Attributes
-    ----------
-    lines : dict
-        What leaves each block.
-    step : tuple of float
-        From where to where the run goes now: signals that jump are read from this side.
-    breaks : list of float
-        Times at which a signal, or one of its derivatives, jumps.
-
-    Raises
-    ------
-    ParameterError
-        If a delay is not positive, or varies faster than time.
-    """
+    """What is known of delayed signals while a run goes on."""
 
     def __init__(self, blocks: list[Block], begin: float, end: float, tolerances: Any) -> None:
+        # Of transport delays with the parameters of the run; polynomials settle to rtol and atol.
         self.specs: list[Any] = [made.current_spec for made in blocks]
         self.begin, self.end, self._tolerances = begin, end, tolerances
+        # from where to where the run goes now, the side from which signals that jump are read; and
+        # times at which a signal, or one of its derivatives, jumps
         self.step, self.breaks = (begin, begin), []
         self._starts, self._ends, self._pieces = [], [], []
-        self.lines: dict[Any, SuppliedOutput] = {}
+        self.lines: dict[Any, SuppliedOutput] = {}  # what leaves each block
         for number, made in enumerate(blocks):
             spec: Any = made.current_spec
             varied = variation(spec, begin, end, str(made.name))

@@ -16,24 +16,16 @@ _DISTINCT = 1e-9  # of the run: samples closer together count as one
 
 
 class Stops:
-    """Samples of clocks, break points of inputs, changes of the samples' spacing, and others.
-
-    Parameters
-    ----------
-    grid : ndarray of shape (k,)
-        Times of the run (s): those of its inputs and of its response.
-    times : ndarray of shape (m,)
-        Times of the inputs (s).
-    inputs : ndarray of shape (ninputs, m)
-    sampled : iterable of Sampled
-        Blocks with clocks.
-    conditions : Known
-        Where conditions of t alone change, and how long steps may be.
-    """
+    """Samples of clocks, break points of inputs, changes of the samples' spacing, and others."""
 
     def __init__(
-        self, grid: Any, times: Any, inputs: Any, sampled: Any, conditions: Known
-    ) -> None:  # fmt: skip
+        self,
+        grid: Any,  # (k,): times of the run (s), those of its inputs and of its response
+        times: Any,  # (m,): times of the inputs (s)
+        inputs: Any,  # (ninputs, m)
+        sampled: Any,  # blocks with clocks
+        conditions: Known,  # where conditions of t alone change, and how long steps may be
+    ) -> None:
         begin, end = float(times[0]), float(times[-1])
         # what is due at the last instant happens there
         due = instants(clocks_of(sampled), begin, float(np.nextafter(end, np.inf)))

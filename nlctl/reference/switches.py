@@ -27,22 +27,14 @@ _MORE = 1e4  # switches to come that are too many: each takes tens of millisecon
 
 
 class Switches:
-    """When the conditions of a run have been at 0.
-
-    Parameters
-    ----------
-    name : str
-        Of the diagram.
-    label : callable
-        ``label(i)``: block and name of a condition.
-    ends : tuple of float
-        First and last time of the run (s).
-    tolerances : tuple of float
-        rtol and atol.
-    """
+    """When the conditions of a run of a diagram have been at 0."""
 
     def __init__(
-        self, name: Any, label: Callable[[int], tuple[str, str]], ends: Any, tolerances: Any
+        self,
+        name: Any,
+        label: Callable[[int], tuple[str, str]],  # block and name of a condition
+        ends: Any,  # first and last time of the run (s)
+        tolerances: Any,  # rtol and atol
     ) -> None:
         self._name, self._label, self._ends, self._tolerances = name, label, ends, tolerances
         self._last: deque[float] = deque(maxlen=_CROWD)

@@ -12,13 +12,14 @@ from scipy.stats import t as students_t
 
 from ..annotations import as_annotated
 from ..arguments import number
+from ..attributes import described_record
 from ..errors import DivergedError, ParameterError
 from ..native import Compiled
 from ..native import compile as compile_diagram
 from ..native.diagram.checks import sized
 from ..params import as_numbers, checked_times
 from ..wording import counted
-from .names import VariedQuantity, varied_quantities
+from .names import VariedQuantity, parameters_and_states, varied_quantities
 from .record import SensitivityResponse
 from .response import sensitivity_response
 
@@ -30,31 +31,9 @@ _SHARE = 0.1  # of such a direction: parameters with less are not in it
 _LOST = 1e6  # noises: what a run that does not reach its end is wrong by
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class Fit:
     """Parameters that fit data, of `nlctl.fit`.
-
-    Attributes
-    ----------
-    names : tuple of str
-    values : ndarray of shape (k,)
-        The least squares.
-    covariance : ndarray of shape (k, k)
-        From the Fisher matrix; infinite for what data do not determine.
-    unidentifiable : tuple of str
-        Parameters that data do not determine, or not apart from each other.
-    noise : float
-        Standard deviation of the residuals, in units of `sigma`.
-    freedom : int
-        Number of data less that of parameters.
-    response : SensitivityResponse
-        The run with these parameters, at the times of the data.
-    residuals : dict
-        By signal: data less the run, over `sigma`; NaN in gaps.
-    success : bool
-        Whether the search has converged.
-    message : str
-        How it ended.
 
     Examples
     --------
@@ -70,15 +49,17 @@ class Fit:
     """
 
     names: tuple[str, ...]
-    values: np.ndarray
+    values: np.ndarray  # (k,): The least squares.
+    # (k, k): From the Fisher matrix; infinite for what data do not determine.
     covariance: np.ndarray
+    # Parameters that data do not determine, or not apart from each other.
     unidentifiable: tuple[str, ...]
-    noise: float
-    freedom: int
-    response: SensitivityResponse
-    residuals: Mapping[str, np.ndarray]
-    success: bool
-    message: str
+    noise: float  # Standard deviation of the residuals, in units of `sigma`.
+    freedom: int  # Number of data less that of parameters.
+    response: SensitivityResponse  # The run with these parameters, at the times of the data.
+    residuals: Mapping[str, np.ndarray]  # By signal: data less the run, over `sigma`; NaN in gaps.
+    success: bool  # Whether the search has converged.
+    message: str  # How it ended.
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)])
@@ -290,14 +271,14 @@ class _Search:
     def response(self, x: np.ndarray) -> SensitivityResponse:
         """Return the run with some parameters."""
         if self._last is None or x.tobytes() != self._at:
-            params, start = dict(self.more["params"] or {}), self.more["initial_state"]
-            states = {n: v for n, v in zip(self.names, x, strict=True) if n.endswith("(0)")}
-            params |= {n: v for n, v in zip(self.names, x, strict=True) if n not in states}
+            params, states = parameters_and_states(dict(zip(self.names, x, strict=True)))
+            start = self.more["initial_state"]
             if states:
-                start = dict(start or {}) | {n.removesuffix("(0)"): v for n, v in states.items()}
+                start = dict(start or {}) | states
             self._last = sensitivity_response(
                 self.diagram, self.times, self.more["inputs"], start, of=list(self.data),
-                with_respect_to=list(self.names), params=params, rtol=self.more["rtol"],
+                with_respect_to=list(self.names),
+                params={**(self.more["params"] or {}), **params}, rtol=self.more["rtol"],
                 atol=self.more["atol"],
             )  # fmt: skip
             self._at = x.tobytes()

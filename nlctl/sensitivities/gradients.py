@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..errors import ParameterError
 from ..names import unknown
 from ..native.ensemble_result import MetricLike
@@ -16,21 +15,9 @@ _STEP = 1e-5  # of the size of the signals
 _AGREE = 1e-5  # of both sides, or of a change by all of itself: less is that of the step
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class MetricGradient:
     """The derivatives of a number of a response, of `nlctl.metric_gradient`.
-
-    Attributes
-    ----------
-    key : str
-        Of the metric.
-    value : float
-    with_respect_to : tuple of str
-    scale : ndarray of shape (k,)
-        Of what size each quantity is.
-    above, below : ndarray of shape (k,)
-        Derivatives to both sides: by how much it changes, for each unit, where a quantity grows,
-        and where it falls.  They differ at kinks, such as where two peaks are equally high.
 
     Examples
     --------
@@ -43,10 +30,12 @@ class MetricGradient:
     ('p',) [nan]
     """
 
-    key: str
+    key: str  # Of the metric.
     value: float
     with_respect_to: tuple[str, ...]
-    scale: np.ndarray
+    scale: np.ndarray  # (k,): Of what size each quantity is.
+    # (k,): Derivatives to both sides: by how much it changes, for each unit, where a quantity
+    # grows, and where it falls.  They differ at kinks, such as where two peaks are equally high.
     above: np.ndarray
     below: np.ndarray
 

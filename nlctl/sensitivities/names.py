@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -85,6 +85,12 @@ def varied_quantities(compiled: Compiled, names: Sequence[str] | str) -> list[Va
         lowest, highest = declared_bounds(owner, full)
         quantities.append(VariedQuantity(name=name, place=place, lowest=lowest, highest=highest))
     return quantities
+
+
+def parameters_and_states(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the parameters of some quantities, and the initial states."""
+    states = {n.removesuffix(_AT_START): v for n, v in given.items() if n.endswith(_AT_START)}
+    return {n: v for n, v in given.items() if not n.endswith(_AT_START)}, states
 
 
 def _check_moves(compiled: Compiled, owner: Any, name: str) -> None:

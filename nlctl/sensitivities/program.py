@@ -196,12 +196,8 @@ class _Maker:
 
     def _along(self, pieces: Sequence[SomeRows], j: int) -> list[SomeRows]:
         """Return the derivatives of pieces by a quantity."""
-        graph = self.source.graph
-        changes = self.source.slopes([e for e, _ in pieces], self.seeds[j])
-        zero = graph.const(0.0)
-        return [
-            (zero if e is None else e, size) for e, (_, size) in zip(changes, pieces, strict=True)
-        ]
+        changes = self.source.changes([e for e, _ in pieces], self.seeds[j])
+        return [(e, size) for e, (_, size) in zip(changes, pieces, strict=True)]
 
     def _rows(self, first: int, pieces: Sequence[SomeRows]) -> list[tuple[int, Tracer]]:
         """Return pieces as arrays with their rows."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..names import unknown
 from ..wording import counted
 
@@ -15,20 +15,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record
 class NoDerivative:
     """Where a run has no derivative from some time on.
-
-    Attributes
-    ----------
-    time : float
-        From when on (s).
-    where : str
-        The block and what happens in it.
-    why : str
-        What there is instead of a derivative.
-    with_respect_to : tuple of str
-        By what there is none.
 
     Examples
     --------
@@ -39,10 +28,10 @@ class NoDerivative:
     no derivative by p from t = 0.5 s on (guard of 'a'): grazing
     """
 
-    time: float
-    where: str
-    why: str
-    with_respect_to: tuple[str, ...]
+    time: float  # From when on (s).
+    where: str  # The block and what happens in it.
+    why: str  # What there is instead of a derivative.
+    with_respect_to: tuple[str, ...]  # By what there is none.
 
     def __str__(self) -> str:
         where = f" ({self.where})" if self.where else ""
@@ -50,30 +39,11 @@ class NoDerivative:
         return f"no derivative by {by} from t = {self.time:.9g} s on{where}: {self.why}"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(eq=False)
 class SensitivityResponse:
     """A run with its derivatives, of `nlctl.sensitivity_response`.
 
     ``response["plant.y", "law.beta"]`` is the derivative of one signal by one quantity over time.
-
-    Attributes
-    ----------
-    time : ndarray of shape (m,)
-        Times in s.
-    signals : tuple of str
-        Of what derivatives are taken.
-    with_respect_to : tuple of str
-        By what.
-    values : ndarray of shape (signals, m)
-        The signals themselves.
-    derivatives : ndarray of shape (signals, quantities, m)
-        NaN where there is none.
-    missing : tuple of NoDerivative
-        Where, and why; empty if there are derivatives up to the end.
-    scale : ndarray of shape (quantities,)
-        Of what size each quantity is taken to be: tolerances hold for a derivative times that.
-    statistics : Statistics
-        Status, time reached, steps.
 
     Examples
     --------
@@ -83,14 +53,17 @@ class SensitivityResponse:
     -0.541341
     """
 
-    time: np.ndarray
-    signals: tuple[str, ...]
-    with_respect_to: tuple[str, ...]
-    values: np.ndarray
-    derivatives: np.ndarray
+    time: np.ndarray  # (m,): Times in s.
+    signals: tuple[str, ...]  # Of what derivatives are taken.
+    with_respect_to: tuple[str, ...]  # By what.
+    values: np.ndarray  # (signals, m): The signals themselves.
+    derivatives: np.ndarray  # (signals, quantities, m): NaN where there is none.
+    # (quantities,): Of what size each quantity is taken to be: tolerances hold for a derivative
+    # times that.
     scale: np.ndarray
+    # Where, and why; empty if there are derivatives up to the end.
     missing: tuple[NoDerivative, ...] = ()
-    statistics: Any = field(default=None)
+    statistics: Any = None  # `Statistics`: status, time reached, steps.
 
     @property
     def success(self) -> bool:

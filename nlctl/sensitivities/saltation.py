@@ -160,8 +160,9 @@ class Saltation:
 
     def at_start(self, j: int) -> dict[int, Expr]:
         """Return derivatives of memories that a run begins by driving, by their states."""
-        zero = self.source.graph.const(0.0)
-        return {m: self.change(e, self.seeds[j])[0] or zero for m, e in self.source.driven.items()}
+        driven = self.source.driven
+        changes = self.source.changes(list(driven.values()), self.seeds[j])
+        return dict(zip(driven, changes, strict=True))
 
     # -- states ----------------------------------------------------------------------------------
 
@@ -184,10 +185,9 @@ class Saltation:
         if at_turn and change is not None:
             late, flowing = self._late(become), list(self.source.flow)
             for i in range(self.places.by):
-                rates = self.source.slopes([e for e, _ in self.source.flow], self.seeds[i])
-                zero = graph.const(0.0)
+                rates = self.source.changes([e for e, _ in self.source.flow], self.seeds[i])
                 sizes = (size for _, size in self.source.flow)
-                flowing += [(e or zero, size) for e, size in zip(rates, sizes, strict=True)]
+                flowing += zip(rates, sizes, strict=True)
             forward = self.source.time(flowing, delays_move=False)
             (rate,) = self.source.slopes([change], forward)
             if rate is not None:
@@ -248,9 +248,8 @@ class Saltation:
                 return None
             return graph.node("leaf", data=(_WAY, start, step), size=size, varies=True)
 
-        changes = source.slopes(exprs, Direction(of={**of, "x": place}))
         zero = graph.const(0.0)
-        kept = self.sides.kept([e or zero for e in changes])
+        kept = self.sides.kept(source.changes(exprs, Direction(of={**of, "x": place})))
         leaves = [e for e in needed(kept) if e.op == "leaf" and e.data[0] == _WAY]
         ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
         return replaced_parts(graph, kept, ways)

@@ -129,14 +129,16 @@ class EquationParts:
             return list(flow)
         direction = self.time(flow)
         ahead = one_sided(self.graph, list(driven.values()), direction)
-        rates = self.slopes(ahead, direction)
-        zero = self.graph.const(0.0)
-        return rows_replaced(self.graph, flow, dict(zip(driven, (r or zero for r in rates),
-                                                        strict=True)))  # fmt: skip
+        rates = self.changes(ahead, direction)
+        return rows_replaced(self.graph, flow, dict(zip(driven, rates, strict=True)))
 
     def slopes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr | None]:
         """Return the derivatives of expressions along a direction, None where they are 0."""
         return slopes(self.graph, exprs, direction, self.equations.fixed_points)
+
+    def changes(self, exprs: Sequence[Expr], direction: Direction) -> list[Expr]:
+        """Return the derivatives of expressions along a direction, 0 where they stand still."""
+        return [e or self.graph.const(0.0) for e in self.slopes(exprs, direction)]
 
     def with_states(self, exprs: Sequence[Expr], instead: Mapping[int, Expr]) -> list[Expr]:
         """Return expressions with others in the places of some states."""

@@ -3,71 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..annotations import as_annotated
+from ..attributes import described_record
 from ..names import unknown
 from ..wording import counted
+from .names import parameters_and_states
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(made_by="tune", eq=False)
 class Tuned:
-    """Gains that were found, of `nlctl.tune`.
+    """Gains that were found, of `nlctl.tune`."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        What was tuned.
-    low, high : ndarray of shape (k,)
-        Within what.
-    start, values : ndarray of shape (k,)
-        Before and after.
-    before, after : dict
-        By key: the least margin of each requirement over all samples, and the mean cost.
-    alone, put_back : ndarray of shape (k,)
-        Least margin, or the mean cost where there is one, with this gain alone at its new value,
-        and with all but this one.
-    cost : str
-        Key of the cost; empty without one.
-    history : pandas.DataFrame
-        Every choice of gains that was tried: ``by`` what it was chosen, ``runs`` that were made
-        until then, the least ``margin``, ``cost``, and the gains.
-    plain_runs, differentiated_runs : int
-        How many runs were made, without and with derivatives.
-    counted_runs : float
-        Both together; one with k derivatives counts as 1 + 0.7 k.
-    notes : tuple of str
-        What had to be done otherwise, a sentence each.
-    message : str
-        How the search ended.
-
-    Examples
-    --------
-    See `tune`.
-    """
-
-    names: tuple[str, ...]
-    low: np.ndarray
+    names: tuple[str, ...]  # What was tuned.
+    low: np.ndarray  # (k,): Within what.
     high: np.ndarray
-    start: np.ndarray
+    start: np.ndarray  # (k,): Before and after.
     values: np.ndarray
+    # By key: the least margin of each requirement over all samples, and the mean cost.
     before: Mapping[str, float]
     after: Mapping[str, float]
+    # (k,): Least margin, or the mean cost where there is one, with this gain alone at its new
+    # value, and with all but this one.
     alone: np.ndarray
     put_back: np.ndarray
-    cost: str
+    cost: str  # Key of the cost; empty without one.
+    # Every choice of gains that was tried: ``by`` what it was chosen, ``runs`` that were made until
+    # then, the least ``margin``, ``cost``, and the gains.
     history: pd.DataFrame
-    plain_runs: int
+    plain_runs: int  # How many runs were made, without and with derivatives.
     differentiated_runs: int
-    counted_runs: float
-    notes: tuple[str, ...]
-    message: str
+    counted_runs: float  # Both together; one with k derivatives counts as 1 + 0.7 k.
+    notes: tuple[str, ...]  # What had to be done otherwise, a sentence each.
+    message: str  # How the search ended.
 
     def __getitem__(self, name: str) -> float:
         if name not in self.names:
@@ -77,8 +51,7 @@ class Tuned:
     @property
     def params(self) -> dict[str, float]:
         """The gains, for ``params=`` of a run."""
-        rows = zip(self.names, map(float, self.values), strict=True)
-        return {name: value for name, value in rows if not name.endswith("(0)")}
+        return parameters_and_states(dict(zip(self.names, map(float, self.values), strict=True)))[0]
 
     @property
     def margin(self) -> float:

@@ -13,6 +13,7 @@ from ..errors import AlgebraicLoopError, CompileError, DivergedError, ParameterE
 from ..native import Compiled, ensemble_response
 from ..native.ensemble import MetricLike
 from .gradients import metric_gradient
+from .names import parameters_and_states
 from .response import sensitivity_response
 
 LOST_MARGIN = -1e3  # the margin of a run that does not reach its end
@@ -194,7 +195,7 @@ class Runs:
         given = dict(zip(problem.names, values.T, strict=True))
         for name in problem.samples[0]:
             given[name] = np.tile([sample[name] for sample in problem.samples], len(points))
-        params, start = _split(given)
+        params, start = parameters_and_states(given)
         try:
             numbers = self._ensemble(params, start, metrics)
         except ParameterError:  # one of these values, or several of a block together
@@ -231,7 +232,8 @@ class Runs:
         problem, values, numbers = self.problem, self.problem.values(cube), []
         signals = list(dict.fromkeys(s for m in problem.metrics for s in m.signals))
         for sample in problem.samples:
-            params, start = _split(dict(zip(problem.names, values, strict=True)) | dict(sample))
+            given = dict(zip(problem.names, values, strict=True)) | dict(sample)
+            params, start = parameters_and_states(given)
             try:
                 run = sensitivity_response(
                     problem.diagram, problem.times, problem.inputs,
@@ -311,7 +313,11 @@ class Runs:
         """Return what gains are worth, with differences of runs towards the middle of the box."""
         problem, count = self.problem, len(self.problem.margins)
         every = (part for parts in problem.parts for part in parts)
-        parts = tuple(_Part.of(part, f"part {i}") for i, part in enumerate(every))
+        parts = tuple(
+            _Part(key=f"part {i}", start=part.start, end=part.end, signals=part.signals,
+                  function=part.function)
+            for i, part in enumerate(every)
+        )  # fmt: skip
         steps = np.where(cube < 0.5, _STEP, -_STEP)
         points = np.vstack([cube, cube + np.diag(steps)])
         here, *moved = self._tables(points, (*problem.metrics, *parts))
@@ -335,13 +341,6 @@ class _Part:
     end: float
     signals: Sequence[str]
     function: Any
-
-    @classmethod
-    def of(cls, metric: MetricLike, key: str) -> _Part:
-        return cls(
-            key=key, start=metric.start, end=metric.end, signals=metric.signals,
-            function=metric.function,
-        )  # fmt: skip
 
 
 def _graded(margins: np.ndarray) -> np.ndarray:
@@ -368,12 +367,6 @@ def _value(metric: MetricLike, run: Any) -> float:
     inside = (run.time >= metric.start) & (run.time <= metric.end)
     places = [run.signals.index(signal) for signal in metric.signals]
     return float(metric.function(run.time[inside], *run.values[places][:, inside].copy()))
-
-
-def _split(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return parameters and initial states."""
-    states = {n.removesuffix("(0)"): v for n, v in given.items() if n.endswith("(0)")}
-    return {n: v for n, v in given.items() if not n.endswith("(0)")}, states
 
 
 def checked_samples(samples: Mapping[str, Any], names: Sequence[str]) -> tuple[dict, ...]:

@@ -7,9 +7,7 @@ import numpy as np
 from ...equations import equation
 from ...functions import clip
 from ...params import param, record
-from ...plants import coordinate_names
-from .model_error import WeightedError, seen_error
-from .reference_model import model_state_names
+from .model_error import WeightedError, seen_error, state_and_model_names
 
 
 @record
@@ -72,12 +70,7 @@ class ConstrainedError(WeightedError):
 
     outputs = ("e", "r", "nu_e", "E_norm", "beta_hat")
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, xm1, ..., xmn, du."""
-        order = len(self.K)
-        return (*coordinate_names(order), *model_state_names(order), "du")
-
+    inputs = property(lambda self: (*state_and_model_names(len(self.K)), "du"))
     states = property(lambda self: (*(f"E_d{i + 1}" for i in range(len(self.K))), "beta_hat"))
 
     @equation

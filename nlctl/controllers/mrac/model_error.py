@@ -28,6 +28,11 @@ def seen_error(E, p):
     return E[0], np.sum(p.P_b * E), -np.sum(p.K * E), np.sqrt(np.sum(E * E))
 
 
+def state_and_model_names(order: int) -> tuple[str, ...]:
+    """Return ("x1", ..., "xn", "xm1", ..., "xmn")."""
+    return (*coordinate_names(order), *model_state_names(order))
+
+
 @record
 class WeightedError:
     """What errors of adaptive loops share: their gains, and the matrix P that weights them."""
@@ -79,10 +84,7 @@ class ModelError(WeightedError):
 
     outputs = ("e", "r", "nu_e", "E_norm")
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, xm1, ..., xmn."""
-        return (*coordinate_names(len(self.K)), *model_state_names(len(self.K)))
+    inputs = property(lambda self: state_and_model_names(len(self.K)))
 
     @equation
     def output(t, x, u, p):

@@ -61,11 +61,9 @@ class FunnelControl:
         set_integer(self, "order", at_least=1)
 
     plant_order = property(lambda self: self.order)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names x1, ..., xn, yd, ..., yd^(n-1)."""
-        return (*coordinate_names(self.order), *derivative_names(self.order - 1))
+    inputs = property(
+        lambda self: (*coordinate_names(self.order), *derivative_names(self.order - 1))
+    )
 
     @equation
     def output(t, x, u, p):

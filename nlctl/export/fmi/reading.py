@@ -18,7 +18,7 @@ from ...native.timed.ahead import ahead
 from ...sampling.clock import Clock, schedules
 from ...sliding.relay import SLIDING
 from ...wording import counted
-from ..words import c_name, check_written_out
+from ..words import c_name, check_written_out, refuse_if_any
 from .records import Happenings, Model
 from .variables import all_variables, value_references
 
@@ -62,24 +62,18 @@ def read_model(
 def _check(compiled: Compiled, what: str) -> None:
     """Refuse what the C of an FMU cannot say."""
     check_written_out(compiled, what)
-    if not ct.isctime(compiled.system):
-        raise CompileError(
-            f"'{what}' cannot be exported: it is in discrete time; put it into a diagram by "
-            "nlctl.sampled"
-        )
-    if compiled.schedule.lines:
-        raise CompileError(f"'{what}' cannot be exported: it has transport delays")
+    is_continuous = ct.isctime(compiled.system)
+    refuse_if_any(what, {
+        "is in discrete time; put it into a diagram by nlctl.sampled": not is_continuous,
+        "has transport delays": bool(compiled.schedule.lines),
+    })  # fmt: skip
     for relay in supplied_blocks(compiled.system, SLIDING):
         raise CompileError(
             f"'{what}' cannot be exported: block '{relay.name}' is an ideal relay, whose sliding "
             "an importer does not know; nlctl.Relay has a hysteresis"
         )
     beyond = compiled.lowered.conditions.beyond
-    if beyond:
-        raise CompileError(
-            f"'{what}' cannot be exported: it has {counted(beyond, 'condition')} more than are "
-            "located"
-        )
+    refuse_if_any(what, {f"has {counted(beyond, 'condition')} more than are located": beyond > 0})
 
 
 def _fixed(compiled: Compiled) -> set[int]:

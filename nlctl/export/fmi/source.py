@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable
 from importlib.resources import files
+from uuid import UUID
 
 from ..._version import __version__
 from ...native.codegen.c.body import CModule, c_number
@@ -15,7 +16,7 @@ from ..words import comment
 from .records import Model
 
 _SHORT = 1e-7  # of the stop time: over which is seen whether a memory reverses
-_SHARED = ("instance.h", "machine.h", "machine.c", "model.c", "wide.c")
+_SHARED = ("common.h", "instance.h", "machine.h", "machine.c", "model.c", "wide.c")
 
 
 def sources(model: Model, version: int) -> dict[str, str]:
@@ -27,21 +28,13 @@ def sources(model: Model, version: int) -> dict[str, str]:
     }  # fmt: skip
     equations, tables = _equations(model), f'#include "model.h"\n\n{_tables(model)}\n'
     text = "".join([equations, tables, *shared.values(), __version__])
-    header = _header(model, _uuid(hashlib.sha256(text.encode()).hexdigest()))
+    header = _header(model, f"{{{UUID(hashlib.sha256(text.encode()).hexdigest()[:32])}}}")
     return {"model.h": header, "equations.h": equations, "tables.c": tables, **shared}
 
 
 def token_of(text: dict[str, str]) -> str:
     """Return the token by which an importer knows that description and binary fit."""
     return text["model.h"].partition('#define TOKEN "')[2].partition('"')[0]
-
-
-def _uuid(digest: str) -> str:
-    return (
-        "{"
-        + "-".join(digest[a:b] for a, b in ((0, 8), (8, 12), (12, 16), (16, 20), (20, 32)))
-        + "}"
-    )
 
 
 def _header(model: Model, token: str) -> str:

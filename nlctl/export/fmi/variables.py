@@ -12,6 +12,7 @@ import numpy as np
 from ...diagrams import state_names
 from ...diagrams.parameters import declared_rules
 from ...native import Compiled
+from ...native.diagram.program import Program
 from ...params import Param
 from ..words import parameter_places
 from .records import Bounds, Variable
@@ -46,21 +47,10 @@ def all_variables(
     fixed: Collection[int],
 ) -> list[Variable]:
     """Return all variables; parameters at the places `fixed` are constants."""
-    program = compiled.program
-    still = {*program.memory, *program.sampled}
-    states = _states(state_names(diagram), at["states"], start, still, program.jumping)
-    rates = [
-        Variable(
-            name=f"der({v.name})", reference=v.reference - at["states"] + at["rates"],
-            causality="local", variability="continuous", initial="calculated",
-            meaning=f"rate of {v.name}", derivative_of=v.reference,
-        )
-        for i, v in enumerate(states) if i not in still
-    ]  # fmt: skip
     before = [
         Variable(name="time", reference=0, causality="independent", variability="continuous",
                  unit="s", meaning="time"),
-        *states, *rates,
+        *_states_and_rates(compiled.program, state_names(diagram), at, start),
     ]  # fmt: skip
     parameters = _parameters(compiled, diagram, at["parameters"], p, fixed)
     indicators = [
@@ -75,23 +65,28 @@ def all_variables(
     return [*before, *signals, *indicators, *parameters]
 
 
-def _states(
-    names: list[str],
-    first: int,
-    start: np.ndarray,
-    still: Collection[int],
-    jumping: Collection[tuple[int, int, int]],
+def _states_and_rates(
+    program: Program, names: list[str], at: dict[str, int], start: np.ndarray
 ) -> list[Variable]:
-    jump = {i for _, begin, end in jumping for i in range(begin, end)}
-    return [
+    still = {*program.memory, *program.sampled}
+    jump = {i for _, begin, end in program.jumping for i in range(begin, end)} - still
+    states = [
         Variable(
-            name=name, reference=first + i, causality="local", initial="exact",
+            name=name, reference=at["states"] + i, causality="local", initial="exact",
             variability="discrete" if i in still else "continuous", start=float(start[i]),
-            meaning="state of a computer or memory" if i in still else "state",
-            reinit=i in jump and i not in still,
+            meaning="state of a computer or memory" if i in still else "state", reinit=i in jump,
         )
         for i, name in enumerate(names)
     ]  # fmt: skip
+    rates = [
+        Variable(
+            name=f"der({v.name})", reference=v.reference - at["states"] + at["rates"],
+            causality="local", variability="continuous", initial="calculated",
+            meaning=f"rate of {v.name}", derivative_of=v.reference,
+        )
+        for i, v in enumerate(states) if i not in still
+    ]  # fmt: skip
+    return [*states, *rates]
 
 
 def _signals(diagram: Any, at: dict[str, int], known: set[str]) -> list[Variable]:
@@ -116,26 +111,18 @@ def _parameters(
     compiled: Compiled, diagram: Any, first: int, p: np.ndarray, fixed: Collection[int]
 ) -> list[Variable]:
     """Return every number of the parameter vector, with what its record says of it."""
-    rules = declared_rules(diagram)
-    return [
-        _parameter(
-            slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
-            first + place, float(p[place]), rules.get(slot.name), place not in fixed,
-        )
-        for slot, index, place in parameter_places(compiled)
-    ]  # fmt: skip
-
-
-def _parameter(
-    name: str, reference: int, value: float, rule: Param | None, may_change: bool
-) -> Variable:
-    return Variable(
-        name=name, reference=reference, initial="exact", start=value,
-        causality="parameter" if may_change else "local",
-        variability="tunable" if may_change else "constant",
-        unit="" if rule is None else rule.unit, meaning="" if rule is None else rule.meaning,
-        bounds=_bounds(rule, may_change),
-    )  # fmt: skip
+    rules, parameters = declared_rules(diagram), []
+    for slot, index, place in parameter_places(compiled):
+        rule, may_change = rules.get(slot.name), place not in fixed
+        parameters.append(Variable(
+            name=slot.name + (f"[{','.join(map(str, index))}]" if index else ""),
+            reference=first + place, initial="exact", start=float(p[place]),
+            causality="parameter" if may_change else "local",
+            variability="tunable" if may_change else "constant",
+            unit="" if rule is None else rule.unit, meaning="" if rule is None else rule.meaning,
+            bounds=_bounds(rule, may_change),
+        ))  # fmt: skip
+    return parameters
 
 
 def _bounds(rule: Param | None, may_change: bool) -> Bounds:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ...attributes import described_record
 from ...diagrams import state_names
 from ...diagrams.parameters import declared_rules
 from ...errors import ParameterError, UsageError
@@ -26,43 +26,23 @@ _FAULT = ("onset", "duration")  # what the record of every fault has
 _CLOSE = 8192 / 2  # switches of functions of time in a run that a page distinguishes
 
 
-@dataclass(frozen=True, kw_only=True)
+@described_record(made_by="handles")
 class Handle:
-    """One number that a page moves.
+    """One number that a page moves."""
 
-    Attributes
-    ----------
-    name : str
-        As ``nlctl simulate --set`` takes it: ``"plant.a"``, ``"plant.x1(0)"``; of an input its
-        label.
-    kind : {"p", "x", "u"}
-        A parameter, an initial state, an input.
-    place : int
-        Where it stands among all of its kind.
-    value, low, high : float
-        As reported, and the ends of its slider.
-    unit, meaning : str
-    fault : str
-        Name of the block of a fault whose onset it is: a switch, which sets the onset to the
-        value, or to a time that no run reaches.
-    is_on : bool
-        Whether that fault happens in the reported run.
-
-    Examples
-    --------
-    See `handles`.
-    """
-
+    # As ``nlctl simulate --set`` takes it: ``"plant.a"``, ``"plant.x1(0)"``; of an input its label.
     name: str
-    kind: str
-    place: int
-    value: float
+    kind: str  # ``"p"`` of a parameter, ``"x"`` of an initial state, ``"u"`` of an input.
+    place: int  # Where it stands among all of its kind.
+    value: float  # As reported, and the ends of its slider.
     low: float
     high: float
     unit: str = ""
     meaning: str = ""
+    # Name of the block of a fault whose onset it is: a switch, which sets the onset to the value,
+    # or to a time that no run reaches.
     fault: str = ""
-    is_on: bool = False
+    is_on: bool = False  # Whether that fault happens in the reported run.
 
 
 def handles(

@@ -19,9 +19,7 @@ _NUMBER = 8  # bytes of every number in a run's memory
 
 
 def memory_text(
-    records: Mapping[str, Any],
-    functions: Mapping[str, tuple[str, ...]],
-    filled: Collection[str],
+    records: Mapping[str, Any], functions: Mapping[str, tuple[str, ...]], filled: Collection[str]
 ) -> str:
     """Return the globals of records, each with its path as a name: ``task.rows.memory``.
 

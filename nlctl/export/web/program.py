@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import control as ct
@@ -12,6 +11,7 @@ import numpy as np
 
 from ... import native
 from ...annotations import as_annotated
+from ...attributes import described_record
 from ...errors import CompileError, ParameterError
 from ...native.driver import Course, prepared
 from ...native.integrate.log import new_log
@@ -22,7 +22,7 @@ from ...native.integrate.state import LANE, Status
 from ...native.run import Run
 from ...native.settings import Settings
 from ...responses.arguments import input_array, state_array
-from ..words import check_written_out, digest, parameter_values
+from ..words import check_written_out, digest, parameter_values, refuse_if_any
 from .here import carried_out
 from .host import HOST, HOST_FUNCTIONS
 from .linking import PROVIDED, check_linker, linked
@@ -42,46 +42,24 @@ _READ = (
 _OF_LANE = ("t", "status", "accepted", "rejected", "noted")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@described_record(made_by="web_program", eq=False)
 class WebProgram:
-    """A loop that runs in WebAssembly.
+    """A loop that runs in WebAssembly."""
 
-    Attributes
-    ----------
-    module : bytes
-        Its imports are functions of one and two numbers, those of `Math` in JavaScript.
-    facts : dict
-        What its host needs to know: sizes, and where numbers lie in records.
-    states, outputs, inputs : tuple of str
-        Labels, in the order of their arrays.
-    parameters : mapping of str to float
-        Every number of them by its name, in the order of their array.
-    compiled : Compiled
-        The diagram.
-    run : Run
-        The same run in this process, from the same memory; it has ended.
-    p, x0, u : ndarray
-        Parameters, initial states, and the inputs' samples of the reported run.
-    digest : str
-        A key of the program and its numbers.
-
-    Examples
-    --------
-    See `web_program`.
-    """
-
+    # Its imports are functions of one and two numbers, those of `Math` in JavaScript.
     module: bytes
-    facts: dict[str, Any]
-    states: tuple[str, ...]
+    facts: dict[str, Any]  # What its host needs to know: sizes, and where numbers lie in records.
+    states: tuple[str, ...]  # Labels, in the order of their arrays.
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    # Every number of them by its name, in the order of their array.
     parameters: Mapping[str, float]
-    compiled: native.Compiled
-    run: Run
-    p: np.ndarray
+    compiled: native.Compiled  # The diagram.
+    run: Run  # The same run in this process, from the same memory; it has ended.
+    p: np.ndarray  # Parameters, initial states, and the inputs' samples of the reported run.
     x0: np.ndarray
     u: np.ndarray
-    digest: str
+    digest: str  # A key of the program and its numbers.
 
     @property
     def signals(self) -> dict[str, np.ndarray]:
@@ -179,18 +157,15 @@ def _check(compiled: native.Compiled, what: str) -> None:
         "has transport delays, whose past has no bound on a page": bool(compiled.schedule.lines),
         "has no states": not compiled.nstates,
     }
-    for reason, holds in reasons.items():
-        if holds:
-            raise CompileError(f"'{what}' cannot run on a page: it {reason}")
+    refuse_if_any(what, reasons, "run on a page")
 
 
 def _check_library(text: str, what: str) -> None:
     """Refuse functions of the C library that JavaScript has not."""
     called = set(re.findall(r"^declare double @(\w+)\(double", text, re.MULTILINE))
-    if lacking := sorted(called - PROVIDED):
-        raise CompileError(
-            f"'{what}' cannot run on a page: it calls '{lacking[0]}', which JavaScript has not"
-        )
+    lacking = sorted(called - PROVIDED)
+    reasons = {f"calls '{name}', which JavaScript has not": True for name in lacking}
+    refuse_if_any(what, reasons, "run on a page")
 
 
 def _laid_out(

@@ -72,18 +72,6 @@ def zeros_like(graph: Graph, array: Any, dtype: Any = None) -> Any:
     return full(graph, array.shape, 0.0)
 
 
-@of(np.ones_like, makes=True)
-def ones_like(graph: Graph, array: Any, dtype: object = None) -> Any:
-    """Return ones in an array's shape."""
-    return elementwise(graph, "add", zeros_like(graph, array, dtype), 1.0)
-
-
-@of(np.full_like, makes=True)
-def full_like(graph: Graph, array: Any, value: object, dtype: object = None) -> Any:
-    """Return equal elements in an array's shape."""
-    return elementwise(graph, "add", zeros_like(graph, array, dtype), value)
-
-
 @of(np.array, makes=True)
 def array(graph: Graph, values: Any, dtype: Any = None, copy: Any = True, ndmin: int = 0) -> Any:
     """Return numbers, lists and arrays as an array of its own."""
@@ -132,29 +120,11 @@ def asarray(graph: Graph, values: Any, dtype: object = None) -> Any:
     return values
 
 
-@of(np.fromiter, makes=True)
-def fromiter(graph: Graph, values: Any, dtype: object, count: int = -1) -> Any:
-    """Return what an iterator yields as an array."""
-    return array(graph, list(values), dtype)
-
-
-@of(np.copy, makes=True)
-def copy(graph: Graph, values: Any) -> Any:
-    """Return a copy."""
-    return traced(graph, values).copy()
-
-
 @of(np.eye, makes=True)
 def eye(graph: Graph, n: int, m: Any = None, k: int = 0, dtype: Any = float) -> Any:
     """Return a matrix with ones on a diagonal."""
     matrix = np.eye(n, m, k, dtype)
     return traced(graph, matrix) if matrix.dtype == float else matrix
-
-
-@of(np.identity, makes=True)
-def _identity(graph: Graph, n: int, dtype: object = float) -> Any:
-    """Return the unit matrix."""
-    return eye(graph, n, dtype=dtype)
 
 
 @of(np.linspace)
@@ -221,3 +191,16 @@ class Joined:
 
 
 ARRAY_METHODS.update(astype=as_type)
+
+# what is one expression, of the graph
+_OF_GRAPHS = (
+    (np.ones_like, lambda graph, array, dtype=None:
+     elementwise(graph, "add", zeros_like(graph, array, dtype), 1.0)),
+    (np.full_like, lambda graph, array, value, dtype=None:
+     elementwise(graph, "add", zeros_like(graph, array, dtype), value)),
+    (np.fromiter, lambda graph, values, dtype, count=-1: array(graph, list(values), dtype)),
+    (np.copy, lambda graph, values: traced(graph, values).copy()),
+    (np.identity, lambda graph, n, dtype=float: eye(graph, n, dtype=dtype)),
+)  # fmt: skip
+for _function, _written in _OF_GRAPHS:
+    of(_function, makes=True)(_written)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
-from ..graph import Expr, Graph, Namespace, Untraceable
+from ..graph import Graph, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
-from ..operators import elementwise
+from ..operators import elementwise, is_of_arrays
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
@@ -212,18 +212,6 @@ class Builtins:
             return both, both
         beyond = op("lt" if name == "min" else "gt", other[1], one[1])
         return op("select", beyond, other[0], one[0]), op("select", beyond, other[1], one[1])
-
-
-def is_of_arrays(expr: Expr) -> bool:
-    """Whether a number is one of NumPy's: it depends on states or inputs."""
-    waiting, seen = [expr], set()
-    while waiting:
-        node = waiting.pop()
-        if node.op in ("call", "solve") or (node.op == "leaf" and node.data[0] in ("x", "u")):
-            return True
-        waiting.extend(arg for arg in node.args if arg not in seen)
-        seen.update(node.args)
-    return False
 
 
 @of(copy.copy, copy.deepcopy)

@@ -85,12 +85,6 @@ of(np.nanmax)(_extreme("maximum", ignores_nan=True))
 of(np.nanmin)(_extreme("minimum", ignores_nan=True))
 
 
-@formula(np.ptp)
-def ptp(np: Facade, values: Any, axis: Axis = None) -> Tracer:
-    """Return the distance between the largest and the smallest."""
-    return np.max(values, axis) - np.min(values, axis)
-
-
 @of(np.sum)
 def sum_along(
     graph: Graph, values: Any, axis: Axis = None, dtype: object = None, *, keepdims: bool = False,
@@ -149,12 +143,6 @@ def var(
     return np.sum(away * away, axis, keepdims=keepdims) / max(_count(array, axis) - ddof, 0.0)
 
 
-@formula(np.std)
-def std(np: Facade, values: Any, axis: Axis = None, **options: Any) -> Tracer:
-    """Return a standard deviation."""
-    return np.sqrt(np.var(values, axis, **options))
-
-
 @formula(np.average)
 def average(np: Facade, values: Any, axis: Axis = None, weights: Any = None) -> Tracer:
     """Return a weighted mean."""
@@ -184,19 +172,14 @@ def prod(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False
     return folded(graph, values, axis, keepdims, of_row)
 
 
-def _is_true(graph: Graph, e: Expr) -> Expr:
-    return e if e.kind == "b" else graph.op("ne", e, graph.const(0.0))
-
-
 def _of_truths(name: str, start: bool) -> Callable[..., Any]:
     def written(graph: Graph, values: Any, axis: Axis = None, *, keepdims: bool = False) -> Any:
         if isinstance(values, Masked):
             values = values.filled(start)
 
         def of_row(row: Sequence[Expr]) -> Expr:
-            truths = [_is_true(graph, e) for e in row]
-            return functools.reduce(lambda a, b: graph.op(name, a, b), truths or [
-                graph.const(start)])  # fmt: skip
+            truths = list(map(graph.truth, row)) or [graph.const(start)]
+            return functools.reduce(functools.partial(graph.op, name), truths)
 
         return folded(graph, values, axis, keepdims, of_row)
 
@@ -331,18 +314,6 @@ def _quantiles(graph: Graph, values: Any, q: Any, axis: Axis = None) -> Tracer:
     return quantiles[0] if not parts.shape else traced(graph, quantiles)
 
 
-@formula(np.percentile)
-def percentile(np: Facade, values: Any, q: Any, axis: Axis = None) -> Tracer:
-    """Return the value below which q per cent lie."""
-    return np.quantile(values, np.divide(q, 100.0), axis)
-
-
-@formula(np.nanmean)
-def nanmean(np: Facade, values: Any, axis: Axis = None) -> Tracer:
-    """Return a mean of what is not NaN."""
-    return np.nansum(values, axis) / np.sum(np.equal(values, values), axis)
-
-
 @formula(np.cov)
 def cov(np: Facade, m: Any, y: Any = None, *, bias: bool = False, ddof: Any = None) -> Tracer:
     """Return the covariances of rows."""
@@ -385,6 +356,19 @@ def norm(np: Facade, x: Any, ord: Any = None, axis: object = None, keepdims: boo
         raise Untraceable(f"the norm {ord!r} of this array")
     return np.sqrt(np.sum(x * x, axis=axis, keepdims=keepdims))
 
+
+# what is one expression
+_FORMULAS = (
+    (np.ptp, lambda np, values, axis=None: np.max(values, axis) - np.min(values, axis)),
+    (np.std, lambda np, values, axis=None, **options: np.sqrt(np.var(values, axis, **options))),
+    (np.percentile,
+     lambda np, values, q, axis=None: np.quantile(values, np.divide(q, 100.0), axis)),
+    (np.nanmean,
+     lambda np, values, axis=None:
+     np.nansum(values, axis) / np.sum(np.equal(values, values), axis)),
+)  # fmt: skip
+for _function, _written in _FORMULAS:
+    formula(_function)(_written)
 
 ARRAY_METHODS.update(
     {name: getattr(np, name) for name in ("max", "min", "sum", "mean", "var", "std", "prod", "any",

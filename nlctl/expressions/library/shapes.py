@@ -126,13 +126,6 @@ def append(graph: Graph, array: Any, values: Any, axis: object = None) -> Tracer
     return concatenated(graph, [a.reshape(-1) for a in arrays])
 
 
-@of(np.outer)
-def outer(graph: Graph, a: Any, b: Any) -> Tracer:
-    """Return all products."""
-    a, b = (traced(graph, v).reshape(-1) for v in (a, b))
-    return a[:, None] * b
-
-
 @of(np.diff)
 def diff(graph: Graph, a: Any, n: int = 1, axis: int = -1, **ends: Any) -> Tracer:
     """Return differences of neighbours."""
@@ -254,12 +247,6 @@ def size(graph: Graph, values: Any, axis: Any = None) -> int:
     return array.size if axis is None else array.shape[axis]
 
 
-@of(np.shape)
-def shape(graph: Graph, values: Any) -> tuple[int, ...]:
-    """Return the shape."""
-    return traced(graph, values).shape
-
-
 def permuted(graph: Graph, values: Any, *axes: Any) -> Tracer:
     """Return an array with its axes in another order."""
     order = axes[0] if len(axes) == 1 and isinstance(axes[0], tuple | list | None) else axes
@@ -297,6 +284,9 @@ _OF_GRAPHS = (
     ((np.ravel,), lambda graph, values, order='C': traced(graph, values).reshape(-1, order=order)),
     ((np.reshape,),
      lambda graph, values, shape, order='C': traced(graph, values).reshape(shape, order=order)),
+    ((np.outer,), lambda graph, a, b:
+     traced(graph, a).reshape(-1)[:, None] * traced(graph, b).reshape(-1)),
+    ((np.shape,), lambda graph, values: traced(graph, values).shape),
     ((np.ndim,), lambda graph, values: traced(graph, values).ndim),
     ((np.isscalar,), lambda graph, value: not traced(graph, value).shape),
 )  # fmt: skip

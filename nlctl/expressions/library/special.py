@@ -105,16 +105,6 @@ def logsumexp(np: Facade, a: Any, axis: object = None) -> Any:
     return logarithm + (np.sum(top) if axis is None else np.squeeze(top, axis=axis))
 
 
-def exp10(np: Facade, x: Any) -> Any:
-    """10^x."""
-    return np.power(10.0, x)
-
-
-def ndtr(np: Facade, x: Any) -> Any:
-    """The distribution function of the normal distribution."""
-    return 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x)
-
-
 def huber(np: Facade, delta: Any, r: Any) -> Any:
     """r^2 / 2 up to |r| = delta, linear beyond."""
     size = np.abs(r)
@@ -130,8 +120,8 @@ def pseudo_huber(np: Facade, delta: Any, r: Any) -> Any:
 
 
 _FORMULAS = {
-    "exp10": exp10,
-    "ndtr": ndtr,
+    "exp10": lambda np, x: np.power(10.0, x),
+    "ndtr": lambda np, x: 0.5 * _elementwise("erfc", np.graph, -1.0 * math.sqrt(0.5) * x),
     "huber": huber,
     "pseudo_huber": pseudo_huber,
     "expit": lambda np, x: 1.0 / (1.0 + np.exp(-1.0 * x)),
@@ -170,16 +160,10 @@ def dist(np: Facade, p: Any, q: Any) -> Tracer:
     return np.sqrt(np.sum(apart * apart))
 
 
-@of(math.fsum)
-def fsum(graph: Graph, values: Any) -> Tracer:
-    """Return a sum."""
-    return sum_along(graph, list(values))
-
-
-@of(math.prod)
-def _product(graph: Graph, values: Any, *, start: Any = 1) -> Tracer:
-    """Return a product."""
-    return elementwise(graph, "mul", start, prod(graph, list(values)))
+of(math.fsum)(lambda graph, values: sum_along(graph, list(values)))
+of(math.prod)(
+    lambda graph, values, *, start=1: elementwise(graph, "mul", start, prod(graph, list(values)))
+)
 
 
 @formula(math.remainder)

@@ -12,7 +12,7 @@ from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .surfaces import surface
 from .table import enter
-from .tables import MOST_PIECES, constant_cells, interval_choice, polynomial
+from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
 
 
 def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
@@ -38,10 +38,7 @@ def _kinds() -> tuple[tuple[Any, Callable[..., Any]], ...]:
         (interpolate.BivariateSpline, surface),
         (interpolate.RegularGridInterpolator, _grid),
         (np.poly1d, lambda graph, p, x: polynomial(graph, x, _floats(p.coeffs[::-1]))),
-        (
-            tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS),
-            _mapped_polynomial,
-        ),
+        (tuple(getattr(np.polynomial, name) for name in _POLYNOMIALS), _mapped_polynomial),
     )
 
 
@@ -83,9 +80,7 @@ def piecewise_polynomial(
         raise Untraceable("a piecewise polynomial with too many pieces")
 
     def at(e: Expr) -> Expr:
-        pieces = [_of_piece(graph, e, breaks[j], coefficients[:, j])
-                  for j in range(breaks.size - 1)]  # fmt: skip
-        value = interval_choice(graph, e, list(breaks[1:-1]), pieces)
+        value = interval_polynomial(graph, e, breaks, coefficients.T)
         nan = graph.const(np.nan)
         return value if extrapolate else _beyond(graph, e, (breaks[0], breaks[-1]), value, nan, nan)
 
@@ -104,15 +99,6 @@ def _guard_range(graph: Graph, x: Expr, ends: Sequence[Any]) -> None:
     """Note that SciPy raises an error beyond the ends of a range."""
     graph.guards.append(graph.op("ge", x, graph.const(float(ends[0]))))
     graph.guards.append(graph.op("le", x, graph.const(float(ends[-1]))))
-
-
-def _of_piece(graph: Graph, x: Expr, start: float, coefficients: np.ndarray) -> Expr:
-    """Return a polynomial in x - start, the highest power first in the coefficients."""
-    inside = graph.op("sub", x, graph.const(float(start)))
-    value = graph.const(float(coefficients[0]))
-    for c in coefficients[1:]:
-        value = graph.op("add", graph.op("mul", value, inside), graph.const(float(c)))
-    return value
 
 
 def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None) -> Any:
@@ -180,7 +166,8 @@ def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
     if values.ndim != 1:
         raise Untraceable("a table with several values")
     if kind in ("linear", "linear-np", "slinear") and not hasattr(thing, "_spline"):
-        rule = functools.partial(_line, graph, thing.x, values)
+        lines = np.stack([np.diff(values) / np.diff(thing.x), values[:-1]], axis=1)
+        rule = lambda e: interval_polynomial(graph, e, thing.x, lines)  # noqa: E731
     elif hasattr(thing, "_spline"):
         spline = _of_one_value(thing._spline)
         rule = lambda e: b_spline(graph, spline, scalar(graph, e), 0, True).only  # noqa: E731
@@ -212,17 +199,6 @@ def _fill(thing: Any) -> tuple[Any, Any]:
     if thing._extrapolate:
         return None, None
     return thing._fill_value_below, thing._fill_value_above
-
-
-def _line(graph: Graph, places: np.ndarray, values: np.ndarray, x: Expr) -> Expr:
-    """Return the line of the interval of x, those at the ends beyond them, too."""
-    op, const = graph.op, graph.const
-    pieces = []
-    for j in range(len(places) - 1):
-        slope = (values[j + 1] - values[j]) / (places[j + 1] - places[j])
-        inside = op("sub", x, const(float(places[j])))
-        pieces.append(op("add", op("mul", const(float(slope)), inside), const(float(values[j]))))
-    return interval_choice(graph, x, list(map(float, places[1:-1])), pieces)
 
 
 def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Tracer, mapped, traced
 from ..graph import Expr, Graph, Untraceable
-from .tables import MOST_PIECES, constant_cells, interval_choice
+from .tables import MOST_PIECES, constant_cells, interval_polynomial
 
 
 def surface(
@@ -60,12 +60,14 @@ def _clipped(graph: Graph, knots: np.ndarray, degree: int) -> Callable[[Expr], E
 
 def _at(graph: Graph, axes: Sequence[_Axis], c: np.ndarray, x: Expr, y: Expr) -> Expr:
     along_y = np.einsum("ij,jpk->ipk", c, axes[1][1])  # of each row: polynomials in the pieces of y
-    rows = [_chosen(graph, axes[1][0], constant_cells(graph, row), y) for row in along_y]
+    rows = [
+        interval_polynomial(graph, y, axes[1][0], constant_cells(graph, row)) for row in along_y
+    ]
     breaks, basis = axes[0]
     pieces = np.empty(basis.shape[1:], dtype=object)
     for place in np.ndindex(pieces.shape):
         pieces[place] = _weighted(graph, basis[(slice(None), *place)], rows)
-    return _chosen(graph, breaks, pieces, x)
+    return interval_polynomial(graph, x, breaks, pieces)
 
 
 def _weighted(graph: Graph, weights: np.ndarray, values: Sequence[Expr]) -> Expr:
@@ -74,14 +76,3 @@ def _weighted(graph: Graph, weights: np.ndarray, values: Sequence[Expr]) -> Expr
         if weight:
             total = graph.op("add", total, graph.op("mul", graph.const(float(weight)), value))
     return total
-
-
-def _chosen(graph: Graph, breaks: np.ndarray, pieces: np.ndarray, x: Expr) -> Expr:
-    """Return the polynomial of the interval of x, the highest power first."""
-    values = []
-    for start, polynomial in zip(breaks[:-1], pieces, strict=True):
-        inside, value = graph.op("sub", x, graph.const(float(start))), polynomial[0]
-        for c in polynomial[1:]:
-            value = graph.op("add", graph.op("mul", value, inside), c)
-        values.append(value)
-    return interval_choice(graph, x, list(map(float, breaks[1:-1])), values)

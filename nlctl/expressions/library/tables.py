@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,23 @@ def interval_choice(graph: Graph, x: Expr, bounds: Sequence[float], pieces: Sequ
     return graph.op("select", below, low, high)
 
 
+def interval_polynomial(
+    graph: Graph, x: Expr, breaks: Any, pieces: Iterable[Iterable[Any]]
+) -> Expr:
+    """Return the polynomial in x - start of the interval of x, the highest power first."""
+
+    def expr(c: Any) -> Expr:
+        return c if isinstance(c, Expr) else graph.const(float(c))
+
+    values = []
+    for start, (first, *others) in zip(breaks[:-1], pieces, strict=True):
+        inside, value = graph.op("sub", x, graph.const(float(start))), expr(first)
+        for c in others:
+            value = graph.op("add", graph.op("mul", value, inside), expr(c))
+        values.append(value)
+    return interval_choice(graph, x, list(breaks[1:-1]), values)
+
+
 @of(np.interp)
 def interp(
     graph: Graph, x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None
@@ -67,13 +85,12 @@ def _linear(
     """Return NumPy's formula of an interval: slope (x - x_j) + f_j, and f_j at the last place."""
     op, const = graph.op, graph.const
     x = graph.number(x)
-    pieces = []
-    for j in range(places.size - 1):
-        rise = op("sub", values[j + 1], values[j])
-        slope = op("div", rise, const(float(places[j + 1] - places[j])))
-        inside = op("sub", x, const(float(places[j])))
-        pieces.append(op("add", op("mul", slope, inside), values[j]))
-    value = interval_choice(graph, x, list(places[1:-1]), pieces) if pieces else values[0]
+    slopes = (
+        op("div", op("sub", b, a), const(float(width)))
+        for (a, b), width in zip(pairwise(values), np.diff(places), strict=True)
+    )
+    pieces = zip(slopes, values, strict=False)
+    value = interval_polynomial(graph, x, places, pieces) if places.size > 1 else values[0]
     value = op("select", op("eq", x, const(float(places[-1]))), values[-1], value)
     value = op("select", op("gt", x, const(float(places[-1]))), right, value)
     return op("select", op("lt", x, const(float(places[0]))), left, value)

@@ -1,22 +1,27 @@
 /* FMI 3.0, Model Exchange and Co-Simulation. */
 #include "fmi3Functions.h"
-#include "instance.h"
 
-#define THIS Instance *i = (Instance *)instance
-#define CHECKED(what) ((what) ? failure(i) : fmi3OK)
+#define FMI(name) fmi3##name
+#define STATE(before, behind) STATE_(before, behind)
+#define STATE_(before, behind) fmi3##before##FMUState##behind
+#define DESERIALIZE Deserialize
+#define RATES fmi3GetContinuousStateDerivatives
+#define OK fmi3OK
+#define FAILED fmi3Error
 #define VR const fmi3ValueReference
+typedef fmi3Instance Component;
+typedef fmi3Status Status;
+typedef fmi3Float64 Real;
+typedef fmi3Boolean Boolean;
+typedef fmi3String Text;
+typedef fmi3Byte Byte;
+typedef fmi3FMUState Kept;
+#include "common.h"
 
-static fmi3Status failure(Instance *i)
+static void say(Instance *i)
 {
   fmi3LogMessageCallback log = (fmi3LogMessageCallback)(size_t)i->logger;
-  if (log) log(i->environment, fmi3Error, "logStatusError", i->machine.message);
-  return fmi3Error;
-}
-
-static fmi3Status refused(fmi3Instance instance, const char *what)
-{
-  THIS;
-  return CHECKED(complain(i, what) < 0);
+  log(i->environment, fmi3Error, "logStatusError", i->machine.message);
 }
 
 static fmi3Instance made(fmi3String name, fmi3String token, int co_simulation, void *environment,
@@ -26,21 +31,7 @@ static fmi3Instance made(fmi3String name, fmi3String token, int co_simulation, v
   if (!i) return NULL;
   i->logger = (void *)(size_t)log;
   i->environment = environment;
-  if (token && strcmp(token, TOKEN) == 0) return i;
-  (void)refused(i, "the instantiation token is that of another FMU");
-  free(i);
-  return NULL;
-}
-
-const char *fmi3GetVersion(void) { return fmi3Version; }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on, size_t n,
-                               const fmi3String names[])
-{
-  THIS;
-  (void)n, (void)names;
-  i->logs = on;
-  return fmi3OK;
+  return checked(i, token, "the instantiation token is that of another FMU");
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
@@ -75,55 +66,30 @@ fmi3Instance fmi3InstantiateScheduledExecution(
   return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
-
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean has_tolerance,
+fmi3Status fmi3EnterInitializationMode(fmi3Instance component, fmi3Boolean has_tolerance,
                                        fmi3Float64 tolerance, fmi3Float64 start,
                                        fmi3Boolean has_stop, fmi3Float64 stop)
 {
   THIS;
   (void)has_stop, (void)stop;
-  if (has_tolerance && tolerance > 0.0) i->machine.tolerance = tolerance;
-  i->machine.t = start;
+  begin_at(i, has_tolerance, tolerance, start);
   machine_changed(&i->machine);
   return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
-{
-  THIS;
-  return CHECKED(i->co_simulation && machine_event(&i->machine) < 0);
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance)
-{
-  THIS;
-  machine_begin(&i->machine);
-  return fmi3OK;
-}
-
-#define NOTHING_TO_DO(name)                                                                       \
-  fmi3Status name(fmi3Instance instance)                                                          \
-  {                                                                                               \
-    (void)instance;                                                                               \
-    return fmi3OK;                                                                                \
-  }
-NOTHING_TO_DO(fmi3EnterEventMode)
-NOTHING_TO_DO(fmi3Terminate)
 NOTHING_TO_DO(fmi3EnterConfigurationMode)
 NOTHING_TO_DO(fmi3ExitConfigurationMode)
 NOTHING_TO_DO(fmi3EvaluateDiscreteStates)
-NOTHING_TO_DO(fmi3EnterContinuousTimeMode)
 NOTHING_TO_DO(fmi3EnterStepMode)
 
-fmi3Status fmi3GetFloat64(fmi3Instance instance, VR vr[], size_t n, fmi3Float64 values[], size_t m)
+fmi3Status fmi3GetFloat64(fmi3Instance component, VR vr[], size_t n, fmi3Float64 values[], size_t m)
 {
   THIS;
   if (n != m) return refused(i, "all variables are numbers, a value each");
   return CHECKED(get_all(i, vr, n, values));
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance instance, VR vr[], size_t n, const fmi3Float64 values[],
+fmi3Status fmi3SetFloat64(fmi3Instance component, VR vr[], size_t n, const fmi3Float64 values[],
                           size_t m)
 {
   THIS;
@@ -132,10 +98,10 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, VR vr[], size_t n, const fmi3Fl
 }
 
 #define NO_VARIABLES(name, kind)                                                                  \
-  fmi3Status name(fmi3Instance instance, VR vr[], size_t n, kind values[], size_t m)               \
+  fmi3Status name(fmi3Instance component, VR vr[], size_t n, kind values[], size_t m)             \
   {                                                                                               \
     (void)vr, (void)values, (void)m;                                                              \
-    return n ? refused(instance, "all variables are of type Float64") : fmi3OK;                    \
+    return n ? refused(component, "all variables are of type Float64") : fmi3OK;                  \
   }
 #define NO_VARIABLES_OF(kind)                                                                     \
   NO_VARIABLES(fmi3Get##kind, fmi3##kind)                                                         \
@@ -152,31 +118,31 @@ NO_VARIABLES_OF(UInt64)
 NO_VARIABLES_OF(Boolean)
 NO_VARIABLES_OF(String)
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, VR vr[], size_t n, size_t sizes[],
+fmi3Status fmi3GetBinary(fmi3Instance component, VR vr[], size_t n, size_t sizes[],
                          fmi3Binary values[], size_t m)
 {
   (void)vr, (void)sizes, (void)values, (void)m;
-  return n ? refused(instance, "all variables are of type Float64") : fmi3OK;
+  return n ? refused(component, "all variables are of type Float64") : fmi3OK;
 }
 
-fmi3Status fmi3SetBinary(fmi3Instance instance, VR vr[], size_t n, const size_t sizes[],
+fmi3Status fmi3SetBinary(fmi3Instance component, VR vr[], size_t n, const size_t sizes[],
                          const fmi3Binary values[], size_t m)
 {
   (void)vr, (void)sizes, (void)values, (void)m;
-  return n ? refused(instance, "all variables are of type Float64") : fmi3OK;
+  return n ? refused(component, "all variables are of type Float64") : fmi3OK;
 }
 
 #define NO_CLOCKS(name, ...)                                                                      \
-  fmi3Status name(fmi3Instance instance, VR vr[], size_t n, __VA_ARGS__)                           \
+  fmi3Status name(fmi3Instance component, VR vr[], size_t n, __VA_ARGS__)                         \
   {                                                                                               \
     (void)vr, (void)a, (void)b;                                                                   \
-    return n ? refused(instance, "there are no clocks: next event times are given") : fmi3OK;      \
+    return n ? refused(component, "there are no clocks: next event times are given") : fmi3OK;    \
   }
 #define NO_CLOCK(name, kind)                                                                      \
-  fmi3Status name(fmi3Instance instance, VR vr[], size_t n, kind a[])                              \
+  fmi3Status name(fmi3Instance component, VR vr[], size_t n, kind a[])                            \
   {                                                                                               \
     (void)vr, (void)a;                                                                            \
-    return n ? refused(instance, "there are no clocks: next event times are given") : fmi3OK;      \
+    return n ? refused(component, "there are no clocks: next event times are given") : fmi3OK;    \
   }
 NO_CLOCK(fmi3GetClock, fmi3Clock)
 NO_CLOCK(fmi3SetClock, const fmi3Clock)
@@ -188,80 +154,39 @@ NO_CLOCKS(fmi3SetIntervalFraction, const fmi3UInt64 a[], const fmi3UInt64 b[])
 NO_CLOCK(fmi3SetShiftDecimal, const fmi3Float64)
 NO_CLOCKS(fmi3SetShiftFraction, const fmi3UInt64 a[], const fmi3UInt64 b[])
 
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance, VR vr[], size_t n, fmi3UInt64 counters[],
+fmi3Status fmi3GetIntervalFraction(fmi3Instance component, VR vr[], size_t n, fmi3UInt64 counters[],
                                    fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
 {
   (void)vr, (void)counters, (void)resolutions, (void)qualifiers;
-  return n ? refused(instance, "there are no clocks: next event times are given") : fmi3OK;
+  return n ? refused(component, "there are no clocks: next event times are given") : fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference vr,
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance component, fmi3ValueReference vr,
                                                size_t *n)
 {
   (void)vr, (void)n;
-  return refused(instance, "dependencies are not provided");
+  return refused(component, "dependencies are not provided");
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference vr, size_t of[],
+fmi3Status fmi3GetVariableDependencies(fmi3Instance component, fmi3ValueReference vr, size_t of[],
                                        fmi3ValueReference on[], size_t elements[],
                                        fmi3DependencyKind kinds[], size_t n)
 {
   (void)vr, (void)of, (void)on, (void)elements, (void)kinds, (void)n;
-  return refused(instance, "dependencies are not provided");
-}
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
-{
-  THIS;
-  return CHECKED(keep_state(i, state) < 0);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState state)
-{
-  THIS;
-  i->machine = *(const Machine *)state;
-  return fmi3OK;
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *state)
-{
-  (void)instance;
-  free_state(state);
-  return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState state, size_t *size)
-{
-  (void)instance, (void)state;
-  *size = sizeof(Machine);
-  return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[],
-                                 size_t size)
-{
-  THIS;
-  return CHECKED(write_state(i, state, bytes, size) < 0);
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[], size_t size,
-                                   fmi3FMUState *state)
-{
-  THIS;
-  return CHECKED(read_state(i, bytes, size, state) < 0);
+  return refused(component, "dependencies are not provided");
 }
 
 #define NO_DERIVATIVE(name)                                                                       \
-  fmi3Status name(fmi3Instance instance, VR of[], size_t n, VR by[], size_t m,                     \
-                  const fmi3Float64 seed[], size_t k, fmi3Float64 result[], size_t l)              \
+  fmi3Status name(fmi3Instance component, VR of[], size_t n, VR by[], size_t m,                   \
+                  const fmi3Float64 seed[], size_t k, fmi3Float64 result[], size_t l)             \
   {                                                                                               \
-    (void)of, (void)n, (void)by, (void)m, (void)seed, (void)k, (void)result, (void)l;              \
-    return refused(instance, "directional derivatives are not provided");                         \
+    (void)of, (void)n, (void)by, (void)m, (void)seed, (void)k, (void)result, (void)l;             \
+    return refused(component, "directional derivatives are not provided");                        \
   }
 NO_DERIVATIVE(fmi3GetDirectionalDerivative)
 NO_DERIVATIVE(fmi3GetAdjointDerivative)
 
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *again,
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance component, fmi3Boolean *again,
                                     fmi3Boolean *terminate, fmi3Boolean *nominals,
                                     fmi3Boolean *values, fmi3Boolean *defined, fmi3Float64 *next)
 {
@@ -276,79 +201,30 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *again,
 
 /* -- Model Exchange */
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_return,
-                                       fmi3Boolean *event, fmi3Boolean *terminate)
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance component, size_t *n)
 {
-  THIS;
-  (void)no_return;
-  int needed = machine_completed(&i->machine);
-  *event = needed > 0;
-  *terminate = fmi3False;
-  return CHECKED(needed < 0);
-}
-
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
-{
-  THIS;
-  return CHECKED(machine_set(&i->machine, 0, time) < 0);
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 x[], size_t n)
-{
-  THIS;
-  return CHECKED(set_continuous(i, x, n) < 0);
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 dx[], size_t n)
-{
-  THIS;
-  return CHECKED(get_continuous(i, machine_rates(&i->machine), dx, n) < 0);
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 z[], size_t n)
-{
-  THIS;
-  return CHECKED(get_indicators(i, z, n) < 0);
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 x[], size_t n)
-{
-  THIS;
-  return CHECKED(get_continuous(i, i->machine.x, x, n) < 0);
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
-                                             size_t n)
-{
-  (void)instance;
-  for (size_t k = 0; k < n; ++k) nominals[k] = 1.0;
-  return fmi3OK;
-}
-
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *n)
-{
-  (void)instance;
+  (void)component;
   *n = N_INDICATORS;
   return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *n)
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance component, size_t *n)
 {
-  (void)instance;
+  (void)component;
   *n = N_CONTINUOUS;
   return fmi3OK;
 }
 
 /* -- Co-Simulation */
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, VR vr[], size_t n,
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance component, VR vr[], size_t n,
                                     const fmi3Int32 orders[], fmi3Float64 values[], size_t m)
 {
   (void)vr, (void)n, (void)orders, (void)values, (void)m;
-  return refused(instance, "derivatives of outputs are not provided");
+  return refused(component, "derivatives of outputs are not provided");
 }
 
-fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 begin, fmi3Float64 length,
+fmi3Status fmi3DoStep(fmi3Instance component, fmi3Float64 begin, fmi3Float64 length,
                       fmi3Boolean no_return, fmi3Boolean *event, fmi3Boolean *terminate,
                       fmi3Boolean *early, fmi3Float64 *reached)
 {
@@ -360,9 +236,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 begin, fmi3Float64 leng
   return CHECKED(result < 0);
 }
 
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clock,
+fmi3Status fmi3ActivateModelPartition(fmi3Instance component, fmi3ValueReference clock,
                                       fmi3Float64 time)
 {
   (void)clock, (void)time;
-  return refused(instance, "there is no scheduled execution");
+  return refused(component, "there is no scheduled execution");
 }
