@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import control as ct
 
@@ -100,7 +100,7 @@ def loop_report(
     blocks, states = counted(len(list(leaves(loop))), "block"), counted(loop.nstates or 0, "state")
     sentences = [f"The loop '{loop.name}' has {blocks} and {states}."]
     parts = diagram_sections(loop, ("loop", "loop-equations"))
-    given = {}
+    given, kept = {}, None
     if response is not None:
         given = own_parameters(loop, response) if params is None else dict(params)
         check_response(loop, response, given)
@@ -108,16 +108,16 @@ def loop_report(
     moved = _moved(loop, response, given, live)
     parts += sections
     _proved(loop, ledger, certificate, sentences, parts)
-    studied = _Studied(requirements=requirements)
     if study is not None:
         _check_study(loop, study)
         sentences.append(without_assumptions(study.verdict))
-        studied = _runs_again(study, requirements)
-        parts += _study_parts(study, studied)
+        of_study, kept, lost = _runs_again(study)
+        requirements = (*requirements, *of_study)
+        parts += _study_parts(study, kept, lost)
     if moved is not None:
         item = live_item(
             moved, response, () if isinstance(live, bool) else live, signals=signals,
-            requirements=studied.requirements, histories=studied.kept, command=repeat, base=given,
+            requirements=requirements, histories=kept, command=repeat, base=given,
         )  # fmt: skip
         parts = [_with_live(part, item) for part in parts]
     described, sources = ([], []) if study is None else methods(study)
@@ -177,31 +177,23 @@ def _with_live(section: Section, item: Live) -> Section:
     return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
 
 
-class _Studied(NamedTuple):
-    """Requirements on a loop, some runs of its study, and what was lost of that."""
-
-    requirements: Sequence[Requirement]
-    kept: Histories | None = None
-    lost: Sequence[str] = ()
-
-
-def _runs_again(result: Result, requirements: Sequence[Requirement]) -> _Studied:
-    """Return what a study requires, and some of its runs again."""
+def _runs_again(result: Result) -> tuple[Sequence[Requirement], Histories | None, list[str]]:
+    """Return what a study requires, some of its runs again, and what was lost of that."""
     lost: list[str] = []
     prepared = loop_again(result, notify=lost.append)
     of_study = () if prepared is None else prepared.experiment.spec.requirements
-    return _Studied((*requirements, *of_study), rows_again(result, prepared), lost)
+    return of_study, rows_again(result, prepared), lost
 
 
-def _study_parts(result: Result, studied: _Studied) -> list[Section]:
+def _study_parts(result: Result, kept: Histories | None, lost: Sequence[str]) -> list[Section]:
     """Return a study as the part behind everything else."""
-    intro = [result.study.study.question or result.study.study.title, *studied.lost]
+    intro = [result.study.study.question or result.study.study.title, *lost]
     heading = Section(
         key="study",
         title=f"The study: {result.study.study.title}",
         items=[Paragraph(text=words) for words in intro],
     )
-    return [heading, *study_sections(result, studied.kept, prefix="study-", level=3, limits=False)]
+    return [heading, *study_sections(result, kept, prefix="study-", level=3, limits=False)]
 
 
 def _numbers(response: Any, study: Result | None, moved: WebProgram | None) -> dict[str, Any]:
