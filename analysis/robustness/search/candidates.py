@@ -135,7 +135,9 @@ def unit_places(space: Space, table: pd.DataFrame) -> np.ndarray:
     """Return the places of rows in their boxes, the opposite of `from_unit_cube`."""
     box = ends(space)
     low, high = box.to_numpy()
-    return np.clip((table[box.columns].to_numpy(dtype=float) - low) / (high - low), 0.0, 1.0)
+    inside = table[box.columns].to_numpy(dtype=float) - low
+    wide = np.where(high > low, high - low, np.inf)  # an integer may have a single value
+    return np.where(high > low, np.clip(inside / wide, 0.0, 1.0), 0.5)
 
 
 def _strategy(start: np.ndarray, size: int, rng: np.random.Generator) -> Any:

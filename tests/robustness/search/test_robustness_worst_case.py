@@ -348,3 +348,15 @@ class TestConfirm:
         assert found.witness == {"mass.damping": pytest.approx(0.15), "mass.growth": 1.5}
         small = shrink(partial(evaluate, made), space, found.witness)
         assert small.names == ("mass.growth",)
+
+
+def test_an_integer_that_is_scaled_to_one_value_stands_still():
+    """x in 4 +- 2 scaled by 0.1 rounds to 4: the search goes on with the other numbers."""
+    integers = Uncertain(name="n", law=stats.randint(2, 7), nominal=4)
+    space = scaled(Space(quantities=(*box(2).quantities, integers)), 0.1)
+    worst = worst_case(
+        lambda table: table.assign(spec=table["x0"] + table["x1"]), space, 60, entropy=3
+    )
+    assert worst.runs["CMA-ES"] > 0
+    assert set(worst.design.table["n"]) == {4}
+    assert worst.margin == pytest.approx(-0.2, abs=1e-12)
