@@ -185,7 +185,7 @@ def record(cls: type[_T]) -> type[_T]:
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     _complete(described)
-    described.__doc__ = _Docstring(doc or "")
+    described.__doc__ = _DocstringOfRecord(doc or "")
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
     @functools.wraps(init)
@@ -221,7 +221,7 @@ def _complete(cls: Any) -> None:
             cls.states = getattr(cls, "states", ())
 
 
-class _Docstring:
+class _DocstringOfRecord:
     """The docstring of a record, completed when somebody reads it."""
 
     def __init__(self, text: str) -> None:
