@@ -52,10 +52,13 @@ class NumPyFunctions:
     pair: Any
     table: Any
     _compared: Any  # ``_compared("lt", other)`` is ``self < other``, and so on
-    __lt__: Any
-    __le__: Any
-    __gt__: Any
-    __ge__: Any
+
+    __lt__, __le__ = _calling("_compared", "lt"), _calling("_compared", "le")
+    __gt__, __ge__ = _calling("_compared", "gt"), _calling("_compared", "ge")
+    __eq__, __ne__ = _calling("_compared", "eq"), _calling("_compared", "ne")
+    __floor__, __ceil__ = _calling("apply", "floor"), _calling("apply", "ceil")
+    __trunc__ = _calling("apply", "trunc")
+    __mod__ = _calling("pair", "remainder")
 
     def __pos__(self) -> Any:
         return self
@@ -99,9 +102,6 @@ class NumPyFunctions:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
 
-    def __mod__(self, other: object) -> Any:
-        return self.pair("remainder", other)
-
     def __floordiv__(self, other: object) -> Any:
         return (self / other).apply("floor")  # type: ignore[operator]
 
@@ -124,22 +124,11 @@ class NumPyFunctions:
             return NotImplemented
         return self.apply("rint")
 
-    def __trunc__(self) -> Any:
-        return self.apply("trunc")
-
-    def __floor__(self) -> Any:
-        return self.apply("floor")
-
-    def __ceil__(self) -> Any:
-        return self.apply("ceil")
-
 
 for _name in _SINGLE:
     setattr(NumPyFunctions, _name, _calling("apply", _name))
 for _name in FUNCTIONS_OF_TWO:
     setattr(NumPyFunctions, _name, _calling("pair", _name))
-for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    setattr(NumPyFunctions, f"__{_name}__", _calling("_compared", _name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:
