@@ -25,7 +25,7 @@ _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 
 
-def _calling(method: str, name: str) -> Callable[..., Any]:
+def calling(method: str, name: str) -> Callable[..., Any]:
     """Return what calls a method of a number with a name: NumPy looks for ``x.sin()``, say."""
     return lambda self, *others: getattr(self, method)(name, *others)
 
@@ -53,12 +53,12 @@ class NumPyFunctions:
     table: Any
     _compared: Any  # ``_compared("lt", other)`` is ``self < other``, and so on
 
-    __lt__, __le__ = _calling("_compared", "lt"), _calling("_compared", "le")
-    __gt__, __ge__ = _calling("_compared", "gt"), _calling("_compared", "ge")
-    __eq__, __ne__ = _calling("_compared", "eq"), _calling("_compared", "ne")
-    __floor__, __ceil__ = _calling("apply", "floor"), _calling("apply", "ceil")
-    __trunc__ = _calling("apply", "trunc")
-    __mod__ = _calling("pair", "remainder")
+    __lt__, __le__ = calling("_compared", "lt"), calling("_compared", "le")
+    __gt__, __ge__ = calling("_compared", "gt"), calling("_compared", "ge")
+    __eq__, __ne__ = calling("_compared", "eq"), calling("_compared", "ne")
+    __floor__, __ceil__ = calling("apply", "floor"), calling("apply", "ceil")
+    __trunc__ = calling("apply", "trunc")
+    __mod__ = calling("pair", "remainder")
 
     def __pos__(self) -> Any:
         return self
@@ -126,9 +126,9 @@ class NumPyFunctions:
 
 
 for _name in _SINGLE:
-    setattr(NumPyFunctions, _name, _calling("apply", _name))
+    setattr(NumPyFunctions, _name, calling("apply", _name))
 for _name in FUNCTIONS_OF_TWO:
-    setattr(NumPyFunctions, _name, _calling("pair", _name))
+    setattr(NumPyFunctions, _name, calling("pair", _name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:
