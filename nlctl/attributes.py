@@ -111,10 +111,28 @@ def _with_section(text: str, section: str, *, after_parameters: bool = False) ->
     return "\n\n".join(part.strip() for part in parts if part)
 
 
+def entries_by_field(cls: type) -> dict[str, list[str]]:
+    """Return the lines that describe fields with a comment, by the first field of each entry.
+
+    The names in front of the first colon are those of all fields of the entry.
+    """
+    rows = [(names.split(", ")[0], names, kind, text) for names, kind, text in _rows(cls)]
+    return {first: _entry(*row).splitlines() for first, *row in rows if row[2]}
+
+
 def _entries(cls: type) -> str:
     """Return the entries of a class's own fields."""
+    return "\n".join(_entry(*row) for row in _rows(cls))
+
+
+def _entry(names: str, kind: str, text: str) -> str:
+    return f"{names} : {kind}\n{textwrap.indent(textwrap.fill(text, 90), '    ')}".rstrip()
+
+
+def _rows(cls: type) -> list[list[str]]:
+    """Return names, type and text of each entry of a class's own fields."""
     comments, classes = _read(cls.__module__)
-    names = vars(sys.modules[cls.__module__])
+    names = vars(sys.modules.get(cls.__module__, object))
     entries: list[list[str]] = []
     for node in classes.get(cls.__qualname__, ()):
         lines, above = [comments.get(node.end_lineno, "")], node.lineno - 1
@@ -129,10 +147,7 @@ def _entries(cls: type) -> str:
             entries[-1][0] += f", {name}"
         else:
             entries.append([name, kind, shape[2] if shape else text])
-    return "\n".join(
-        f"{names} : {kind}\n{textwrap.indent(textwrap.fill(text, 90), '    ')}".rstrip()
-        for names, kind, text in entries
-    )
+    return entries
 
 
 @functools.cache
@@ -140,7 +155,7 @@ def _read(module: str) -> tuple[dict[int, str], dict[str, list[Any]]]:
     """Return a module's comments by line, those alone in one after "\\n", and fields by class."""
     try:
         source = inspect.getsource(sys.modules[module])
-    except OSError:  # installed without it
+    except (OSError, TypeError, KeyError):  # installed without it, or typed in
         return {}, {}
     comments = {}
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
@@ -151,12 +166,19 @@ def _read(module: str) -> tuple[dict[int, str], dict[str, list[Any]]]:
         node.name: [
             field
             for field in node.body
-            if isinstance(field, ast.AnnAssign) and not ast.unparse(field.target).startswith("_")
+            if isinstance(field, ast.AnnAssign)
+            and not ast.unparse(field.target).startswith("_")
+            and not _is_parameter(field)
         ]
         for node in ast.walk(ast.parse(source))
         if isinstance(node, ast.ClassDef)
     }
     return comments, fields
+
+
+def _is_parameter(node: ast.AnnAssign) -> bool:
+    """Whether `nlctl.param` says what a field is."""
+    return isinstance(node.value, ast.Call) and ast.unparse(node.value.func).endswith("param")
 
 
 def _has_default(node: ast.AnnAssign) -> bool:

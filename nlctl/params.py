@@ -18,6 +18,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from .annotations import as_numbers, reporting
+from .attributes import entries_by_field
 from .errors import ParameterError, UnknownKeywordError
 from .names import unknown
 from .pickles import state_of, with_state
@@ -184,7 +185,7 @@ def record(cls: type[_T]) -> type[_T]:
         cls.__checked_at_birth__ = True  # type: ignore[attr-defined]
     described: Any = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     _complete(described)
-    described.__doc__ = _documented(described, doc or "")
+    described.__doc__ = _DocstringOfRecord(doc or "")
     init, known = described.__init__, [f.name for f in dataclasses.fields(described) if f.init]
 
     @functools.wraps(init)
@@ -220,17 +221,29 @@ def _complete(cls: Any) -> None:
             cls.states = getattr(cls, "states", ())
 
 
+class _DocstringOfRecord:
+    """The docstring of a record, completed when somebody reads it."""
+
+    def __init__(self, text: str) -> None:
+        self.text, self.whole = text, ""
+
+    def __get__(self, instance: object, owner: type) -> str:
+        self.whole = self.whole or _documented(owner, self.text)
+        return self.whole
+
+
 def _documented(cls: Any, doc: str) -> str:
     """Return the docstring of a record class with all fields in numpydoc's Parameters."""
     margin = doc.rpartition("\n")[2]  # what stands in front of the closing quotes
     margin = margin if margin.isspace() else ""
     there = re.findall(r"^\s*(\w+(?:, \w+)*) :", doc, re.M)
     told_of = {name for names in there for name in names.split(", ")}
-    lines = []
+    lines, commented = [], entries_by_field(cls)
     for field in dataclasses.fields(cls):
         if field.name not in told_of:
-            inherited = _inherited_entry(cls, field.name)
-            lines += inherited or _entry(field, declared_params(cls).get(field.name))
+            entry = commented.get(field.name) or _inherited_entry(cls, field.name)
+            lines += entry or _entry(field, declared_params(cls).get(field.name))
+            told_of |= set(entry[0].partition(" : ")[0].split(", ")) if entry else set()
     if not lines:
         return doc
     entries = "".join(f"{margin}{line}\n" for line in lines)

@@ -61,15 +61,11 @@ class PureFeedback:
 
     Parameters
     ----------
-    order : int
-        Order n >= 1.
     f : equation
         ``f(x, v) -> float`` with `x` the tuple (x_1, ..., x_n) and `v` the actuator's output.
         Assumption 3 wants F(x, v) = f(x, v) - f(x, 0) to lie in a sector.
     d : equation, optional
         ``d(x, t) -> float``, the disturbance; 0 by default.
-    initial : mapping, optional
-        Initial state, ``{"x1": 0.5}``; the others start from 0.
 
     Examples
     --------
@@ -80,9 +76,10 @@ class PureFeedback:
     >>> plant = nlctl.block(nlctl.PureFeedback(order=2, f=f), "plant")
     """
 
-    order: int
+    order: int  # Order n >= 1.
     f: Callable[[Any, Any], Any]
     d: Callable[[Any, Any], Any] = no_disturbance
+    # Initial state, ``{"x1": 0.5}``; the others start from 0.
     initial: Mapping[str, float] = field(default_factory=dict)
 
     inputs = ("v",)

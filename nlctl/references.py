@@ -30,15 +30,9 @@ def derivative_names(order: int) -> tuple[str, ...]:
 
 @record
 class _Reference:
-    """What references share: yd and its derivatives.
+    """What references share: yd and its derivatives."""
 
-    Parameters
-    ----------
-    order : int, optional
-        Number n >= 0 of derivatives that are outputs.
-    """
-
-    order: int = 2
+    order: int = 2  # Number n >= 0 of derivatives that are outputs.
 
     inputs = ()
     feedthrough = False

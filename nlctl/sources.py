@@ -23,15 +23,9 @@ _MOST = 4096  # points of a table
 
 @record
 class _Source:
-    """What sources share.
+    """What sources share."""
 
-    Parameters
-    ----------
-    outputs : tuple of str, optional
-        Name of the signal.
-    """
-
-    outputs: tuple[str, ...] = ("ref",)
+    outputs: tuple[str, ...] = ("ref",)  # Name of the signal.
 
     inputs = ()
     feedthrough = False
@@ -301,13 +295,6 @@ class TimeTable(_Source):
     behind the last one it stays at its first and last value; with `periodic` it begins again at
     the last time, at which the period ends.  At most 4096 points; more are an input of the run.
 
-    Parameters
-    ----------
-    hold : bool, optional
-        Whether each value is held until the next time (zero-order hold).
-    periodic : bool, optional
-        Whether it repeats, with the period times[-1] - times[0].
-
     Examples
     --------
     >>> table = nlctl.sources.TimeTable(times=(0.0, 1.0, 3.0), values=(0.0, 2.0, 0.0))
@@ -315,8 +302,8 @@ class TimeTable(_Source):
     [1.]
     """
 
-    hold: bool = False
-    periodic: bool = False
+    hold: bool = False  # Whether each value is held until the next time (zero-order hold).
+    periodic: bool = False  # Whether it repeats, with the period times[-1] - times[0].
     times: Floats = param((0.0, 1.0), unit="s", meaning="times t_k", symbol="tau")
     values: Floats = param((0.0, 1.0), unit="1", meaning="values at these times")
 

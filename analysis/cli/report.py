@@ -200,21 +200,23 @@ def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenP
         check_report_options(out, pdf=options.pdf, force=options.force)
         from ..papers import named_paper
         from ..report.render import write_report
+        from ..reproductions.page import compose_paper
         from .progress import progress_bar
 
-        reproduction = named_paper(name)
+        paper = named_paper(name)
         if options.live:
             from ..reproductions.live import check_moved, with_parts_live
 
-            check_moved(reproduction.paper)
-        reproduction.clear(out, force=options.force)
-        composed = reproduction.compose(
-            out, whole=far, threads=options.threads, beside=beside, watch=progress_bar,
+            check_moved(paper)
+        if paper.clear is not None:
+            paper.clear(out, force=options.force)
+        composed = compose_paper(
+            paper, out, whole=far, threads=options.threads, beside=beside, watch=progress_bar,
             notify=notify,
         )  # fmt: skip
         report = composed.report
         if options.live:
-            report = with_parts_live(reproduction.paper, report)
+            report = with_parts_live(paper, report)
         words = " --far" * far + " --interactive" * options.interactive
         words += " --live" * bool(options.live)
         report = stamped(replace(report, command=report.command + words), options)

@@ -18,7 +18,7 @@ from flint import arb, fmpq
 from nlctl.expressions.functions import FUNCTIONS
 
 from .arithmetic import Ball, as_ball
-from .numpy_functions import NumPyFunctions, of_lifted
+from .numpy_functions import NumPyFunctions, calling, of_lifted
 from .paths import Undecided
 
 LARGEST_POWER = 12  # powers up to which a sum is multiplied out
@@ -116,6 +116,7 @@ class Sum(NumPyFunctions):
         self.partial = partial
 
     lifted = staticmethod(as_sum)
+    minimum, maximum = calling("pair", "minimum"), calling("pair", "maximum")
 
     def __repr__(self) -> str:
         return f"Sum({self.terms})"
@@ -180,14 +181,6 @@ class Sum(NumPyFunctions):
 
     def __abs__(self) -> Sum:
         return self._function("absolute")
-
-    def minimum(self, other: object) -> Sum:
-        """Smaller one, an atom."""
-        return self._function("minimum", as_sum(other))
-
-    def maximum(self, other: object) -> Sum:
-        """Larger one, an atom."""
-        return self._function("maximum", as_sum(other))
 
     def apply(self, name: str) -> Sum:
         """Return a function of the table that has an enclosure, as an atom."""

@@ -25,7 +25,7 @@ _SINGLE = {name: row for name, row in FUNCTIONS.items() if row.enclosure and row
 JUMPS = ("floor", "ceil", "sign", "trunc", "rint")
 
 
-def _calling(method: str, name: str) -> Callable[..., Any]:
+def calling(method: str, name: str) -> Callable[..., Any]:
     """Return what calls a method of a number with a name: NumPy looks for ``x.sin()``, say."""
     return lambda self, *others: getattr(self, method)(name, *others)
 
@@ -52,10 +52,13 @@ class NumPyFunctions:
     pair: Any
     table: Any
     _compared: Any  # ``_compared("lt", other)`` is ``self < other``, and so on
-    __lt__: Any
-    __le__: Any
-    __gt__: Any
-    __ge__: Any
+
+    __lt__, __le__ = calling("_compared", "lt"), calling("_compared", "le")
+    __gt__, __ge__ = calling("_compared", "gt"), calling("_compared", "ge")
+    __eq__, __ne__ = calling("_compared", "eq"), calling("_compared", "ne")
+    __floor__, __ceil__ = calling("apply", "floor"), calling("apply", "ceil")
+    __trunc__ = calling("apply", "trunc")
+    __mod__ = calling("pair", "remainder")
 
     def __pos__(self) -> Any:
         return self
@@ -99,9 +102,6 @@ class NumPyFunctions:
             return _ARRAY_FUNCTIONS[function](*given, **named)
         return function._implementation(*given, **named)
 
-    def __mod__(self, other: object) -> Any:
-        return self.pair("remainder", other)
-
     def __floordiv__(self, other: object) -> Any:
         return (self / other).apply("floor")  # type: ignore[operator]
 
@@ -124,22 +124,11 @@ class NumPyFunctions:
             return NotImplemented
         return self.apply("rint")
 
-    def __trunc__(self) -> Any:
-        return self.apply("trunc")
-
-    def __floor__(self) -> Any:
-        return self.apply("floor")
-
-    def __ceil__(self) -> Any:
-        return self.apply("ceil")
-
 
 for _name in _SINGLE:
-    setattr(NumPyFunctions, _name, _calling("apply", _name))
+    setattr(NumPyFunctions, _name, calling("apply", _name))
 for _name in FUNCTIONS_OF_TWO:
-    setattr(NumPyFunctions, _name, _calling("pair", _name))
-for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    setattr(NumPyFunctions, f"__{_name}__", _calling("_compared", _name))
+    setattr(NumPyFunctions, _name, calling("pair", _name))
 
 
 def _pairwise(name: str, a: Any, b: Any) -> Any:

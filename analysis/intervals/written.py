@@ -11,7 +11,7 @@ from typing import Any
 
 from .arithmetic import as_ball
 from .normal_form import exact
-from .numpy_functions import NumPyFunctions
+from .numpy_functions import NumPyFunctions, calling
 from .paths import Undecided
 
 OPERATIONS = (
@@ -68,17 +68,12 @@ class Written(NumPyFunctions):
         other = self.lifted(other)
         return other if other is NotImplemented else self._node(operation, self.place, other.place)
 
+    __add__, __mul__ = calling("_with", "+"), calling("_with", "*")
+    __truediv__ = calling("_with", "/")
+    minimum, maximum = calling("_with", "minimum"), calling("_with", "maximum")
+
     def __neg__(self) -> Written:
         return self * -1.0
-
-    def __add__(self, other: object) -> Any:
-        return self._with("+", other)
-
-    def __mul__(self, other: object) -> Any:
-        return self._with("*", other)
-
-    def __truediv__(self, other: object) -> Any:
-        return self._with("/", other)
 
     def __pow__(self, n: Any) -> Any:
         if isinstance(n, NumPyFunctions) or n != int(n) or abs(n) > _MOST:
@@ -87,14 +82,6 @@ class Written(NumPyFunctions):
 
     def __abs__(self) -> Written:
         return self._node("absolute", self.place)
-
-    def minimum(self, other: object) -> Any:
-        """Smaller one."""
-        return self._with("minimum", other)
-
-    def maximum(self, other: object) -> Any:
-        """Larger one."""
-        return self._with("maximum", other)
 
     def apply(self, name: str) -> Any:
         """Return a function of the list, or one that is made of them."""

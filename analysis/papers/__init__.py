@@ -1,4 +1,4 @@
-"""The papers that are reproduced, by name: one module each, with a record and what composes it."""
+"""The papers that are reproduced, by name: one module each, with its record."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..catalogue import paper_summaries
 
 if TYPE_CHECKING:
-    from ..reproductions.page import Reproduction
+    from ..reproductions.paper import Paper
 
 __all__ = ["named_paper", "paper_key", "paper_names"]
 
@@ -62,7 +62,7 @@ def paper_key(name: str, kind: str = "paper") -> str:
     return key
 
 
-def named_paper(name: str) -> Reproduction:
+def named_paper(name: str) -> Paper:
     """Return the paper of a name.
 
     Parameters
@@ -72,8 +72,8 @@ def named_paper(name: str) -> Reproduction:
 
     Returns
     -------
-    Reproduction
-        Its record, and what composes its page.
+    Paper
+        Its record.
 
     Raises
     ------
@@ -83,8 +83,8 @@ def named_paper(name: str) -> Reproduction:
     Examples
     --------
     >>> from nlctl.analysis.papers import named_paper
-    >>> [case.key for case in named_paper("tabuada-2007").paper.cases]
+    >>> [case.key for case in named_paper("tabuada-2007").cases]
     ['1']
     """
-    reproduction: Reproduction = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
-    return reproduction
+    paper: Paper = import_module(f"{__name__}.{paper_key(name)}").REPRODUCTION
+    return paper

@@ -13,7 +13,6 @@ from nlctl.papers import canudas_de_wit_1995 as printed
 from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import paths_figure, rows_over_time
-from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
 _F_S, _SIGMA_0, _PUSH = 1.5, 1e5, 1.425
@@ -287,7 +286,7 @@ _TABLE_I = (
     ("v_s", "0.001 m/s", "{friction.v_s:g}", "Table I"),
 )
 
-_PAPER = Paper(
+REPRODUCTION = Paper(
     key="canudas_de_wit_1995",
     title="The LuGre model of friction, reproduced",
     question="does the model show what its figures show, with the parameters of its Table I?",
@@ -409,5 +408,3 @@ _PAPER = Paper(
         caption="Under PID control the mass hunts about the position that is wanted.",
     ),
 )  # fmt: skip
-
-REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

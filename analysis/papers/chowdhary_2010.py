@@ -13,7 +13,6 @@ from nlctl.papers import chowdhary_2010 as printed
 from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
 _TIMES = np.linspace(0, 40, 4001)
@@ -160,7 +159,7 @@ _MODEL = (
     ),
 )
 
-_PAPER = Paper(
+REPRODUCTION = Paper(
     key="chowdhary_2010",
     title="Concurrent learning without persistent excitation, reproduced",
     question="do weights that learn from recorded points come to their true values?",
@@ -239,5 +238,3 @@ _PAPER = Paper(
         caption="With a record the weights come to their true values (dotted).",
     ),
 )  # fmt: skip
-
-REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

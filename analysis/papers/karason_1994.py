@@ -12,7 +12,6 @@ from nlctl.papers import karason_1994 as printed
 from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
 _TIMES = np.linspace(0, 20, 8001)
@@ -191,7 +190,7 @@ _MODEL = (
     ),
 )
 
-_PAPER = Paper(
+REPRODUCTION = Paper(
     key="karason_1994",
     title="Adaptive control with a constrained input, reproduced",
     question="does an unstable plant at the edge of what its input can hold track in the end?",
@@ -281,5 +280,3 @@ _PAPER = Paper(
         caption="The plant comes back from the edge, and follows its model.",
     ),
 )  # fmt: skip
-
-REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

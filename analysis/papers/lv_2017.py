@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..paper.page.record import LV_2017
 from ..paper.report import clear, compose
-from ..reproductions.page import Reproduction
 
-REPRODUCTION = Reproduction(paper=LV_2017, compose=compose, clear=clear)
+REPRODUCTION = replace(LV_2017, compose=compose, clear=clear)

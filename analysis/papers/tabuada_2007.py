@@ -12,7 +12,6 @@ from nlctl.papers import tabuada_2007 as printed
 from ..report.document import Equation, Paragraph
 from ..reproductions.cases import PaperCase, PaperRun
 from ..reproductions.figures import rows_over_time
-from ..reproductions.page import Reproduction, compose_paper
 from ..reproductions.paper import Paper, PaperFigure, PaperRuns, PaperSource, Part, Statement
 
 PLANT_MATRIX = np.array([[0.0, 1.0], [-2.0, 3.0]])
@@ -188,7 +187,7 @@ _MODEL = (
     ),
 )  # fmt: skip
 
-_PAPER = Paper(
+REPRODUCTION = Paper(
     key="tabuada_2007",
     title="Event-triggered sampling of a linear feedback, reproduced",
     question="does the linear example do what is quoted of it, and which constants are right?",
@@ -272,5 +271,3 @@ _PAPER = Paper(
         caption="No interval between samples is shorter than the bound.",
     ),
 )  # fmt: skip
-
-REPRODUCTION = Reproduction(paper=_PAPER, compose=partial(compose_paper, _PAPER))

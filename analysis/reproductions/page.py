@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -45,17 +44,6 @@ class Composed:
     # Whether all numbers of the reproduction are those that were to be reached; what refutes the
     # paper counts as reached.
     passed: bool
-
-
-@described_record(eq=False)
-class Reproduction:
-    """A paper, and what composes its page."""
-
-    paper: Paper
-    # ``compose(folder, whole=, threads=, beside=, watch=, notify=) -> Composed``.
-    compose: Callable[..., Composed]
-    # ``clear(folder, force=)`` removes what an earlier page has left in its folder.
-    clear: Callable[..., object] = field(default=lambda folder, force=False: None)
 
 
 def report_of(
@@ -146,9 +134,11 @@ def compose_paper(
     *,
     whole: bool = False,
     watch: ProgressWatch = unwatched,
-    **unused: object,
+    **more: object,
 ) -> Composed:
     """Run a paper's examples, and compose its page; nothing is written."""
+    if paper.compose is not None:
+        return paper.compose(folder, whole=whole, watch=watch, **more)
     # Threads and a second process are of no use to runs of seconds.
     if whole:
         raise UsageError(f"{paper.key} has no runs beyond its examples: leave --far out")

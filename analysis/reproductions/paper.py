@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from matplotlib.figure import Figure as MatplotlibFigure
@@ -148,7 +148,12 @@ class Paper:
     digits: str = ".6g"  # Format of the numbers found.
     command: str = ""  # What makes the page again; ``nlctl report KEY`` where it is empty.
     # Packages whose versions stand on the page next to those of every report.
-    packages: tuple[str, ...] = field(default=())
+    packages: tuple[str, ...] = ()
+    # ``compose(folder, whole=, threads=, beside=, watch=, notify=)`` returns the page of a paper
+    # that has more than its examples, as `nlctl.analysis.reproductions.page.Composed`.
+    compose: Callable[..., Any] | None = None
+    # ``clear(folder, force=)`` removes what an earlier page has left in its folder.
+    clear: Callable[..., object] | None = None
 
     @property
     def references(self) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ from .origin import plain_study
 from .reading.own_kinds import STAND_IN, own_kinds, stand_ins
 from .reading.written import from_toml
 from .resolve import uncertain
-from .result import Result, described
+from .result import Result, described_tables
 from .sealed import (
     ANEW,
     RunFolderError,
@@ -213,7 +213,7 @@ def _put_together(
     folder: Path, study: Study, content: Mapping[str, Any], origin: Mapping[str, Any]
 ) -> Result:
     """Return the result that the files of a folder make."""
-    tables, key, rows, findings = described(content), origin_key(origin), None, []
+    tables, key, rows, findings = described_tables(content), origin_key(origin), None, []
     if study.runs is not None:
         design = main_design(study.runs, _space(study, tables["quantities"]), study.study.seed)
         rows = load_rows(folder, key, design)

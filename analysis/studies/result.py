@@ -30,7 +30,7 @@ _COLUMNS = {  # of tables; None: those that their rows have
 }
 
 
-def described(rows: Mapping[str, Any]) -> dict[str, Any]:
+def described_tables(rows: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a study varies, requires and measures as tables, from the rows of each."""
     tables = {name: pd.DataFrame(rows[name], columns=names) for name, names in _COLUMNS.items()}
     return {name: table.set_index(table.columns[0]) for name, table in tables.items()}

@@ -38,7 +38,7 @@ from .origin import (
 )
 from .reading.parse import StudyFile, read_study
 from .reading.written import to_toml
-from .result import Result, described
+from .result import Result, described_tables
 from .sealed import RunFolderError, origin_key, write_json
 
 # what `locked` makes, and a killed run leaves
@@ -197,7 +197,7 @@ def _through(run: _Run) -> Result:
     return Result(
         folder=folder,
         study=study,
-        **described(_rows_of(run.prepared.experiment)),
+        **described_tables(_rows_of(run.prepared.experiment)),
         rows=rows,
         findings=tuple(findings),
         complete=complete,

@@ -13,15 +13,9 @@ LAGS_BEHIND = "its output is a state that follows u later, no function v = k(u, 
 
 @record
 class _Follower(FromUToV):
-    """What actuators share whose output is their first state.
+    """What actuators share whose output is their first state."""
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Output at the start.
-    """
-
-    v0: float = 0.0
+    v0: float = 0.0  # Output at the start.
 
     states = ("v",)
     feedthrough = False

@@ -93,11 +93,6 @@ class BacklashInverse(Remembering):
 
     It obeys (2) with k between 1 / m_r and 1 / m_l and eps_u between c_l and c_r.
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
-
     Examples
     --------
     It jumps across the gap where its input reverses:
@@ -112,7 +107,7 @@ class BacklashInverse(Remembering):
     m_l: float = param(1.2, unit="1", meaning="slope of the left (falling) side", above=0)
     c_r: float = param(0.5, unit="1", meaning="right end of the gap")
     c_l: float = param(-0.6, unit="1", meaning="left end of the gap")
-    v0: float = 1.0
+    v0: float = 1.0  # Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
 
     inputs = ("u", "u1")
     states = ("side",)

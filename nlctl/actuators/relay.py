@@ -66,11 +66,6 @@ class Relay(Remembering):
     memory relaxes onto the side with 1000/s, and its sign counts: the output switches 0.7 ms after
     the input has met a threshold, and a swing back that comes sooner is missed.
 
-    Parameters
-    ----------
-    v0 : float, optional
-        Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
-
     Examples
     --------
     >>> relay = nlctl.block(nlctl.Relay(on=1.0, off=-1.0), "relay")
@@ -82,7 +77,7 @@ class Relay(Remembering):
     on: float = param(1.0, unit="1", meaning="input from which the relay is on")
     off: float = param(-1.0, unit="1", meaning="input up to which the relay is off")
     height: float = param(1.0, unit="1", meaning="output |v|", above=0)
-    v0: float = -1.0
+    v0: float = -1.0  # Side s(0-) at the start, 1 or -1: the initial value of the state ``side``.
 
     states = ("side",)
     feedthrough = False
@@ -161,11 +156,6 @@ class Preisach(Remembering):
     It does not obey (2): |v| <= sum w_k for all u.  In plain `control.input_output_response` each
     memory relaxes as that of `nlctl.Relay`.
 
-    Parameters
-    ----------
-    v0 : float or tuple of float, optional
-        Sides s_k(0-) at the start, 1 or -1: one for all, or one each.
-
     Examples
     --------
     Two relays of half weight, which turn on at 0.5 and 1:
@@ -180,6 +170,7 @@ class Preisach(Remembering):
     alpha: Floats = param(_GRID[0], unit="1", meaning="inputs from which relays are on")
     beta: Floats = param(_GRID[1], unit="1", meaning="inputs up to which relays are off")
     w: Floats = param((0.1,) * 10, unit="1", meaning="weights", at_least=0)
+    # Sides s_k(0-) at the start, 1 or -1: one for all, or one each.
     v0: float | tuple[float, ...] = -1.0
 
     feedthrough = False

@@ -24,11 +24,6 @@ from .robust import RobustTerm
 class Zero:
     """A block whose output is 0: put it instead of a piece that is to be left out.
 
-    Parameters
-    ----------
-    outputs : tuple of str
-        The signals that are 0, for instance ``("W_psi", "W_norm")`` for no network.
-
     Examples
     --------
     >>> no_network = nlctl.controllers.Zero(outputs=("W_psi", "W_norm"))
@@ -36,6 +31,7 @@ class Zero:
     [0. 0.]
     """
 
+    # The signals that are 0, for instance ``("W_psi", "W_norm")`` for no network.
     outputs: tuple[str, ...]
 
     inputs = ()

@@ -148,12 +148,6 @@ class PID2:
 
     Parameters
     ----------
-    signals : tuple of str, optional
-        Names of the reference and of the measured output; one name alone is an error.
-    applied : str, optional
-        Name of one more input: what the plant gets instead of u, behind an actuator with
-        other limits, or by hand.  The integral then tracks that, so that the change from manual
-        to automatic makes no jump.
     anti_windup : {"back-calculation", "clamping", "none"}, optional
         What keeps the integral from winding up.
 
@@ -171,7 +165,11 @@ class PID2:
     >>> law = nlctl.sampled(nlctl.discretise(law, 0.1))
     """
 
+    # Names of the reference and of the measured output; one name alone is an error.
     signals: tuple[str, ...] = ("ref", "y")
+    # Name of one more input: what the plant gets instead of u, behind an actuator with other
+    # limits, or by hand.  The integral then tracks that, so that the change from manual to
+    # automatic makes no jump.
     applied: str = ""
     anti_windup: str = "back-calculation"
     k_p: float = param(1.0, unit="1", meaning="proportional gain")

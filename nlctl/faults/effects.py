@@ -56,17 +56,11 @@ def while_present(faulty: Callable[..., Any]) -> Callable[..., Any]:
 
 @record
 class _Effect:
-    """What all faults share: when they are present.
-
-    Parameters
-    ----------
-    has_condition : bool, optional
-        Whether a `Latch` begins it.
-    """
+    """What all faults share: when they are present."""
 
     onset: float = param(0.0, unit="s", meaning="time before which the fault does not begin")
     duration: float = param(NEVER, unit="s", meaning="how long it lasts, 1e12 for ever", above=0)
-    has_condition: bool = False
+    has_condition: bool = False  # Whether a `Latch` begins it.
 
     outputs = ("faulty",)
     vector = True

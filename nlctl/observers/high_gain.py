@@ -37,10 +37,6 @@ class HighGainObserver:
 
     Parameters
     ----------
-    measured : str, optional
-        Name of the output.
-    known : tuple of str, optional
-        Names of what phi_0 takes as u.
     model : equation, optional
         ``phi_0(x, u) -> float`` with the estimates and the known inputs as arrays; 0 by default.
 
@@ -52,8 +48,8 @@ class HighGainObserver:
     [ 20. 100.]
     """
 
-    measured: str = "y"
-    known: tuple[str, ...] = ()
+    measured: str = "y"  # Name of the output.
+    known: tuple[str, ...] = ()  # Names of what phi_0 takes as u.
     model: Callable[[Any, Any], Any] = nothing_known
     alpha: Floats = param(
         (2.0, 1.0), unit="1", meaning="coefficients alpha_1, ..., alpha_n", above=0

@@ -47,16 +47,10 @@ class ExtendedKalmanFilter:
 
     Parameters
     ----------
-    known, measured : tuple of str, optional
-        Names of the inputs u and of the outputs y.
     f : equation, optional
         ``f(x, u) -> (x1', ..., xn')``; a double integrator by default.
     h : equation, optional
         ``h(x) -> (y1, ..., yk)``; x1 by default.
-    x0 : sequence of float, optional
-        Initial estimate; 0 by default.
-    P0 : sequence of sequence of float, optional
-        Initial covariance of the error; by default the unit matrix.
 
     Examples
     --------
@@ -73,11 +67,12 @@ class ExtendedKalmanFilter:
     [ 2.   0.  -1.9  0.   0.1]
     """
 
-    known: tuple[str, ...] = ("u",)
+    known: tuple[str, ...] = ("u",)  # Names of the inputs u and of the outputs y.
     measured: tuple[str, ...] = ("y",)
     f: Callable[[Any, Any], Any] = double_integrator
     h: Callable[[Any], Any] = first_state
-    x0: Sequence[float] = ()
+    x0: Sequence[float] = ()  # Initial estimate; 0 by default.
+    # Initial covariance of the error; by default the unit matrix.
     P0: Sequence[Sequence[float]] = ()
     Q: Matrix = param(((0.1, 0.0), (0.0, 0.1)), unit="1/s", meaning="intensity of the noise in x'")
     R: Matrix = param(((0.1,),), unit="s", meaning="intensity of the noise in y")

@@ -26,12 +26,6 @@ class LuenbergerObserver:
     The error x - x_hat obeys (x - x_hat)' = (A - L C)(x - x_hat), whatever u is.  `luenberger`
     makes one of a plant and poles.  With the gain of `control.lqe` it is the steady Kalman filter.
 
-    Parameters
-    ----------
-    known, measured : tuple of str, optional
-        Names of the plant's inputs and outputs, in the order of the columns of B and the rows of
-        C; () for a plant without inputs, whose B and D have no columns.
-
     Examples
     --------
     A double integrator, with both poles of the error at -1:
@@ -41,6 +35,8 @@ class LuenbergerObserver:
     [2. 1.]
     """
 
+    # Names of the plant's inputs and outputs, in the order of the columns of B and the rows of C;
+    # () for a plant without inputs, whose B and D have no columns.
     known: tuple[str, ...] = ("u",)
     measured: tuple[str, ...] = ("y",)
     A: Matrix = param(((0.0, 1.0), (0.0, 0.0)), unit="1/s", meaning="matrix A of the plant")

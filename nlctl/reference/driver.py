@@ -103,9 +103,8 @@ class Driver:
                 )
                 self.known.step = (t, stop)
                 resumes = self.jumps.committed(t, x) if t >= end and what else None
-                left = self.jumps.watched_before(min(t, self._last), x) if t > begin else None
                 x, sides = self.jumps.at(t, x, what, sides)
-                self._note_jumps(t, x, left)
+                self._note_jumps(t, x)
                 self._record(t, x, ends=self._ended)
                 if self._ended:
                     return
@@ -308,20 +307,21 @@ class Driver:
         if not self.jumps.ends(i, rises):
             self._note_change(i, t, rises, x)
 
-    def _note_jumps(self, t: float, x: np.ndarray, left: np.ndarray | None) -> None:
+    def _note_jumps(self, t: float, x: np.ndarray) -> None:
         """Note the functions that the run watches whose signs have jumped at an instant.
 
         One that has jumped to 0 is noted where it leaves that for the other side.
         """
-        if left is None or not left.size:
+        if not self.jumps.watched or not self._came.size:
             return
-        right, first = self.jumps.watched_at(t, x), sum(self.jumps.kinds) - left.size
-        came = self._came[first:] if self._came.size else left
-        came = np.sign(np.where(left == 0.0, came, left))
+        right = self.jumps.watched_at(t, x)
+        first = self._came.size - right.size
+        came = self._came[first:]
         leaves = (came * np.sign(right) < 0.0) | ((came == 0.0) & (np.abs(right) > 0.0))
         for k in np.flatnonzero(leaves).tolist():
             notes = self._note_first if came[k] == 0.0 else self._note_change
             notes(first + k, t, bool(right[k] > 0.0), x)
+            came[k] = np.sign(right[k])
 
     def _note_change(self, i: int, t: float, rises: bool, x: np.ndarray) -> None:
         """Note a change of sign, whether it ends the run, and whether there is an end of them."""

@@ -96,10 +96,6 @@ class Jumps:
             self._label(found, sum(row.size for row in seen))
         return np.concatenate([*seen, become])
 
-    def watched_before(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Return the functions that the run watches, before anything jumps at an instant."""
-        return self.watched_at(t, self.committed(t, x) if self.watched else x)
-
     def watched_at(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return the functions that the run watches; memories are what they have become."""
         u = self.inputs(t) if self.watched else _NOTHING

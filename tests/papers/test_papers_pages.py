@@ -27,7 +27,7 @@ def runs():
 
     def of(name):
         if name not in made:
-            made[name] = simulate_cases(named_paper(name).paper.cases)
+            made[name] = simulate_cases(named_paper(name).cases)
         return made[name]
 
     return of
@@ -37,7 +37,7 @@ def runs():
 @pytest.mark.parametrize("name", SIBLINGS)
 def test_every_number_is_reached_but_those_that_are_refuted(name, runs):
     """And what is refuted says whose statement it is, and stands under what does not reproduce."""
-    paper = named_paper(name).paper
+    paper = named_paper(name)
     found = found_numbers(paper.statements, runs(name))
     missed = {f.statement.quantity for f in found if not f.holds}
     assert missed == REFUTED.get(name, set())
@@ -49,7 +49,7 @@ def test_every_number_is_reached_but_those_that_are_refuted(name, runs):
 @pytest.mark.parametrize("name", SIBLINGS)
 def test_the_page_has_the_evidence_that_its_claims_name(name, runs):
     """Keys of sections; the question, the verdict and what is open are on it."""
-    paper = named_paper(name).paper
+    paper = named_paper(name)
     report = paper_page(paper, runs(name))
     keys = {section.key for section in report.sections}
     assert {claim.evidence for claim in report.claims} <= keys
@@ -61,7 +61,7 @@ def test_the_page_has_the_evidence_that_its_claims_name(name, runs):
 @pytest.mark.parametrize("name", paper_names())
 def test_a_record_names_what_it_has(name):
     """Statements are of its parts and of its sources, and a number is a number."""
-    paper = named_paper(name).paper
+    paper = named_paper(name)
     parts, sources = {p.key for p in paper.parts}, {s.key for s in paper.sources}
     statements = paper.statements
     assert paper.key == name
@@ -75,7 +75,7 @@ def test_a_record_names_what_it_has(name):
 @pytest.mark.parametrize("name", SIBLINGS)
 def test_what_could_not_be_read_is_said(name):
     """No article was read: each page says so, and where its numbers were."""
-    paper = named_paper(name).paper
+    paper = named_paper(name)
     assert "could not be read" in " ".join(paper.open_points)
     assert {s.read for s in paper.statements} & {source.key for source in paper.sources}
 
@@ -111,7 +111,7 @@ def test_far_runs_are_of_papers_that_have_some(tmp_path):
     with pytest.raises(
         nlctl.errors.UsageError, match="karason_1994 has no runs beyond its examples"
     ):
-        compose_paper(named_paper("karason_1994").paper, tmp_path, whole=True)
+        compose_paper(named_paper("karason_1994"), tmp_path, whole=True)
 
 
 def test_papers_are_listed_with_their_examples():
@@ -125,7 +125,7 @@ def test_the_page_of_papers_has_a_row_for_each():
     """With what is reproduced and what is not, as the record says."""
     text = (ROOT / "docs" / "explanation" / "papers.md").read_text(encoding="utf-8")
     for name in paper_names():
-        paper = named_paper(name).paper
+        paper = named_paper(name)
         (row,) = [line for line in text.splitlines() if line.startswith(f"| `{name}`")]
         assert paper.reproduced in row
         assert paper.not_reproduced in row

@@ -121,3 +121,33 @@ def test_a_memory_is_what_it_has_become_within_a_step(level, how):
     exact = [np.arccos(level - 0.2), 2 * np.pi - np.arccos(level + 0.2)]
     np.testing.assert_allclose(rows["time"], exact, rtol=0, atol=1e-7)
     assert rows["direction"].tolist() == ["falling", "rising"]
+
+
+@pytest.mark.parametrize("how", [WAYS[n] for n in ("tsit5", "rodas5p", "python-control")])
+def test_memories_that_memories_move_jump_at_one_instant(how):
+    """sin t is caught where it passes 1/2, at pi / 6; watching that changes nothing."""
+    source = ct.nlsys(lambda t, x, u, p: [x[1], -x[0]], lambda t, x, u, p: x[0], states=2,
+                      inputs=0, outputs=["r"], name="source")  # fmt: skip
+    lag = ct.ss(-1, 1, 1, 0, inputs="r", outputs="y", name="lag")
+    loop = nlctl.interconnect({"source": source, "lag": lag}, outputs=["r"])
+    stuck = nlctl.with_faults(loop, nlctl.Fault("source.r", "stuck", when="source.r > 0.5"))
+    held, on, since = (
+        next(i for i, name in enumerate(stuck.state_labels) if name.endswith(end))
+        for end in ("_held", "_on", "_since")
+    )
+    watched = {
+        "held": lambda t, x, u, p: x[held] - 0.25,
+        "on": lambda t, x, u, p: x[on] - 0.5,
+        "since": lambda t, x, u, p: x[since] - 0.1,
+        "later": lambda t, x, u, p: np.where(x[on] > 0.5, t - x[since] - 1.0, -1.0),
+    }
+    start = {"source.x[0]": 0.0, "source.x[1]": 1.0}
+    made = nlctl.input_output_response(
+        stuck, [0, 2], 0, start, events=watched, rtol=1e-10, atol=1e-12, **how
+    )
+    times = made.events.set_index("which")["time"]
+    for name in ("held", "on", "since"):
+        assert times[name] == pytest.approx(np.pi / 6, abs=1e-8)
+    assert times["later"] == pytest.approx(np.pi / 6 + 1, abs=1e-8)
+    assert made.states[since, -1] == pytest.approx(np.pi / 6, abs=1e-8)
+    assert made.states[held, -1] == pytest.approx(0.5, abs=1e-8)

@@ -23,10 +23,8 @@ def reseal(folder, *names):
             record["files"][finding.relative_to(folder).as_posix()] = file_digest(finding)
         record["files"][name] = file_digest(part)
     files = [folder / name for name in record["files"]]
-    write_json(
-        folder / "contents.json",
-        record | {"rows": _rows(folder, files), "tables": _tables(folder, files)},
-    )
+    tables = _tables(folder, files)
+    write_json(folder / "contents.json", record | {"rows": _rows(tables), "tables": tables})
 
 
 def write_chunk(path, frame):

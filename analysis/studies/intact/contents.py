@@ -34,12 +34,13 @@ def seal(result: Result, key: str, before: Mapping[str, Any] | None = None) -> N
     write_json(result.folder / "results.json", result.plain() | {"origin": key})
     folder, done = result.folder, [finding.key for finding in result.findings]
     files = list(_parts(folder, keyed(result.study)))
+    tables = _tables(folder, files)
     digests = {path.relative_to(folder).as_posix(): file_digest(path) for path in files}
     is_same = before is not None and before["files"] == digests
     content = {
         "files": digests,
-        "rows": _rows(folder, files),
-        "tables": _tables(folder, files),
+        "rows": _rows(tables),
+        "tables": tables,
         "analyses": list(keyed(result.study)),
         "done": done,
         "complete": result.complete,
@@ -71,13 +72,12 @@ def is_part(path: Path) -> bool:
     return not (hidden or damaged) and (path.is_symlink() or not path.is_dir())
 
 
-def _rows(folder: Path, files: Iterable[Path]) -> dict[str, int]:
+def _rows(tables: Mapping[str, Any]) -> dict[str, int]:
     """Return the number of rows that each part of a folder keeps in chunks."""
     rows: dict[str, int] = {}
-    for path in files:
-        if path.parent.name == "chunks" and path.suffix == ".parquet":
-            part = path.relative_to(folder).parts[0]
-            rows[part] = rows.get(part, 0) + parquet().read_metadata(path).num_rows
+    for path, table in ((Path(name), table) for name, table in tables.items()):
+        if path.parent.name == "chunks":
+            rows[path.parts[0]] = rows.get(path.parts[0], 0) + table["rows"]
     return rows
 
 
@@ -151,13 +151,13 @@ def _contradictions(folder: Path, content: dict[str, Any], files: list[Path]) ->
     """Yield what the record says that cannot be, of files that are all as it says."""
     place = f"'{folder / CONTENTS}'"
     try:
-        rows, tables = _rows(folder, files), _tables(folder, files)
+        tables = _tables(folder, files)
     except (OSError, ValueError, NotImplementedError) as error:  # of pyarrow, which derives them
         yield f"a table of '{folder}' cannot be read ({str(error).partition(chr(10))[0]})"
         return
+    rows, recorded = _rows(tables), content["tables"]
     if rows != content["rows"]:
         yield f"{place} counts other rows ({content['rows']}) than there are ({rows})"
-    recorded = content["tables"]
     for name in dict.fromkeys([*recorded, *tables]):
         if recorded.get(name) != tables.get(name):
             expected, actual = (_size(where.get(name)) for where in (recorded, tables))

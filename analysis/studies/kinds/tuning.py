@@ -16,7 +16,7 @@ from nlctl.sensitivities import Tuned, tune
 from nlctl.wording import counted
 
 from ... import figures as figures
-from ...report.document import Item, Paragraph, Table, captioned
+from ...report.document import Item, Paragraph, captioned
 from ...robustness import (
     Experiment,
     Prepared,
@@ -49,6 +49,10 @@ _BOUGHT = (
     "this one. What lies far outside is cut off."
 )
 _FRESH = "Share of the fresh rows with at most that margin, with the same rows before and after."
+_SAMPLES = (
+    "Margins and cost on the samples that gains were found on: least margins, and the mean of a "
+    "metric."
+)
 MADSEN = (
     "K. Madsen: An algorithm for minimax solution of overdetermined systems of non-linear "
     "equations. J. Inst. Maths Applics 16 (1975) 321–328. doi 10.1093/imamat/16.3.321."
@@ -138,6 +142,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
         violation_probability(design, part, asked.confidence) for part in np.split(margins, 2)
     )
     verdict = {} if asked.limit is None else vars(bound_verdict(after, asked.limit))
+    ends = {"before": tuned.before, "after": tuned.after}  # margins and cost on the samples
     return finding_of(
         asked,
         _sentence(asked, tuned, before, after),
@@ -146,7 +151,7 @@ def _run(asked: Tuning, ground: Ground) -> Finding | None:
         numbers=_numbers(tuned, before, after),
         tables={
             "gains": tuned.to_pandas(),
-            "requirements": _requirements(tuned),
+            "requirements": pd.DataFrame(ends).rename_axis("number"),
             "tried": tuned.history,
             "fresh": pd.DataFrame(np.split(margins, 2), index=["before", "after"]).T,
             "signals": _signals(prepared, tuned),
@@ -230,12 +235,6 @@ def _numbers(tuned: Tuned, before: Violation, after: Violation) -> dict[str, Any
     }
 
 
-def _requirements(tuned: Tuned) -> pd.DataFrame:
-    """Return margins and cost on the samples, before and after."""
-    columns = {"before": tuned.before, "after": tuned.after}
-    return pd.DataFrame(columns).rename_axis("number")
-
-
 def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
     """Return what the spec reads over time, at nominal values, before and after."""
     experiment, space = prepared.experiment, prepared.experiment.space
@@ -295,23 +294,14 @@ def _items(finding: Finding, result: Result, asked: Tuning, key: str) -> Iterato
         f"Median before {np.median(margins[0]):.4g}, after {np.median(margins[1]):.4g}.",
         figures.margins_of_both(*margins),
     )
-    yield _requirements_table(tables["requirements"])
+    ends = {c: column.map(margin_text) for c, column in tables["requirements"].items()}
+    yield result_table(pd.DataFrame(ends), _SAMPLES, {"before": "before", "after": "after"})
     yield captioned(
         f"{key}-tried",
         _TRIED + text.clipped(tables["tried"]["margin"]),
         f"Runs as counted: {n['counted_runs']:.0f}.",
         figures.tried(tables["tried"], is_cost),
     )
-
-
-def _requirements_table(requirements: pd.DataFrame) -> Table:
-    return Table(
-        caption="Margins and cost on the samples that gains were found on: least margins, and the "
-        "mean of a metric.",
-        columns=("number", "before", "after"),
-        rows=[(name, margin_text(row["before"]), margin_text(row["after"]))
-              for name, row in requirements.to_dict("index").items()],
-    )  # fmt: skip
 
 
 def _largest_of(before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]) -> str:

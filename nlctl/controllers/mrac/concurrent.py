@@ -38,15 +38,6 @@ class HistoryStack:
     It needs a measurement or an estimate of x_n' besides the states.  Use it as
     ``nlctl.sampled(HistoryStack(...), dt)``.
 
-    Parameters
-    ----------
-    nodes : int, optional
-        Number of regressors.
-    points : int, optional
-        Largest number of points.
-    derivative : str, optional
-        Name of the signal x_n'.
-
     Examples
     --------
     A point psi = 2 with Delta = x2' - gain u = 7 - 1 is recorded: count, z, Omega.
@@ -57,9 +48,9 @@ class HistoryStack:
     [ 1. 12.  4.]
     """
 
-    nodes: int = 6
-    points: int = 100
-    derivative: str = "x2_dot"
+    nodes: int = 6  # Number of regressors.
+    points: int = 100  # Largest number of points.
+    derivative: str = "x2_dot"  # Name of the signal x_n'.
     gain: float = param(1.0, unit="1", meaning="input gain of the plant")
     novelty: float = param(0.05, unit="1", meaning="least relative change of psi", at_least=0)
 

@@ -12,15 +12,9 @@ from ..rbf import regressor_names
 
 @record
 class _StateRegressor:
-    """What regressors of the states and one more signal share.
+    """What regressors of the states and one more signal share."""
 
-    Parameters
-    ----------
-    order : int, optional
-        Order n >= 1 of the plant.
-    """
-
-    order: int = 1
+    order: int = 1  # Order n >= 1 of the plant.
 
     vector = True
 

@@ -33,11 +33,6 @@ class FunnelControl:
     t = 0.  It needs e and n - 1 derivatives of it, here x_i - yd^(i-1) of the plant class (1), and
     the sign of the input gain, which is positive here.  At the boundary u is NaN: there is no law.
 
-    Parameters
-    ----------
-    order : int, optional
-        Relative degree n >= 1 of the plant.
-
     Examples
     --------
     Half way to the boundary the gain is 1 / (1 - 1/4):
@@ -47,7 +42,7 @@ class FunnelControl:
     [ 0.5 -2.   1. ]
     """
 
-    order: int = 2
+    order: int = 2  # Relative degree n >= 1 of the plant.
     k: float = param(1.0, unit="1", meaning="factor of the control input", above=0)
     rho_0: float = param(5.1, unit="1", meaning="half width of the funnel at t = 0", above=0)
     rho_inf: float = param(0.1, unit="1", meaning="half width of the funnel at last", above=0)

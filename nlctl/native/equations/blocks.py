@@ -209,7 +209,7 @@ def _watched(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]) -
 def _states_now(reader: Reader, schedule: Schedule, become: Mapping[int, Tracer]) -> Tracer:
     """Return all states within a step, with what memories `become` by then, by blocks' places."""
     graph, at, parts = reader.graph, 0, []
-    known = {  # an ideal relay's mode is no function of the states
+    known = {  # an ideal relay's mode does not follow from the states
         place: values[k : k + 1]
         for i, values in become.items() if supplied_of(reader.blocks[i].system) is not SLIDING
         for k, place in enumerate(memory(reader.blocks[i]))

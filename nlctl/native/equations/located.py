@@ -96,7 +96,7 @@ def found_conditions(
     """Return what switches in a diagram whose blocks have been read."""
     # Where it moves rates, declared switching functions, guards, by their blocks' places, what
     # arrives at delays and memories become (`others`), or an event function (`watched`).
-    declared, watched = tuple(declared), tuple(watched)
+    declared, others, watched = tuple(declared), tuple(others), tuple(watched)
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
     moving = needed(roots)
@@ -109,7 +109,7 @@ def found_conditions(
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
     p = _values(reader)
-    for condition, node in _undeclared(reader, rates, guards, watched):
+    for condition, node in _undeclared(reader, rates, guards, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = None
         if condition in timed or condition not in inside:
@@ -157,7 +157,11 @@ def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
 
 
 def _undeclared(
-    reader: Reader, rates: Sequence[Tracer], guards: Mapping[int, Tracer], watched: Sequence[Expr]
+    reader: Reader,
+    rates: Sequence[Tracer],
+    guards: Mapping[int, Tracer],
+    others: Sequence[Expr],
+    watched: Sequence[Expr],
 ) -> Iterable[tuple[Expr, Node | None]]:
     """Yield the conditions of blocks that do not declare theirs, each with its block."""
     # And those of the run's own event functions.
@@ -168,7 +172,8 @@ def _undeclared(
         parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
         for condition in conditions(_pieces(parts), given):
             yield condition, node
-    for condition in conditions(list(watched), set(_pieces(reader.signals.values()))):
+    # What signals are, and memories become, is of blocks.
+    for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):
         yield condition, None
 
 
