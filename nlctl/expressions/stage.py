@@ -309,7 +309,9 @@ class Stage:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
             return NumberType(np.float64, self._float64)
-        raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
+        if cls is np.errstate:
+            return _errstate
+        raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
         if is_of_a_library(cls):
@@ -353,6 +355,13 @@ class Stage:
             copied.__set_name__(copied, value.attrname or value.func.__name__)
             return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
+
+
+def _errstate(**how: Any) -> Any:
+    """Return what says how NumPy reports errors, unless it raises or calls something."""
+    if not {"ignore", "warn", None}.issuperset(how.values()):
+        raise Untraceable("NumPy's errors as errors of Python's")
+    return np.errstate(**how)
 
 
 def _is_column(value: object) -> bool:
