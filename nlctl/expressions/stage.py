@@ -45,6 +45,7 @@ from .staged import (
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
+_OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
 _LARGE = 65536  # elements of an array that stays as it is
 
@@ -228,8 +229,11 @@ class Stage:
     def _written(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
+        folds = (getattr(real, "__module__", None) or "").startswith(_OF_MATRICES)
 
         def function(*arguments: Any, **options: Any) -> Any:
+            if folds and not holds_tracers([*settled(arguments), *map(settled, options.values())]):
+                return of_numbers(*arguments, **options)
             if makes or holds_tracers([*arguments, *options.values()]):
                 options = {k: unwrapped(v) for k, v in options.items()}
                 return written(self.graph, *map(unwrapped, arguments), **options)
