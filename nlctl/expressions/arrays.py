@@ -36,7 +36,7 @@ class Computed(Special):
 def _operator(name: str, reflected: bool = False) -> Callable[..., Any]:
     def method(self: Computed, *other: Any) -> Any:
         if self.graph.attempts and name == "div":
-            raise Untraceable("try around a division of what is no number")
+            raise Untraceable("try around a division of complex numbers")
         return self.operation(self.graph, name, (*other, self) if reflected else (self, *other))
 
     return method

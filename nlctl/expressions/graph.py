@@ -85,13 +85,13 @@ def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, .
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 
-FOLLOWED = "is followed"  # attribute of an error that a traced function may catch
+CATCHABLE = "is catchable"  # attribute of an error that a traced function may catch
 
 
-def followed(error: type[Exception]) -> Exception:
+def catchable(error: type[Exception]) -> Exception:
     """Return an error that Python raises where a traced function is."""
     raised = error("as Python does")
-    vars(raised)[FOLLOWED] = True
+    vars(raised)[CATCHABLE] = True
     return raised
 
 
@@ -120,7 +120,7 @@ class Graph:
         # expressions that are numbers of Python's own somewhere, which raise errors where NumPy's
         # are infinite
         self.of_python: set[Expr] = set()
-        # choices between one of Python's integers and a float, which no path has told apart
+        # choices between one of Python's integers and a float, where no path knows which
         self.mixed: set[Expr] = set()
         # what is taken to hold on the path through a function that is being traced
         self.decisions: dict[Expr, bool] = {}
@@ -145,7 +145,7 @@ class Graph:
         if not self.attempts:
             self.guards.append(condition)
         elif not self.decided(condition):
-            raise followed(error)
+            raise catchable(error)
 
     def assumed(self, integer: Expr) -> int:
         """Return the value of an integer; from now on the parameters behind it are fixed."""

@@ -46,6 +46,8 @@ class Merger(ast.NodeTransformer):
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
+        if (appended := _appended([node])) is not None:
+            return self.visit(ast.copy_location(ast.Expr(appended), node))
         values = _of_branches(copy.deepcopy(node))
         self.generic_visit(node)
         if values is None or any(isinstance(n, _BINDING) for n in ast.walk(node)):
@@ -76,6 +78,22 @@ def _returned(body: Sequence[ast.stmt]) -> ast.expr | None:
     if yes is None or no is None or len(first.body) > 1:
         return None
     return ast.copy_location(ast.IfExp(first.test, yes, no), first)
+
+
+def _appended(body: Sequence[ast.stmt]) -> ast.Call | None:
+    """Return what appends to one list, whichever branch is taken; None if there is more."""
+    only = body[0] if len(body) == 1 else None
+    if isinstance(only, ast.Expr) and isinstance(only.value, ast.Call):
+        call = only.value
+        plain = len(call.args) == 1 and not call.keywords
+        adds = isinstance(call.func, ast.Attribute) and call.func.attr == "append"
+        return call if plain and adds else None
+    if not isinstance(only, ast.If):
+        return None
+    yes, no = _appended(only.body), _appended(only.orelse)
+    if yes is None or no is None or ast.dump(yes.func) != ast.dump(no.func):
+        return None
+    return ast.Call(yes.func, [ast.IfExp(only.test, yes.args[0], no.args[0])], [])
 
 
 def _placed(statement: ast.stmt, like: ast.AST) -> ast.stmt:

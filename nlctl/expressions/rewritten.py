@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Tracer, traced
-from .graph import FOLLOWED, Ambiguous, Graph, Namespace, Untraceable, followed
+from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
@@ -75,10 +75,12 @@ class _Rewriter(ast.NodeTransformer):
         self.generic_visit(node)
         if any(isinstance(n, _LEAVING) for part in node.finalbody for n in ast.walk(part)):
             raise Untraceable("a way out of finally")
-        for handler in node.handlers:  # what ends a trace is no error of the function's
-            caught = [n for n in ast.walk(handler.type or handler) if isinstance(n, ast.Name)]
-            if handler.type is None or any(n.id == "BaseException" for n in caught):
+        for handler in node.handlers:  # none catches what ends a trace
+            caught = {n.id for n in ast.walk(handler.type or handler) if isinstance(n, ast.Name)}
+            if handler.type is None or "BaseException" in caught:
                 handler.type = ast.Name("Exception", ast.Load())
+            elif "FloatingPointError" in caught:
+                raise Untraceable("NumPy's errors as errors of Python's")
         attempt = ast.With([ast.withitem(call_instead("attempt"))], node.body)
         node.body = [ast.copy_location(attempt, node)] if node.handlers else node.body
         return node
@@ -202,7 +204,7 @@ def is_raised(error: BaseException) -> bool:
     """Whether an error is one that a traced function raises itself, or that Python raises in it."""
     if isinstance(error, Untraceable | Ambiguous):
         return False
-    if FOLLOWED in vars(error):
+    if CATCHABLE in vars(error):
         return True
     place = error.__traceback__
     while place is not None and place.tb_next is not None:
@@ -238,7 +240,7 @@ def _index(whole: Any, value: Any) -> Any:
     for k, v in enumerate(whole):
         if v is value or v == value:
             return k
-    raise followed(ValueError)
+    raise catchable(ValueError)
 
 
 class NumberKeys(dict[Any, Any]):

@@ -36,6 +36,7 @@ from .source import codes_in
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
+_OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
 _LARGE = 65536  # elements of an array that stays as it is
 
@@ -222,8 +223,12 @@ class Stage:
     def _written(self, real: Any) -> Callable[..., Any]:
         """Return a function of the table."""
         written, of_numbers, makes = WRITTEN[real], self.for_numbers(real), real in ARRAY_MAKERS
+        folds = (getattr(real, "__module__", None) or "").startswith(_OF_MATRICES)
 
         def function(*arguments: Any, **options: Any) -> Any:
+            given = [*settled(arguments), *map(settled, options.values())]
+            if folds and not staged.holds_tracers(given):
+                return of_numbers(*arguments, **options)
             if makes or staged.holds_tracers([*arguments, *options.values()]):
                 options = {k: unwrapped(v) for k, v in options.items()}
                 return written(self.graph, *map(unwrapped, arguments), **options)
@@ -306,7 +311,9 @@ class Stage:
         """Return a class: of somebody a copy whose methods lead here, of a library what makes."""
         if cls is np.float64:
             return NumberType(np.float64, self._float64)
-        raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc, np.errstate)
+        if cls is np.errstate:
+            return _errstate
+        raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
         if staged.is_of_a_library(cls):
@@ -350,6 +357,13 @@ class Stage:
             copied.__set_name__(copied, value.attrname or value.func.__name__)
             return copied
         return self.instead(value) if callable(value) or type(value) is np.ndarray else value
+
+
+def _errstate(**how: Any) -> Any:
+    """Return what says how NumPy reports errors, unless it raises or calls something."""
+    if not {"ignore", "warn", None}.issuperset(how.values()):
+        raise Untraceable("NumPy's errors as errors of Python's")
+    return np.errstate(**how)
 
 
 def _is_column(value: object) -> bool:

@@ -168,10 +168,10 @@ def _of_each(written: Any) -> Any:
         a, others = traced(graph, a), [traced(graph, b) for b in rest]
         if a.ndim < 3:
             return written(graph, a, *others)
-        each = [b if b.ndim == a.ndim else [b] * len(a) for b in others]
+        sides = [b if b.ndim == a.ndim else [b] * len(a) for b in others]
         if any(b.ndim == a.ndim and len(b) != len(a) for b in others):
             raise Untraceable("many matrices at once, with other shapes")
-        return traced(graph, [function(graph, *parts) for parts in zip(a, *each, strict=True)])
+        return traced(graph, [function(graph, *parts) for parts in zip(a, *sides, strict=True)])
 
     return function
 

@@ -238,7 +238,7 @@ def vectorize(graph: Graph, function: Any, otypes: Any = None) -> Any:
         zero = traced(graph, np.zeros(shape))
         arrays = [elementwise(graph, "add", a, zero) for a in arrays]
         numbers = [[_handed_over(graph, a[index]) for a in arrays] for index in np.ndindex(shape)]
-        results = [traced(graph, function(*each)) for each in numbers]
+        results = [traced(graph, function(*row)) for row in numbers]
         if any(f.shape or not (are_floats or _is_float(graph, f)) for f in results):
             raise Untraceable("np.vectorize of something else than floats")
         results = [scalar(graph, graph.number(f.only)) for f in results]
@@ -275,14 +275,14 @@ def wraps(graph: Graph, *_: Any, **__: Any) -> Any:
 
 
 @of(functools.cache, functools.lru_cache, makes=True)
-def cached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) -> Any:
-    """Return a function that computes anew what Python's keeps."""
+def uncached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) -> Any:
+    """Return a function that computes again what Python's keeps."""
     if function is None or isinstance(function, int):
-        return functools.partial(cached, graph)
+        return functools.partial(uncached, graph)
 
     around, first = getattr(function, "__closure__", None) or (), []
 
-    def anew(*arguments: Any, **named: Any) -> Any:
+    def computed(*arguments: Any, **named: Any) -> Any:
         for value in (*arguments, *named.values()):
             if isinstance(value, list | dict | set) or getattr(value, "shape", ()):
                 raise TypeError("a cache of what has no hash")
@@ -293,7 +293,7 @@ def cached(graph: Graph, function: Any = None, typed: bool = False, **_: Any) ->
             raise Untraceable("a cache of a function that reads what changes")
         return function(*arguments, **named)
 
-    return anew
+    return computed
 
 
 def _never_changes(value: Any) -> bool:

@@ -36,10 +36,10 @@ from .values import (
     Unknown,
     captured,
     element,
+    handed_out_again,
     holder,
     least_upper_bound,
     python_function,
-    remembered,
 )
 from .walk import Walk
 
@@ -98,7 +98,7 @@ class FunctionWalk(Walk):
             first = list(thing.given)
             return self.call(thing.function, first + given, dict(thing.named) | named)
         if isinstance(thing, Cached):
-            return remembered(self.call(thing.function, given, named))
+            return handed_out_again(self.call(thing.function, given, named))
         if isinstance(thing, Instance):
             method = made.attribute(self, function, "__call__")
             return self.call(method, given, named)

@@ -36,10 +36,10 @@ from .values import (
     element,
     forgotten,
     function_choice,
+    handed_out_again,
     holder,
     least_upper_bound,
     library,
-    remembered,
 )
 from .walk import Walk
 
@@ -331,7 +331,7 @@ class Expressions(ast.NodeVisitor):
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), [base], {})
             if getter is not getattr(entry, "fget", None):
-                return remembered(result)
+                return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
             return captured(getattr(thing, name))  # its name or its value

@@ -38,11 +38,11 @@ from .values import (
     element,
     forgotten,
     function_choice,
+    handed_out_again,
     holder,
     least_upper_bound,
     library,
     python_function,
-    remembered,
 )
 from .walk import Walk
 
@@ -114,7 +114,7 @@ def call(
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
-        return remembered(walk.call(wrapped, given, named))
+        return handed_out_again(walk.call(wrapped, given, named))
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
         return FRESH
     owner = getattr(thing, "__self__", None)

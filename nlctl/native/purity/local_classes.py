@@ -23,22 +23,22 @@ _OF_CONSTANTS = (ast.Constant, ast.UnaryOp, ast.USub, ast.BinOp, ast.operator, a
                  ast.Name, ast.Load)  # fmt: skip
 
 
-def made_class(node: ast.ClassDef, function: FunctionType, decorators: list[Any]) -> type:
+def class_defined_in(node: ast.ClassDef, function: FunctionType, decorators: list[Any]) -> type:
     """Return the class that a function defines, or refuse one that is more than its methods."""
     codes = [c for c in codes_in(function.__code__) if _is_of(c, node)]
     simple = not (node.bases or node.keywords) and all(map(_only_defines, node.body))
     if len(codes) != 1 or codes[0].co_freevars or not simple:
         raise Impure(f"defines the class {node.name}", "define it outside of the function")
     body: Any = FunctionType(codes[0], function.__globals__)
-    made: Any = builtins.__build_class__(body, node.name)
+    defined: Any = builtins.__build_class__(body, node.name)
     for decorator, expression in zip(decorators, node.decorator_list, strict=True):
         if decorator is not dataclasses.dataclass:
             raise Impure(f"decorates the class {node.name}", "define it outside of the function")
-        made = decorator(**dict(_options(expression)))(made)
-    return made
+        defined = decorator(**dict(_options(expression)))(defined)
+    return defined
 
 
-def constants_of(node: ast.ClassDef) -> Iterator[ast.expr]:
+def constants_in_class(node: ast.ClassDef) -> Iterator[ast.expr]:
     """Yield the expressions whose values a class keeps."""
     for statement in node.body:
         if isinstance(statement, ast.FunctionDef):

@@ -13,7 +13,7 @@ from ...expressions.source import Definition
 from . import made
 from .expressions import CHANGES, OPERATORS, Expressions, Frame
 from .known_calls import MEMORY
-from .local_classes import constants_of, made_class
+from .local_classes import class_defined_in, constants_in_class
 from .values import (
     FRESH,
     OUTSIDE,
@@ -141,7 +141,7 @@ class CallWalker(Expressions):
             self.either([node.body, node.orelse])
 
     def is_off(self, test: ast.expr) -> bool:
-        """Whether a test is a global that is False: it is looked at again before each run."""
+        """Whether a test is a global that is False: each run makes sure that it still is."""
         around: Frame | None = self.frame
         while around is not None and isinstance(test, ast.Name) and test.id not in around.names:
             around = around.parent
@@ -242,12 +242,12 @@ class CallWalker(Expressions):
         self.assign(node.name, value)
 
     def visit_ClassDef(self, node: ast.ClassDef) -> None:
-        for value in constants_of(node):
+        for value in constants_in_class(node):
             self.visit(value)
         if node not in self.walk.classes:
             calls = [d.func if isinstance(d, ast.Call) else d for d in node.decorator_list]
             decorators = [self.visit(call).known for call in calls]
-            self.walk.classes[node] = made_class(node, self.frame.function, decorators)
+            self.walk.classes[node] = class_defined_in(node, self.frame.function, decorators)
         self.assign(node.name, captured(self.walk.classes[node]))
 
 

@@ -249,7 +249,7 @@ def forgotten(value: KnownValue) -> KnownValue:
     return replace(value, known=UNKNOWN_VALUE)
 
 
-def remembered(value: KnownValue) -> KnownValue:
+def handed_out_again(value: KnownValue) -> KnownValue:
     """Return what is known of a result that a cache hands out again: it outlives the call."""
     known = value.known if isinstance(value.known, (*PLAIN, Pure, FunctionType)) else UNKNOWN_VALUE
     return replace(value, own=False, inside=False, known=known)

@@ -347,7 +347,7 @@ def nested_attempts(t, x, u, params):
     except ValueError:
         r = 0.5
     try:
-        r = r + math.exp(x[1] * 300)
+        r = r + min(math.exp(x[1] * 80), 100.0)
     except Exception:
         r = 0.0
     return [r, x[1]]

@@ -352,3 +352,24 @@ def random_frozen_noise(t, x, u, params):
     w = np.geomspace(0.1, 10, 5)
     wave = np.sum(np.cos(w * t + phases))
     return [x[1], -x[0] - 0.2 * x[1] + 0.1 * wave + u[0]]
+
+
+@engineered(12, 1)
+def appended_by_branches(t, x, u, params):
+    out = []
+    for v in x:
+        if v > 1:
+            out.append(1.0)
+        elif v < -1:
+            out.append(-1.0 - 0.1 * v)
+        else:
+            out.append(v)
+    return u[0] - np.array(out)
+
+
+@engineered(6, 1)
+def modes_of_a_constant_matrix(t, x, u, params):
+    stiffness = 2.0 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
+    mass = np.diag(np.linspace(1.0, 2.0, 6))
+    slowest = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real.min()
+    return -np.linalg.solve(mass, stiffness @ x) * slowest + np.linalg.det(mass) * u[0]

@@ -11,18 +11,6 @@ from engineers.entry import engineered
 
 
 @engineered(2, 1)
-def bisection_by_hand(t, x, u, params):
-    lo, hi = -10.0, 10.0
-    for _ in range(40):
-        mid = 0.5 * (lo + hi)
-        if mid**3 + mid - x[0] > 0:
-            hi = mid
-        else:
-            lo = mid
-    return [u[0] - mid, x[0] - x[1]]
-
-
-@engineered(2, 1)
 def newton_while(t, x, u, params):
     z, it = 1.0, 0
     while abs(z**3 + z - x[0]) > 1e-10 and it < 30:
