@@ -152,7 +152,9 @@ def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
     """Return what is to be written for some of the results."""
     return {
         name: [
-            part for row, array in found.results[name] for part in _stores(_array(name), row, array)
+            part
+            for row, array in found.results[name]
+            for part in _stores("s" if name.startswith(("sample", "reset")) else name, row, array)
         ]
         for name in names
     }
@@ -184,11 +186,6 @@ def planned(
         copied = parameters if name in PREPARE else 0
         functions[name] = Function(arguments=given, plan=planned, copied=copied)
     return functions, size
-
-
-def _array(results: str) -> str:
-    """Return the array that results are written to."""
-    return "s" if results.startswith(("sample", "reset")) else results
 
 
 def _stores(name: str, row: int, array: Tracer) -> list[Store]:

@@ -31,7 +31,14 @@ def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> S
     spare = _fitting(cache.of(Spare), sizes)
     if spare is None:
         work = new_work(x0, times, *sizes[2:])
-        arrays = tuple(array for array in _arrays(work) if array.size)
+        # of those that are 0 when a run begins flat ones are the same memory; `v` has unit vectors
+        arrays = tuple(
+            array
+            for (*_, name), array in named_arrays(work)
+            if array.size
+            and name not in ("lanes", "samples", "y", "v")
+            and not name.endswith("_flat")
+        )
         return Spare(sizes, work, arrays, sum(array.nbytes for array in arrays) <= _MOST)
     for array in spare.arrays:
         array.fill(0)
@@ -61,11 +68,13 @@ def give_back(cache: Cache, spare: Spare) -> None:
         del kept[:-_KEPT]  # those that have not been asked for
 
 
-def _arrays(record: Any) -> Iterator[np.ndarray]:
-    """Yield the arrays of a workspace that are 0 when a run begins."""
+def named_arrays(
+    record: Any, path: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Yield the arrays of a record, and of those inside, with their names."""
     for name in record._fields[:-1]:
         value = getattr(record, name)
         if hasattr(value, "_fields"):
-            yield from _arrays(value)
-        elif name not in ("lanes", "samples", "y", "v") and not name.endswith("_flat"):
-            yield value  # flat ones are the same memory, and `v` has unit vectors
+            yield from named_arrays(value, (*path, name))
+        elif isinstance(value, np.ndarray):
+            yield (*path, name), value

@@ -16,8 +16,6 @@ import numpy as np
 from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
 from .steps import Attempt, Jump, LaneEquations
 
-__all__ = ["accumulated", "accumulating"]
-
 _RATE = 1e-3  # of what is compared (1/s): an ideal relay that comes to rest has done so by then
 _MANY = 3e4  # switches, of a sequence of periods as 1 / n, after which it is enough
 _STEPS = 20  # accepted for each event: with more it does not switch all the time

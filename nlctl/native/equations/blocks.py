@@ -11,7 +11,7 @@ import control as ct
 import numpy as np
 
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, as_array, leaf_vector, scalar
+from ...expressions.arrays import Tracer, leaf_vector
 from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
 from ...expressions.trace import trace
 from ...responses.watched import watches_nan
@@ -25,7 +25,7 @@ from ..diagram.schedule import Schedule, during
 from ..diagram.trace import time
 from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
-from .reader import Reader
+from .reader import Reader, as_vector
 from .relays import with_sliding
 
 
@@ -133,14 +133,8 @@ def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     row = sum(count_switching_functions(node) for node in reader.blocks)
     functions = []
     for function in (condition.function for condition in switches.located):
-        size = function.size or 1
-        array = (
-            Tracer(reader.graph, as_array(function), 0, size)
-            if function.size
-            else scalar(reader.graph, function).reshape(1)
-        )
-        functions.append((row, array))
-        row += size
+        functions.append((row, as_vector(reader.graph, function)))
+        row += function.size or 1
     return functions
 
 

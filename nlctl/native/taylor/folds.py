@@ -56,22 +56,19 @@ def _orders_text(layout: SeriesLayout) -> str:
     }
     highest = b.new(f"fptosi {b.load(place['order'], 0)} to i64").text
     b.write(f"call void @first(ptr %t, ptr %x, ptr %u, ptr %c, ptr {place['o']}, ptr %k)")
-    b.write("br label %orders")
-    b.begin("orders")
-    b.write("%order = phi i64 [1, %entry], [%following, %orders]")
-    _write_weights(b, place["w"], "%order", lanes)
-    b.write(f"call void @sums(ptr %k, i64 %order, ptr {place['a']}, ptr {place['q']})")
-    before, here = _orders_at(b, "%order", size)
+    turns = Turns(b, [constant(1, kind="i")])
+    order = turns.carried[0].text
+    _write_weights(b, place["w"], order, lanes)
+    b.write(f"call void @sums(ptr %k, i64 {order}, ptr {place['a']}, ptr {place['q']})")
+    before, here = _orders_at(b, order, size)
     given = ", ".join(
         f"ptr {p}"
         for p in ("%t", "%x", "%u", "%c", "%v", *(place[n] for n in "wo"), before,
                   place["a"], place["q"], here)
     )  # fmt: skip
     b.write(f"call void @following({given})")
-    b.write("%following = add i64 %order, 1")
-    more = b.new(f"icmp slt i64 %following, {highest}").text
-    b.write(f"br i1 {more}, label %orders, label %last")
-    b.begin("last")
+    following = b.new(f"add i64 {order}, 1")
+    turns.end(b.new(f"icmp slt i64 {following.text}, {highest}"), [following])
     _write_weights(b, place["w"], highest, lanes)
     before, here = _orders_at(b, highest, size)
     b.write(f"call void @last(ptr {place['w']}, ptr {before}, ptr {here})")

@@ -262,7 +262,8 @@ class Body:
         self, name: str, make: Callable[..., tuple[Value, ...]], args: list[Value], count: int
     ) -> tuple[Value, ...]:
         """Call a function with some results, which `make` writes when it is first needed."""
-        width, full = args[0].width, self._full(name, args[0].width)
+        width = args[0].width
+        full = f"@nlctl.{name}.{width or 1}{'.portable' if self.portable else ''}"
         kind = llvm_type(width)
         kind = f"{{{kind}, {kind}}}" if count == 2 else kind
         if full not in self.module.functions:
@@ -274,9 +275,6 @@ class Body:
         return tuple(
             self.new(f"extractvalue {kind} {result.text}, {i}", width) for i in range(count)
         )
-
-    def _full(self, name: str, width: int) -> str:
-        return f"@nlctl.{name}.{width or 1}{'.portable' if self.portable else ''}"
 
     def _defined(self, full: str, kind: str, make: Callable[..., Any], args: list[Value]) -> str:
         """Return the text of a function."""
