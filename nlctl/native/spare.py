@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .cache import Cache
+from .integrate.memory import named_arrays
 from .integrate.state import new_lanes
 from .integrate.workspace import Work, new_work
 
@@ -66,15 +66,3 @@ def give_back(cache: Cache, spare: Spare) -> None:
     if spare.is_small:
         kept.append(spare)
         del kept[:-_KEPT]  # those that have not been asked for
-
-
-def named_arrays(
-    record: Any, path: tuple[str, ...] = ()
-) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
-    """Yield the arrays of a record, and of those inside, with their names."""
-    for name in record._fields[:-1]:
-        value = getattr(record, name)
-        if hasattr(value, "_fields"):
-            yield from named_arrays(value, (*path, name))
-        elif isinstance(value, np.ndarray):
-            yield (*path, name), value

@@ -88,11 +88,8 @@ def rejected(lane, error, task):
     finite = np.isfinite(error)
     if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
-    lane.rejected += 1
-    lane.tries = lane.seeks = lane.traces = 0
-    lane.cross = 0.0
     order = rodas5p.ORDER if lane.stiff else task.pair.order
-    lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
+    shorten(lane, max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
     return True
@@ -113,11 +110,7 @@ def next_step(lane, error, rate, task):
     if task.taylor.highest and task.fixed == 0.0:
         lane.h = max(lane.h, lane.step)  # coefficients will say how long it is to be
         return
-    log_error, memories, slower = (
-        np.log(max(error, 1e-10)),
-        task.rows.memory.size,
-        5.0 / task.pair.order,
-    )
+    log_error, slower = np.log(max(error, 1e-10)), 5.0 / task.pair.order
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44
     now, before = (0.17, 0.04) if lane.stiff else (0.14 * slower, 0.08 * slower)
@@ -132,7 +125,7 @@ def next_step(lane, error, rate, task):
     elif not lane.stiff:
         limit = min(_reach(task), 0.8 * task.pair.stable)
         lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
-        if memories and lane.slow:
+        if task.rows.memory.size and lane.slow:
             lane.h = limit / rate
 
 

@@ -161,10 +161,7 @@ def keep(task, lanes, w, done, passed):
         broke = 0 if passed[j] or w.past.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
             broke = min(broke, 1)
-        if (
-            lanes[j].tick < task.clocks.ticks.shape[1]
-            and task.clocks.ticks[j, lanes[j].tick] <= lanes[j].t
-        ):
+        if is_due(task, lanes[j], j):
             broke = 0
         for i in range(task.lines.delays.shape[0]):
             w.past.fresh[i, j] = broke
@@ -174,6 +171,13 @@ def keep(task, lanes, w, done, passed):
         passed[j] = jumps or (passed[j] and task.rows.memory.size > 0)
         _show(task, lanes[j], w, j, True)
     return jumped
+
+
+@numba.njit(**INNER)
+def is_due(task, lane, j):
+    """Whether something happens to sampled blocks at the time that a lane has come to."""
+    ticks = task.clocks.ticks
+    return lane.tick < ticks.shape[1] and ticks[j, lane.tick] <= lane.t
 
 
 @numba.njit(**INNER)
@@ -197,10 +201,8 @@ def _has_kink(task, m):
         return False
     before, after = task.times[m] - task.times[m - 1], task.times[m + 1] - task.times[m]
     for i in range(task.inputs.shape[0]):
-        rise, next_rise = (
-            task.inputs[i, m] - task.inputs[i, m - 1],
-            (task.inputs[i, m + 1] - task.inputs[i, m]),
-        )
+        rise = task.inputs[i, m] - task.inputs[i, m - 1]
+        next_rise = task.inputs[i, m + 1] - task.inputs[i, m]
         if rise * after != next_rise * before:
             return True
     return False

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ...accumulation import PACE, jumps_end
+from ...accumulation import jumps_end
 from ..machine.address import call_out
 from .evaluate import evaluate, inputs_at
 from .log import note
-from .memory import Places1, Places2, Reals2, Reals3, arrays_of
+from .memory import Places1, Places2, Reals2, Reals3
 from .restart import restart
 from .state import DIVERGED, INNER, RUNNING, ZENO
 
@@ -41,15 +41,8 @@ class Guards(NamedTuple):
 
     above: Places2  # whether it was not negative when last seen
     rising: Reals2  # the value of one that was negative behind its jump and is to rise, or NaN
-    pace: Reals3  # how its jumps follow each other, see `jumps_end`
+    pace: Reals3  # (guards, lanes, PACE): how its jumps follow each other, see `jumps_end`
     table: Places2
-
-
-def new_guards(guards: int, lanes: int) -> Guards:
-    """Return the arrays for so many guards."""
-    return arrays_of(
-        Guards, above=(guards, lanes), rising=(guards, lanes), pace=(guards, lanes, PACE)
-    )
 
 
 @numba.njit(**INNER)

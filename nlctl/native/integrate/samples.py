@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out
-from .delays import next_break
+from .delays import is_due, next_break
 from .evaluate import inputs_at
 from .memory import Places1, Places2, Reals1, Reals2
 from .state import INNER, RUNNING
@@ -61,7 +61,7 @@ def take_samples(task, lanes, w, sampled):
     """
     found = False
     for j in range(lanes.size):
-        sampled[j] = _is_due(task, lanes[j], j)
+        sampled[j] = lanes[j].status == RUNNING and is_due(task, lanes[j], j)
         found |= sampled[j]
     for j in range(lanes.size):
         if sampled[j] and lanes[j].segment == task.times.size - 1:
@@ -126,20 +126,9 @@ def begin_afresh(task, lanes, w, sampled):
             continue
         gap = next_stop(task, lane, w, j) - lane.t
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
-        lane.log_error_before = lane.last = lane.low = lane.high = 0.0
-        lane.cross = 0.0
-        lane.tries = lane.seeks = lane.same_side = lane.short = lane.quiet = lane.slow = 0
-        lane.traces = 0
-
-
-@numba.njit(**INNER)
-def _is_due(task, lane, j):
-    running = lane.status == RUNNING
-    return (
-        running
-        and lane.tick < task.clocks.ticks.shape[1]
-        and task.clocks.ticks[j, lane.tick] <= lane.t
-    )
+        lane.log_error_before = lane.last = lane.low = lane.high = lane.cross = 0.0
+        lane.tries = lane.seeks = lane.traces = lane.same_side = 0
+        lane.short = lane.quiet = lane.slow = 0
 
 
 @numba.njit(**INNER)

@@ -14,11 +14,10 @@ import numpy as np
 from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
 from ..driver import Course, prepared
-from ..integrate.memory import data_address, type_of, with_fields
+from ..integrate.memory import data_address, named_arrays, type_of, with_fields
 from ..integrate.workspace import Task
 from ..run import Run
 from ..settings import Settings
-from ..spare import named_arrays
 
 HELD_STEPS = 500  # of a window
 TIMES_ROW = list(type_of(Task).formats).index("times")  # of the task's table

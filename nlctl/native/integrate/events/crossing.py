@@ -230,10 +230,8 @@ def bracket(task, lane, w, bad, j):
         if first:
             events.g_low[i, j] = events.g_before[i, j] = events.g_start[i, j]
         if bad or first:
-            events.g_high[i, j], events.g_low[i, j] = (
-                events.g[i, j],
-                events.g_low[i, j] * weight,
-            )
+            events.g_high[i, j] = events.g[i, j]
+            events.g_low[i, j] *= weight
         else:
             events.g_before[i, j], events.g_low[i, j] = events.g_low[i, j], events.g[i, j]
             events.g_high[i, j] *= weight

@@ -312,16 +312,8 @@ def _bracket(w, x, j):
     k = min(int(4.0 * x), 3)
     inner = k + 1 if inside.values[k + 1] < inside.values[k] else k
     low, high = (k, k + 1) if inner == 0 or inner == 4 else (inner - 1, inner + 1)
-    inside.bracket[0, j], inside.bracket[1, j], inside.bracket[2, j] = (
-        0.25 * low,
-        0.25 * inner,
-        0.25 * high,
-    )
-    inside.height[0, j], inside.height[1, j], inside.height[2, j] = (
-        inside.values[low],
-        inside.values[inner],
-        inside.values[high],
-    )
+    for n, place in enumerate((low, inner, high)):
+        inside.bracket[n, j], inside.height[n, j] = 0.25 * place, inside.values[place]
     if inner == 0 or inner == 4:
         inside.bracket[1, j] = -1.0
     inside.part[j], inside.foreseen[j] = x, np.inf

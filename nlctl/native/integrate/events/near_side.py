@@ -59,10 +59,8 @@ def _halve(rhs, task, lanes, w, back):
     inside = w.inside
     for j in range(lanes.size):
         if inside.sought[j] > 0:
-            inside.bracket[0, j], inside.bracket[2, j] = (
-                lanes[j].low / lanes[j].step,
-                1.0 - back,
-            )
+            inside.bracket[0, j] = lanes[j].low / lanes[j].step
+            inside.bracket[2, j] = 1.0 - back
             inside.part[j] = 0.5 * (inside.bracket[0, j] + inside.bracket[2, j])
     for _ in range(_HALVINGS):
         events_at_parts(rhs, task, lanes, w, w.ahead.g, w.ahead.m)
