@@ -83,11 +83,9 @@ def _noted(run: Any, row: int, times: np.ndarray) -> np.ndarray:
 
 
 def _is_small(evaluated: LaneEquations, point: tuple, rates: np.ndarray, crowd: Crowd) -> bool:
-    """Whether from one switch to the next what is compared stays within tolerances.
-
-    On a parabola it comes as far as its rate after the switch takes it in a quarter of the way.
-    It is slow as well, or there have been many: periods as 1 / n fall by 2 / n in two switches.
-    """
+    """Whether from one switch to the next what is compared stays within tolerances."""
+    # On a parabola it comes as far as its rate after the switch takes it in a quarter of the way.
+    # It is slow as well, or there have been many: periods as 1 / n fall by 2 / n in two switches.
     t, x, u = point
     ahead = crowd.period / 8
     there = reached(lambda s, z: evaluated.switching(s, z, u)[crowd.row], t, x, rates, ahead)

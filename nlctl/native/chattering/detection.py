@@ -56,11 +56,9 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 
 
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
-    """Return which lanes are to be looked at, at the end of a window.
-
-    Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    `_LONG` windows on: what usual runs take must not cost them anything.
-    """
+    """Return which lanes are to be looked at, at the end of a window."""
+    # Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
+    # `_LONG` windows on: what usual runs take must not cost them anything.
     before, longest, windows, slow = (paces[name] for name in _PACES.names or ())
     gone = lanes["t"] - before
     before[:] = lanes["t"]

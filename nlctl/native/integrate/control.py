@@ -41,11 +41,9 @@ def choose_step(lane, stop, over, max_steps):
 
 @numba.njit(**INNER)
 def limit_step(task, lane, j):
-    """Shorten the step that is proposed where it might pass over a function of t alone.
-
-    A function that is called as it stands may move at any time: from rest, where error control
-    sees nothing of it, no step passes an output sample, or is longer than `opaque`.
-    """
+    """Shorten the step that is proposed where it might pass over a function of t alone."""
+    # A function that is called as it stands may move at any time: from rest, where error control
+    # sees nothing of it, no step passes an output sample, or is longer than `opaque`.
     if task.fixed > 0.0 or lane.tries > 0 or lane.status != RUNNING:
         return
     longest, cells = task.timed.longest[j], task.timed.reach.shape[1]
@@ -61,16 +59,12 @@ def limit_step(task, lane, j):
 
 @numba.njit(**INNER)
 def memory_error(task, x, m, m_other, j):
-    """Return the largest difference of what a lane's memories would become, over its tolerance.
-
-    A memory that is carried along is a state like any other, and follows from the others by an
-    equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
-    at which the memory is seen to reverse.  So `m` is of a step's solution and `m_other` of one
-    that differs from it by the error.
-
-    What only one of them moves does not count: where a relay switches, or a memory begins to move,
-    is an event, and is located as one.
-    """
+    """Return the largest difference of what a lane's memories would become, over its tolerance."""
+    # A memory that is carried along is a state like any other, and follows from the others by an
+    # equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
+    # at which the memory is seen to reverse. So `m` is of a step's solution and `m_other` of one
+    # that differs from it by the error. What only one of them moves does not count: where a relay
+    # switches, or a memory begins to move, is an event, and is located as one.
     largest, spoilt = 0.0, 0.0
     for i in range(m.shape[0]):
         before = x[task.rows.memory[i], j]
@@ -138,11 +132,9 @@ def _reach(task):
 
 @numba.njit(**INNER)
 def choose_method(lane, task):
-    """Go over to the stiff method where stability limits the step, and back where it does not pay.
-
-    The stiff method is first tried; it stays while it gets further with a step tried than the
-    explicit one would by more than what its steps cost, `cost` explicit ones each.
-    """
+    """Go over to the stiff method where stability limits steps, and back where it does not pay."""
+    # The stiff method is first tried; it stays while it gets further with a step tried than the
+    # explicit one would by more than what its steps cost, `cost` explicit ones each.
     tried = lane.accepted + lane.rejected
     if not lane.stiff:
         if lane.slow >= lane.patience * (1 if task.alone else 100):

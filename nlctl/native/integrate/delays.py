@@ -53,11 +53,9 @@ def next_break(task, w, lane, j, stop):
 
 @numba.njit(**INNER)
 def _read(task, w, lane, i, j):
-    """Return when a step that begins now has read enough of the past of a line.
-
-    Pieces are short where a signal moves: a longer step would go over a pulse that was kept.  A
-    step that was given is taken as it is.
-    """
+    """Return when a step that begins now has read enough of the past of a line."""
+    # Pieces are short where a signal moves: a longer step would go over a pulse that was kept. A
+    # step that was given is taken as it is.
     past = w.past
     now = piece_at(past.t, j, past.first[i, j], past.kept[j] - 1, sent(task, i, j, lane.t))
     ahead = now + PAST_PIECES
@@ -125,11 +123,9 @@ def _fit(task, w, j):
 
 @numba.njit(**INNER)
 def unresolved(task, lane, w, j, event):
-    """Whether polynomials miss too much of a step in which nothing else is wrong.
-
-    A jump that no switching function tells of is driven into a very short step, and accepted.
-    Right behind an event the signal at the end says nothing of the step.
-    """
+    """Whether polynomials miss too much of a step in which nothing else is wrong."""
+    # A jump that no switching function tells of is driven into a very short step, and accepted.
+    # Right behind an event the signal at the end says nothing of the step.
     past = w.past
     if not event and not past.missed_at_end[j] <= past.missed[j]:
         past.missed[j] = past.missed_at_end[j]
@@ -147,11 +143,9 @@ def unresolved(task, lane, w, j, event):
 
 @numba.njit(**INNER)
 def keep(task, lanes, w, done, passed):
-    """Keep the signals of the accepted steps, and let arrive what arrives at their ends.
-
-    ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
-    events if there are memories.  Return whether a jump arrives in any lane.
-    """
+    """Keep the signals of the accepted steps, and let arrive what arrives at their ends."""
+    # ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
+    # events if there are memories. Return whether a jump arrives in any lane.
     jumped = False
     for j in range(lanes.size):
         if not done[j]:

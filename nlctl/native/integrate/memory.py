@@ -83,11 +83,9 @@ def _kind(hint: Any) -> Any:
 
 
 def with_table(record: Any, **values: Any) -> Any:
-    """Return a named tuple of these values; its table holds as long as it does.
-
-    Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
-    that this function has made.
-    """
+    """Return a named tuple of these values; its table holds as long as it does."""
+    # Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
+    # that this function has made.
     numbers: list[int] = []
     for name, (dtype, ndim) in type_of(record).formats.items():
         numbers.extend(_entry(record, name, values[name], dtype, ndim))

@@ -136,10 +136,8 @@ def _jump(task, lanes, w, fallen, chosen):
 
 @numba.njit(**INNER)
 def _counted(task, lane):
-    """Count jumps without progress of time, or in the first step after another.
-
-    Too many have no end.  That they do not end is so from the first of them on.
-    """
+    """Count jumps without progress of time, or in the first step after another."""
+    # Too many have no end. That they do not end is so from the first of them on.
     gone = lane.t - lane.fell_at
     still = max(_STILL * abs(lane.t), _HOVERS * (task.times[-1] - task.times[0]))
     lane.crowd = lane.crowd + 1 if gone <= max(still, 1.5 * lane.last) else 0

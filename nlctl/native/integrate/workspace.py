@@ -99,11 +99,9 @@ def new_work(
     terms: tuple[int, int] = (1, 0),
     log: int = 0,
 ) -> Work:
-    """Return the arrays for integrating members from `x0` (states, lanes) on.
-
-    The inputs include the lines, and so do the outputs what arrives there.  `terms` are the
-    numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
-    """
+    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    # The inputs include the lines, and so do the outputs what arrives there. `terms` are the
+    # numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
     n, lanes = x0.shape
     states = {name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage")}
     states["x"][:] = x0

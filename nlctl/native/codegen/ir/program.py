@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Mapping
 from ....expressions.graph import Expr
 from ..plan import Function
 from ..solver import DONE, GUESS, Solver
-from .loops import written
+from .loops import LoopWriter
 from .numbers import Writer
 from .text import Body, Module, Turns, constant
 
@@ -56,7 +56,7 @@ def _function(
     for level in function.plan.levels:
         writer.numbers(level.numbers)
         for loop in level.loops:
-            written(writer, loop)
+            LoopWriter(writer, loop).write()
     b.write("ret void")
     given = ", ".join(f"ptr noalias %{argument}" for argument in function.arguments)
     return f"define {linkage}void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"

@@ -341,14 +341,14 @@ class Body:
     def address(self, array: str, at: int, index: str | None = None, step: int = 1) -> str:
         """Return the address of entry `at` of an array, or of ``index * step + at``."""
         if index is None:
-            return (
-                self.new(f"getelementptr double, ptr %{array}, i64 {at}").text
-                if at
-                else (f"%{array}")
-            )
+            return self.moved(f"%{array}", at) if at else f"%{array}"
         scaled = self.new(f"mul i64 {index}, {step}").text if step != 1 else index
         moved = self.new(f"add i64 {scaled}, {at}").text if at else scaled
-        return self.new(f"getelementptr double, ptr %{array}, i64 {moved}").text
+        return self.moved(f"%{array}", moved)
+
+    def moved(self, where: str, by: int | str) -> str:
+        """Return the address that is so many numbers behind another one."""
+        return self.new(f"getelementptr double, ptr {where}, i64 {by}").text
 
     def load(self, where: str, width: int) -> Value:
         """Return the number, or as many as a vector has, at an address."""

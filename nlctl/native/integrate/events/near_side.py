@@ -18,10 +18,8 @@ _HALVINGS = 24  # of the way to a break point that is farther back
 
 @numba.njit(**INNER)
 def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.memories.m what they are just before a break point that ends a step.
-
-    Behind it, what carries a memory along may have jumped back: it keeps what it was before.
-    """
+    """Make memories in w.memories.m what they are just before a break point that ends a step."""
+    # Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     inside, ahead, memories = w.inside, w.ahead, w.memories
     wanted, any_wanted, nearer = inside.wanted, False, w.events.g_inside[3]
     back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
@@ -52,10 +50,8 @@ def look_before(rhs, task, lanes, w, found):
 
 @numba.njit(**INNER)
 def _halve(rhs, task, lanes, w, back):
-    """Set w.inside.part right before the first break point of the lanes that are sought.
-
-    Where a memory turns at the break point at which its input jumps, a step ends farther behind.
-    """
+    """Set w.inside.part right before the first break point of the lanes that are sought."""
+    # Where a memory turns at the break point at which its input jumps, a step ends farther behind.
     inside = w.inside
     for j in range(lanes.size):
         if inside.sought[j] > 0:

@@ -47,10 +47,8 @@ WHOLE = arrays_alike(Elimination, (0,))
 
 
 def elimination(structure: np.ndarray) -> Elimination:
-    """Order pivots after Markowitz: the next is the one that can create the fewest entries.
-
-    Shapes: `structure` (n, n).
-    """
+    """Order pivots after Markowitz: the next is the one that can create the fewest entries."""
+    # Shapes: `structure` (n, n).
     n = len(structure)
     here = structure | np.eye(n, dtype=bool)
     waiting, order, below, right = np.ones(n, dtype=bool), [], [], []
@@ -69,12 +67,10 @@ def elimination(structure: np.ndarray) -> Elimination:
 
 
 def cost(n: int, order: Elimination) -> float:
-    """Return what a step of the stiff method for n states takes, in steps of the explicit one.
-
-    Measured, of eight diagrams within a factor of 2: 2 for what does not depend on n, the Jacobian
-    matrix, and one step for 1500 multiplications in factorising and in nine solutions, or for 6000
-    where whole columns fill SIMD registers.
-    """
+    """Return what a step of the stiff method for n states takes, in steps of the explicit one."""
+    # Measured, of eight diagrams within a factor of 2: 2 for what does not depend on n, the
+    # Jacobian matrix, and one step for 1500 multiplications in factorising and in nine solutions,
+    # or for 6000 where whole columns fill SIMD registers.
     if order.order.size:
         return 2.0 + 0.06 * n + (order.target.size + 9 * order.source.size) / 1500.0
     return 2.0 + 0.06 * n + (n**3 / 3 + 9 * n * n) / 6000.0
@@ -110,10 +106,8 @@ def _placed(order: list[int], below: list[np.ndarray], right: list[np.ndarray]) 
 
 
 def jacobian_place(i: int, j: int, n: int) -> int:
-    """Return where the entry of row i and column j of n states is kept, time in column n.
-
-    Columns are kept as they are made: `DIRECTIONS` of them together, row by row.
-    """
+    """Return where the entry of row i and column j of n states is kept, time in column n."""
+    # Columns are kept as they are made: `DIRECTIONS` of them together, row by row.
     return (j // DIRECTIONS * n + i) * DIRECTIONS + j % DIRECTIONS
 
 
@@ -145,11 +139,9 @@ def solve(method, only_entries, work, b):
 
 @numba.njit(**INNER)
 def _factorise_entries(method, diagonal, jacobian, factors):
-    """Factorise with the pivots of an `Elimination`; return whether all are large enough.
-
-    Row by row: what is subtracted is on the right of pivots that are done.  Of these their
-    inverses are kept.
-    """
+    """Factorise with the pivots of an `Elimination`; return whether all are large enough."""
+    # Row by row: what is subtracted is on the right of pivots that are done. Of these their
+    # inverses are kept.
     start, pivot, column, rank = method.start, method.pivot, method.column, method.rank
     source, target, done = method.source, method.target, INDEX(0)
     for e in range(source.size):
@@ -203,12 +195,10 @@ def multiply(method, jacobian, v, product):
 
 @numba.njit(**INNER)
 def _factorise_all(columns, pivots):
-    """Factorise a square matrix in place, P M = L U, with partial pivoting.
-
-    Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
-    adds nothing up, so that SIMD registers are full and no order of additions is left to a
-    compiler.
-    """
+    """Factorise a square matrix in place, P M = L U, with partial pivoting."""
+    # Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
+    # adds nothing up, so that SIMD registers are full and no order of additions is left to a
+    # compiler.
     n = columns.shape[0]
     for c in range(n):
         best = c

@@ -90,10 +90,8 @@ def directions(n: int, inputs: int) -> np.ndarray:
 
 @numba.njit(**INNER)
 def _jacobian(rhs, point, along, task, lanes, w):
-    """Fill w.stiff.jacobian and w.stiff.f_t at the start of a step.
-
-    Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
-    """
+    """Fill w.stiff.jacobian and w.stiff.f_t at the start of a step."""
+    # Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
     lane = lanes[0]
     w.t[0] = lane.t
     if task.stiff.derivatives == DIFFERENCES or not _exact(point, along, task, lanes, w):
@@ -181,12 +179,10 @@ def _spectral_radius(task, w):
 
 @numba.njit(**INNER)
 def _memory_error(rhs, task, lanes, w, only_entries):
-    """Return the largest error of what memories would become, over its tolerance.
-
-    Estimated by the defect f - x' of the solution at the end of the step, divided by
-    1 / (h gamma) - J.  Most of that is the polynomial's, which is of order 3 in what fast
-    components amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
-    """
+    """Return the largest error of what memories would become, over its tolerance."""
+    # Estimated by the defect f - x' of the solution at the end of the step, divided by 1 / (h
+    # gamma) - J. Most of that is the polynomial's, which is of order 3 in what fast components
+    # amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
     ahead = w.ahead
     error = w.x_stage_flat  # not needed any more
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.stiff.U, error)
