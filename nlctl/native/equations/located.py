@@ -72,11 +72,9 @@ class Conditions:
 
     @property
     def partners(self) -> list[int]:
-        """How many rows behind it, or with a sign before, the partner of each row is; 0 for none.
-
-        Where the function of even integers is 0, it rises with what is counted if the other one is
-        below 0; where that one is 0, if the first is above.
-        """
+        """How many rows behind it, or with a sign before, each row's partner is; 0 for none."""
+        # Where the function of even integers is 0, it rises with what is counted if the other one
+        # is below 0; where that one is 0, if the first is above.
         return [one.integers * one.rows for one in self.located for _ in range(one.rows)]
 
     @property
