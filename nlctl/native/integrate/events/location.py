@@ -189,7 +189,7 @@ def locate_jump(lane, rtol, is_behind):
     else:
         lane.low = lane.step
     lane.tries += 1
-    rest = max(min(10.0 * rtol, 1e-4) * lane.high, 4e-16 * abs(lane.t))
+    rest = max(behind_event(rtol) * lane.high, 4e-16 * abs(lane.t))
     found = lane.high - lane.low <= rest
     if found and (is_behind or lane.low == lane.high):
         return EVENT

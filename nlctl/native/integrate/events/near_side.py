@@ -11,7 +11,7 @@ import numpy as np
 
 from ..methods.dense import events_at_parts
 from ..state import INNER, opposite
-from .location import EVENT
+from .location import EVENT, behind_event
 
 _HALVINGS = 24  # of the way to a break point that is farther back
 
@@ -22,7 +22,7 @@ def look_before(rhs, task, lanes, w, found):
     # Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     inside, ahead, memories = w.inside, w.ahead, w.memories
     wanted, any_wanted, nearer = inside.wanted, False, w.events.g_inside[3]
-    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
+    back = 2.5 * behind_event(task.rtol)  # the break point is not so far back
     for j in range(lanes.size):
         wanted[j] = found[j] == EVENT and _crosses(task, w, w.events.g, j)
         any_wanted |= wanted[j]
