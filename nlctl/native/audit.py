@@ -121,10 +121,8 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
         dx, g, m = code.values(code.rhs, "dx g m", point, c)
         (y,) = code.values(code.out, "y", point, c)
         # next states are 0 as python-control has it where nothing is due
-        due, after = (
-            [code.values(function, "s", point, c)[0] for function in functions]
-            for functions in (code.samples, code.resets)
-        )
+        due = [code.values(function, "s", point, c)[0] for function in code.samples]
+        after = [code.values(function, "s", point, c)[0] for function in code.resets]
         jumped = np.concatenate([np.zeros(0), *after])[:jumping]
         sampled = [s[:count] for s in due]
         return dx, y, *sampled, *without_nan(np.append(g, m)[declared], jumped)

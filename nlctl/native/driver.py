@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import control as ct
 import numpy as np
@@ -186,10 +187,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
         outputs=compiled.system.noutputs or 0,
         p=c,
         alone=int(count == 1),
-        rtol=float(settings.rtol),
-        atol=float(settings.atol),
-        fixed=float(settings.step),
-        max_steps=int(settings.max_steps),
+        **_bounds(settings),
         method=EXPLICIT if isinstance(method, Tableau) else METHODS[method],
         pair=pair_of(settings.pair),
         stiff=of_program.stiff,
@@ -214,6 +212,14 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
     )  # fmt: skip
     spare.work.lanes["stiff"] = method == "rodas5p"
     return Run(machine=code, task=task, work=with_past(compiled, task, spare.work, p), spare=spare)
+
+
+def _bounds(settings: Settings) -> dict[str, Any]:
+    """Return what errors and numbers of steps are bounded by."""
+    return {
+        "rtol": float(settings.rtol), "atol": float(settings.atol),
+        "fixed": float(settings.step), "max_steps": int(settings.max_steps),
+    }  # fmt: skip
 
 
 def _method(compiled: Compiled, settings: Settings) -> str | Tableau:

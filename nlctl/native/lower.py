@@ -171,10 +171,8 @@ def planned(
     known = _computed_before(results, varying, parameters)
     prepared = _kept(known, parameters)
     size = parameters + sum(store.size for store in prepared)
-    wanted, before = (
-        {"prepare": prepared, **stores},
-        {"prepare": {}, **dict.fromkeys(stores, known)},
-    )
+    wanted, before = {"prepare": prepared, **stores}, dict.fromkeys(stores, known)
+    before["prepare"] = {}
     if POINT in stores:
         later = _computed_before(results, _along(results), size, known)
         wanted[POINT], before["along"] = _kept(later, size), known | later

@@ -37,5 +37,5 @@ def _walked(
             )
         ]
         y = np.concatenate([np.zeros(0), *(shown for _, shown in walked)])
-    blocks = [each for inner, _ in walked for each in inner]
+    blocks = [block for inner, _ in walked for block in inner]
     return blocks, system.output_map @ np.concatenate((y, stacked))

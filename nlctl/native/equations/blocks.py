@@ -25,7 +25,7 @@ from ..diagram.schedule import Schedule, during
 from ..diagram.trace import time
 from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
-from .reader import Reader, as_vector
+from .reader import Reader, vector_of
 from .relays import with_sliding
 
 
@@ -133,7 +133,7 @@ def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     row = sum(count_switching_functions(node) for node in reader.blocks)
     functions = []
     for function in (condition.function for condition in switches.located):
-        functions.append((row, as_vector(reader.graph, function)))
+        functions.append((row, vector_of(reader.graph, function)))
         row += function.size or 1
     return functions
 

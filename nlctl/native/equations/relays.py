@@ -15,7 +15,7 @@ from ..diagram.schedule import Schedule
 from ..diagram.trace import traced_parameters
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, sliding_rates
 from ..sliding.second import Limits
-from .reader import Reader, as_vector
+from .reader import Reader, vector_of
 
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:
@@ -69,7 +69,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
 
 
 def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
-    return concatenated(graph, [as_vector(graph, part) for part in parts])
+    return concatenated(graph, [vector_of(graph, part) for part in parts])
 
 
 def _limits(reader: Reader, i: int) -> Limits:

@@ -28,9 +28,9 @@ def by_address(function: Any) -> Any:
         return types.none(address, *arrays), generate
 
     # numba takes a function's arguments one by one only if they are named
-    own = inspect.signature(function)
+    signature = inspect.signature(function)
     first = inspect.Parameter("typing_context", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    definition.__signature__ = own.replace(parameters=[first, *own.parameters.values()])  # type: ignore[attr-defined]
+    definition.__signature__ = signature.replace(parameters=[first, *signature.parameters.values()])  # type: ignore[attr-defined]
     name = function.__name__
     template = make_intrinsic_template(function, definition, name, prefer_literal=False)
     infer_global(function, types.Function(template))
