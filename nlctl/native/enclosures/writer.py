@@ -48,28 +48,26 @@ def judged_rows(sides: int, results: int) -> JudgedRows:
     return JudgedRows(*accumulate((_BEFORE, sides, sides, 2 * sides, 2 * results)))
 
 
-def enclosure_text(
-    results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int, lanes: int = LANES
-) -> str:
+def enclosure_text(results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int) -> str:
     """Return the IR of both functions."""
     all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
     module = Module(inlined=len(all_of_it) <= INLINED)
-    texts = [_values(module, results, lanes), _judge(module, results, gradients, sides, lanes)]
+    texts = [_values(module, results), _judge(module, results, gradients, sides)]
     return "\n".join([module.text(), *texts])
 
 
-def values_text(results: Sequence[Expr], lanes: int = LANES) -> str:
+def values_text(results: Sequence[Expr]) -> str:
     """Return the IR of `values` alone."""
     module = Module(inlined=len(needed(results)) <= INLINED)
-    text = _values(module, results, lanes)
+    text = _values(module, results)
     return f"{module.text()}\n{text}"
 
 
 class EnclosureWriter:
     """Writes enclosures of expressions; `names` says what each is called so far."""
 
-    def __init__(self, b: Body, lanes: int) -> None:
-        self.b, self.lanes = b, lanes
+    def __init__(self, b: Body) -> None:
+        self.b = b
         self.names: dict[Expr, Ends] = {}
         self.jumps: dict[Expr, Value] = {}  # where an expression may jump for a reason of its own
 
@@ -84,7 +82,7 @@ class EnclosureWriter:
         b, args = self.b, [self.names[a] for a in node.args]
         if node.op == "const":
             known = arithmetic.truth if node.kind == "b" else arithmetic.point_of
-            return known(node.data, self.lanes)
+            return known(node.data, LANES)
         if node.op == "leaf":
             return self.ends("x", 2 * node.data[1])
         if node.op == "add":
@@ -122,16 +120,14 @@ class EnclosureWriter:
 
     def ends(self, array: str, row: int) -> Ends:
         """Read an interval from two rows."""
-        low, high = (
-            self.b.load(self.b.address(array, (row + k) * self.lanes), self.lanes) for k in (0, 1)
-        )
+        low, high = (self.b.load(self.b.address(array, (row + k) * LANES), LANES) for k in (0, 1))
         return Ends(low=low, high=high)
 
     def keep(self, array: str, row: int, *values: Value | float) -> None:
         """Write values to consecutive rows."""
         for k, value in enumerate(values):
-            wide = self.b.wide(value, self.lanes)
-            self.b.store(wide, self.b.address(array, (row + k) * self.lanes))
+            wide = self.b.wide(value, LANES)
+            self.b.store(wide, self.b.address(array, (row + k) * LANES))
 
     def may_jump(self, expr: Expr) -> Value | None:
         """Return where an expression may jump; None if nowhere."""
@@ -148,9 +144,9 @@ def _function(b: Body, name: str, *arguments: str) -> str:
     return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
 
 
-def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
+def _values(module: Module, results: Sequence[Expr]) -> str:
     b = Body(module)
-    w = EnclosureWriter(b, lanes)
+    w = EnclosureWriter(b)
     w.write(results)
     for k, expr in enumerate(results):
         w.keep("v", 2 * k, *arithmetic.finite(w.names[expr]).values)
@@ -159,19 +155,15 @@ def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
 
 
 def _judge(
-    module: Module,
-    results: Sequence[Expr],
-    gradients: Sequence[Sequence[Expr]],
-    sides: int,
-    lanes: int,
+    module: Module, results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int
 ) -> str:
     b, rows = Body(module), judged_rows(sides, len(results))
-    w = EnclosureWriter(b, lanes)
+    w = EnclosureWriter(b)
     w.write([*results, *(g for gradient in gradients for g in gradient)])
     box = [w.ends("x", 2 * i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
-    inner, written = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
+    inner, written = (b.address("o", at * LANES) for at in (rows.inner, rows.values))
     b.write(f"call void @values(ptr {inner}, ptr {written})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
