@@ -71,7 +71,6 @@ def with_parameters_of(other: Any) -> Callable[[_F], _F]:
             known = _parameters(others) | _parameters(text)
             names = inspect.signature(function).parameters
             entries = dict.fromkeys(known[name] for name in names if name in known)
-            text = text if _PARAMETERS in text else _with_section(text, _PARAMETERS)
             head, _, rest = text.partition(_PARAMETERS)
             behind = _SECTION.search(rest)
             others = head + (rest[behind.start() :] if behind else "")

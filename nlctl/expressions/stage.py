@@ -226,7 +226,7 @@ class Stage:
         folds = (getattr(real, "__module__", None) or "").startswith(_OF_MATRICES)
 
         def function(*arguments: Any, **options: Any) -> Any:
-            given = [*settled(arguments), *map(settled, options.values())]
+            given = [*staged.settled(arguments), *map(staged.settled, options.values())]
             if folds and not staged.holds_tracers(given):
                 return of_numbers(*arguments, **options)
             if makes or staged.holds_tracers([*arguments, *options.values()]):

@@ -92,20 +92,15 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
             return
         _, c = prepared_parameters(compiled, trial.p, width, due)
         done.append(_Audited(code=code))
-        evaluated, trial = _evaluated(compiled, code, c), _with_own_diagram(compiled, trial, code)
+        evaluated, own = _evaluated(compiled, code, c), apart(compiled.schedule.system)
+        params = override(own.system, trial.params)  # nobody else writes into that diagram
+        trial = replace(trial, meetings=code.meetings, apart=own, params=params)
         relays = relay_places(compiled.schedule.nodes)
         outputs = every_output(compiled, trial.p) if relays else None
         for point in _points(trial):
             every = outputs(point) if outputs else {}
             known = {i: float(every[i][0]) for i in relays}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
-
-
-def _with_own_diagram(compiled: Compiled, trial: Trial, code: Machine) -> Trial:
-    """Return a trial with a diagram that nobody else writes parameters into."""
-    own = apart(compiled.schedule.system)
-    params = override(own.system, trial.params)
-    return replace(trial, meetings=code.meetings, apart=own, params=params)
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
@@ -126,10 +121,8 @@ def _evaluated(compiled: Compiled, code: Machine, c: np.ndarray) -> Evaluated:
         dx, g, m = code.values(code.rhs, "dx g m", point, c)
         (y,) = code.values(code.out, "y", point, c)
         # next states are 0 as python-control has it where nothing is due
-        due, after = (
-            [code.values(function, "s", point, c)[0] for function in functions]
-            for functions in (code.samples, code.resets)
-        )
+        due = [code.values(function, "s", point, c)[0] for function in code.samples]
+        after = [code.values(function, "s", point, c)[0] for function in code.resets]
         jumped = np.concatenate([np.zeros(0), *after])[:jumping]
         sampled = [s[:count] for s in due]
         return dx, y, *sampled, *without_nan(np.append(g, m)[declared], jumped)
@@ -299,7 +292,7 @@ def _compare_blocks(compiled: Compiled, trial: Trial, ours: PointValues, point: 
     outputs = every_output(compiled, trial.p)(point)
     rates, rounded, *_ = rounding(compiled, replace(trial, meetings=()), point, schedule)
     every = _by_block(compiled, rounded)
-    given = list(block_inputs(system, u[: system.ninputs or 0], outputs))
+    given = block_inputs(system, u[: system.ninputs or 0], outputs)
     for i in dict.fromkeys((*compiled.schedule.order, *range(len(nodes)))):
         node, (block, inputs) = nodes[i], given[i]
         if supplied_of(block) is not None:

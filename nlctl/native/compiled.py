@@ -23,20 +23,13 @@ from ..responses.watched import Watched
 from ..upstream.control_internals import StandIn, is_system, state_space
 from ..upstream.systems import System
 from ..wording import counted
+from . import jacobians
 from .describe import called, described
 from .diagram.checks import check_sizes
 from .diagram.parameters import length
 from .diagram.program import program
 from .diagram.schedule import schedule
-from .jacobians import (
-    Tangent,
-    check_enters_alone,
-    float_parameters,
-    jacobian,
-    over_a_period,
-    tangent,
-    tell_of_differences,
-)
+from .jacobians import Tangent
 from .machine.evaluations import evaluations
 from .reading import Reading
 
@@ -190,7 +183,7 @@ class Compiled(Reading, StandIn):
     @property
     def tangent(self) -> Tangent:
         """The derivatives of the equations along a direction of states, inputs and parameters."""
-        return tangent(self)
+        return jacobians.tangent(self)
 
     @as_annotated
     def linearize(
@@ -250,12 +243,12 @@ class Compiled(Reading, StandIn):
             x0, u0 = x0.states, x0.inputs if u0 is None else u0
         system = self.system
         n, m, given = system.nstates or 0, system.ninputs or 0, self.schedule.ninputs
-        tell_of_differences(self)
+        jacobians.tell_of_differences(self)
         directions = np.eye(n + given + length(self.program.layout), n + m)
-        found = jacobian(self, x0, u0, t, params, directions)
+        found = jacobians.jacobian(self, x0, u0, t, params, directions)
         rates, outputs, dt = found["dx"], found["y"], system.dt
         if self.program.sampled:
-            rates, outputs, dt = over_a_period(self, found)
+            rates, outputs, dt = jacobians.over_a_period(self, found)
         own = {
             "name": f"{system.name}$linearized",
             "inputs": system.input_labels,
@@ -293,8 +286,8 @@ class Compiled(Reading, StandIn):
             As `linearize`, if there is no such parameter, and if numbers follow from it outside of
             the equations, by a record's `derived`.
         """
-        places = float_parameters(self)
-        tell_of_differences(self)
+        places = jacobians.float_parameters(self)
+        jacobians.tell_of_differences(self)
         self.parameter_vector(params)  # blocks have the run's parameters then
         start = (self.system.nstates or 0) + self.schedule.ninputs
         directions = np.zeros((start + length(self.program.layout), len(parameters)))
@@ -302,9 +295,9 @@ class Compiled(Reading, StandIn):
             if name not in places:
                 raise unknown("parameter", name, places, f"of '{self.system.name}' that is a float")
             place, owner = places[name]
-            check_enters_alone(owner, name)
+            jacobians.check_enters_alone(owner, name)
             directions[start + place, k] = 1.0
-        found = jacobian(self, x0, u0, t, params, directions)
+        found = jacobians.jacobian(self, x0, u0, t, params, directions)
         return found["dx"], found["y"]
 
     def _call(

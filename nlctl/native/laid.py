@@ -53,25 +53,20 @@ def _laid(reading: Reading, code: Machine) -> Laid:
 
 def _rows(program: Program, code: Machine, watched: tuple[Watched, ...]) -> EventRows:
     """Return how many rows are whose: declared, located, memories."""
-    located = code.lowered.rows["g"]
-    bending = code.lowered.conditions.bending
+    located, conditions = code.lowered.rows["g"], code.lowered.conditions
+    partners = [*[0] * program.switching, *conditions.partners, *[0] * len(program.guards)]
     return with_table(
         EventRows,
         bending=program.switching,
-        declared=program.switching + bending,
+        declared=program.switching + conditions.bending,
         guarded=located - len(program.guards),
         switching=located,
         watched=located - len(program.guards) - len(watched),
         ways=np.array([each.direction for each in watched], dtype=np.int64),
         ending=np.array([each.ends for each in watched], dtype=np.int64),
-        partners=np.array(_partners(program, code), dtype=np.int64),
+        partners=np.array(partners, dtype=np.int64),
         memory=np.array(program.memory, dtype=np.int64),
     )
-
-
-def _partners(program: Program, code: Machine) -> list[int]:
-    found = code.lowered.conditions.partners
-    return [*[0] * program.switching, *found, *[0] * len(program.guards)]
 
 
 def _resets(program: Program, code: Machine) -> Resets:

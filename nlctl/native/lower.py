@@ -158,7 +158,9 @@ def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
     """Return what is to be written for some of the results."""
     return {
         name: [
-            part for row, array in found.results[name] for part in _stores(_array(name), row, array)
+            part
+            for row, array in found.results[name]
+            for part in _stores("s" if name.startswith(("sample", "reset")) else name, row, array)
         ]
         for name in names
     }
@@ -175,10 +177,8 @@ def planned(
     known = _computed_before(results, varying, parameters)
     prepared = _kept(known, parameters)
     size = parameters + sum(store.size for store in prepared)
-    wanted, before = (
-        {"prepare": prepared, **stores},
-        {"prepare": {}, **dict.fromkeys(stores, known)},
-    )
+    wanted, before = {"prepare": prepared, **stores}, dict.fromkeys(stores, known)
+    before["prepare"] = {}
     if POINT in stores:
         later = _computed_before(results, _along(results), size, known)
         wanted[POINT], before["along"] = _kept(later, size), known | later
@@ -190,11 +190,6 @@ def planned(
         copied = parameters if name in PREPARE else 0
         functions[name] = Function(arguments=given, plan=planned, copied=copied)
     return functions, size
-
-
-def _array(results: str) -> str:
-    """Return the array that results are written to."""
-    return "s" if results.startswith(("sample", "reset")) else results
 
 
 def _stores(name: str, row: int, array: Tracer) -> list[Store]:

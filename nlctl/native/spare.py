@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .cache import Cache
+from .integrate.memory import named_arrays
 from .integrate.state import new_lanes
 from .integrate.workspace import Work, new_work
 
@@ -31,7 +31,14 @@ def workspace(cache: Cache, x0: np.ndarray, times: np.ndarray, *sizes: Any) -> S
     spare = _fitting(cache.of(Spare), sizes)
     if spare is None:
         work = new_work(x0, times, *sizes[2:])
-        arrays = tuple(array for array in _arrays(work) if array.size)
+        # of those that are 0 when a run begins flat ones are the same memory; `v` has unit vectors
+        arrays = tuple(
+            array
+            for (*_, name), array in named_arrays(work)
+            if array.size
+            and name not in ("lanes", "samples", "y", "v")
+            and not name.endswith("_flat")
+        )
         return Spare(sizes, work, arrays, sum(array.nbytes for array in arrays) <= _MOST)
     for array in spare.arrays:
         array.fill(0)
@@ -59,13 +66,3 @@ def give_back(cache: Cache, spare: Spare) -> None:
     if spare.is_small:
         kept.append(spare)
         del kept[:-_KEPT]  # those that have not been asked for
-
-
-def _arrays(record: Any) -> Iterator[np.ndarray]:
-    """Yield the arrays of a workspace that are 0 when a run begins."""
-    for name in record._fields[:-1]:
-        value = getattr(record, name)
-        if hasattr(value, "_fields"):
-            yield from _arrays(value)
-        elif name not in ("lanes", "samples", "y", "v") and not name.endswith("_flat"):
-            yield value  # flat ones are the same memory, and `v` has unit vectors

@@ -14,8 +14,8 @@ from ...annotations import as_annotated
 from ...attributes import described_record
 from ...errors import CompileError, ParameterError
 from ...native.driver import Course, prepared
-from ...native.integrate.log import new_log
-from ...native.integrate.memory import with_fields
+from ...native.integrate.log import Log
+from ...native.integrate.memory import arrays_alike, with_fields
 from ...native.integrate.methods.lu import WHOLE
 from ...native.integrate.methods.stiff import DIFFERENCES, stiff_method
 from ...native.integrate.state import LANE, Status
@@ -185,7 +185,7 @@ def _laid_out(
     stiff = stiff_method(n, DIFFERENCES, task.stiff.c, WHOLE)
     task = with_fields(task, timed=timed, stiff=stiff)
     if work.log.t.size:
-        work = with_fields(work, log=new_log(NOTED + work.log.t.size))
+        work = with_fields(work, log=arrays_alike(Log, (NOTED + work.log.t.size,)))
     size = sum(a.nbytes for a in (work.samples, work.y, task.p, task.inputs))
     if size > _MOST:
         raise CompileError(

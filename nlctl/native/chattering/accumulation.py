@@ -16,8 +16,6 @@ import numpy as np
 from ...accumulation import AT_LEAST, WITHIN, Crowd, crowd_of, reached, tolerance_of
 from .steps import Attempt, Jump, LaneEquations
 
-__all__ = ["accumulated", "accumulating"]
-
 _RATE = 1e-3  # of what is compared (1/s): an ideal relay that comes to rest has done so by then
 _MANY = 3e4  # switches, of a sequence of periods as 1 / n, after which it is enough
 _STEPS = 20  # accepted for each event: with more it does not switch all the time
@@ -85,11 +83,9 @@ def _noted(run: Any, row: int, times: np.ndarray) -> np.ndarray:
 
 
 def _is_small(evaluated: LaneEquations, point: tuple, rates: np.ndarray, crowd: Crowd) -> bool:
-    """Whether from one switch to the next what is compared stays within tolerances.
-
-    On a parabola it comes as far as its rate after the switch takes it in a quarter of the way.
-    It is slow as well, or there have been many: periods as 1 / n fall by 2 / n in two switches.
-    """
+    """Whether from one switch to the next what is compared stays within tolerances."""
+    # On a parabola it comes as far as its rate after the switch takes it in a quarter of the way.
+    # It is slow as well, or there have been many: periods as 1 / n fall by 2 / n in two switches.
     t, x, u = point
     ahead = crowd.period / 8
     there = reached(lambda s, z: evaluated.switching(s, z, u)[crowd.row], t, x, rates, ahead)

@@ -59,12 +59,10 @@ def new_paces(lanes: np.ndarray) -> np.ndarray:
 
 
 def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
-    """Return which lanes are to be looked at, at the end of a window.
-
-    Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
-    `_LONG` windows on: what usual runs take must not cost them anything.  A window that a turn to
-    another method cuts short is one together with the next.
-    """
+    """Return which lanes are to be looked at, at the end of a window."""
+    # Those that have become slow, after 1, 2, 4, ... windows; and those that run on and on, from
+    # `_LONG` windows on: what usual runs take must not cost them anything. A window that a turn to
+    # another method cuts short is one together with the next.
     before, longest, tried, windows, slow = (paces[name] for name in _PACES.names or ())
     status = lanes["status"]
     whole = lanes["accepted"] + lanes["rejected"] - tried >= WINDOW

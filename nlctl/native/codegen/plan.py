@@ -158,10 +158,8 @@ def plan_function(
     for node, used_in in users.items():
         if len(used_in) > 1 and node not in stored and node.kind != "b":
             stored[node], rows = ("c", rows), rows + (node.size or 1)
-    written = _written(stores, nodes, stored, known)
-    users = _loops(
-        nodes, level, stored, known, written
-    )  # again: what lies in memory is computed once
+    written = _written(stores, nodes, stored, known)  # again: what is in memory is computed once
+    users = _loops(nodes, level, stored, known, written)
     loops: dict[_Loop, list[Expr]] = {}
     for node in nodes:
         for loop in users.get(node, ()):

@@ -84,11 +84,6 @@ class Schedule:
         has_relays = any(supplied_of(node.system) is SLIDING for node in self.nodes)
         return (self.system.ninputs or 0) if has_relays else 0
 
-    @property
-    def simple(self) -> bool:
-        """Whether every block is evaluated exactly once, and nothing is solved for."""
-        return not self.loops and len(self.order) == len(self.nodes)
-
 
 def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Schedule:
     """Flatten a diagram and order its blocks."""

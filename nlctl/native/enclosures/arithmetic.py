@@ -225,9 +225,7 @@ def choice_of(b: Body, condition: Ends, x: Ends, y: Ends) -> Ends:
         rest = b.select(condition.high, neither, w)
         return b.select(condition.low, v, rest)
 
-    low, high = (
-        chosen(*parts) for parts in zip(x.values, y.values, both.values, strict=True)
-    )  # fmt: skip
+    low, high = map(chosen, x.values, y.values, both.values)
     return Ends(low=low, high=high, not_negative=both.not_negative)
 
 

@@ -19,7 +19,7 @@ from ..machine.finish import Loaded, finished
 from ..purity.check import check_pure
 from ..purity.values import FRESH, Impure
 from .scalars import UnroundedGraph, scalar_expressions
-from .writer import LANES, JudgedRows, enclosure_text
+from .writer import LANES, JudgedRows, enclosure_text, judged_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,6 @@ class BoxCode:
     expressions: tuple[Expr, ...]  # numbers, each a function of the sides
     rows: JudgedRows  # of what `judge` writes
     loaded: Loaded
-    lanes: int = LANES  # boxes at a time
     fixed: int = 0  # so many of the last sides are numbers, and have no width
 
     @property
@@ -46,17 +45,17 @@ class BoxCode:
     def values(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds of the functions on boxes, by their natural extension."""
         # Shapes: `low, high` (boxes, sides); returns (boxes, results).
-        count, lanes = len(low), self.lanes
+        count = len(low)
         ends = np.stack([low, high], axis=2).astype(float)  # (boxes, sides, 2)
-        missing = -count % lanes
+        missing = -count % LANES
         if missing:
             ends = np.concatenate([ends, np.repeat(ends[:1], missing, axis=0)])
-        batches = ends.reshape(-1, lanes, self.sides, 2).transpose(0, 2, 3, 1)
+        batches = ends.reshape(-1, LANES, self.sides, 2).transpose(0, 2, 3, 1)
         batches = np.ascontiguousarray(batches)
-        results = np.empty((len(batches), self.rows.results, 2, lanes))
+        results = np.empty((len(batches), len(self.expressions), 2, LANES))
         for given, result in zip(batches, results, strict=True):
             self._values(given.ctypes.data, result.ctypes.data)
-        flat = results.transpose(0, 3, 1, 2).reshape(-1, self.rows.results, 2)[:count]
+        flat = results.transpose(0, 3, 1, 2).reshape(-1, len(self.expressions), 2)[:count]
         return flat[..., 0], flat[..., 1]
 
 
@@ -100,7 +99,7 @@ def enclosed(results: Sequence[Expr], sides: int, fixed: int = 0) -> BoxCode:
     return BoxCode(
         sides=sides,
         expressions=tuple(numbers),
-        rows=JudgedRows(sides=sides, results=len(numbers)),
+        rows=judged_rows(sides, len(numbers)),
         loaded=_loaded(enclosure_text(numbers, gradients, sides)),
         fixed=fixed,
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from .boxes import BoxCode
 from .search import ALL_PROVED, FULL, REFUTED, prove_below, supremum
+from .writer import LANES
 
 _ROOM = 2_048  # boxes for which there is room to begin with
 _ALONE = 20_000  # boxes after which the rest is divided among threads
@@ -172,7 +173,7 @@ def _check_fixed(code: BoxCode, low: np.ndarray, high: np.ndarray) -> None:
 
 
 def _room(code: BoxCode) -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros((2 * code.sides, code.lanes)), np.zeros((code.rows.count, code.lanes))
+    return np.zeros((2 * code.sides, LANES)), np.zeros((code.rows.count, LANES))
 
 
 def _widths(box: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The table of interval rules: what each function of the table of functions makes of intervals.
+"""The table of interval rules: what each function of the table of functions makes of arithmetic.
 
 A rule returns an interval, and where the function may jump within its arguments.  Functions that
 rise or fall are known by their ends, periodic ones by their ends and the turning points between
@@ -13,23 +13,8 @@ from dataclasses import dataclass
 
 from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Value, constant
-from .arithmetic import (
-    Ends,
-    absolute_of,
-    add,
-    defined,
-    div,
-    finite,
-    hull_of,
-    maximum,
-    minimum,
-    mul,
-    neg,
-    point_of,
-    root_of,
-    routine,
-    sub,
-)
+from . import arithmetic
+from .arithmetic import Ends
 from .rounding import function_downwards, function_upwards, larger, smaller
 
 _Result = tuple[Ends, Value | None]
@@ -74,15 +59,15 @@ STEPS = ("floor", "ceil", "trunc", "rint", "sign")
 def interval_of(b: Body, name: str, *args: Ends) -> _Result:
     """Return what a function of the table makes of intervals, and where it may jump."""
     if name in ("minimum", "maximum"):  # which know an infinite constant
-        return (minimum if name == "minimum" else maximum)(b, *args), None
-    args = tuple(map(finite, args))
+        return (arithmetic.minimum if name == "minimum" else arithmetic.maximum)(b, *args), None
+    args = tuple(map(arithmetic.finite, args))
     if name in MONOTONE:
         known = MONOTONE[name]
-        return routine(b, name, lambda c, x: _by_ends(c, name, known, x), *args), None
+        return arithmetic.routine(b, name, lambda c, x: _by_ends(c, name, known, x), *args), None
     if name in STEPS:
         return _steps(b, name, args[0])
     if name in _SMOOTH:
-        return routine(b, name, lambda c, *given: RULES[name](c, *given)[0], *args), None
+        return arithmetic.routine(b, name, lambda c, *given: RULES[name](c, *given)[0], *args), None
     return RULES[name](b, *args)
 
 
@@ -108,7 +93,9 @@ def _by_ends(b: Body, name: str, known: Monotone, x: Ends) -> Ends:
     if known.domain == (-_INF, _INF):
         return ends
     inside = b.compare("oge", x.low, known.domain[0])
-    return defined(b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends)
+    return arithmetic.defined(
+        b, b.logic("and", inside, b.compare("ole", x.high, known.domain[1])), ends
+    )
 
 
 def _steps(b: Body, name: str, x: Ends) -> _Result:
@@ -118,7 +105,7 @@ def _steps(b: Body, name: str, x: Ends) -> _Result:
 
 
 def _cosh(b: Body, x: Ends) -> _Result:
-    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), absolute_of(b, x)), None
+    return _by_ends(b, "cosh", Monotone(values=(1.0, _INF)), arithmetic.absolute_of(b, x)), None
 
 
 _TURN = 1 / (2 * math.pi)
@@ -148,7 +135,7 @@ def _circular(name: str, top: float) -> Callable[..., _Result]:
         low = b.select(_meets(b, x, _TURN, 0.5 - top), -1.0, low)
         high = b.select(_meets(b, x, _TURN, -top), 1.0, high)
         is_number = b.logic("and", b.compare("ord", x.low, x.high), b.compare("ord", low, high))
-        return defined(b, is_number, Ends(low=low, high=high)), None
+        return arithmetic.defined(b, is_number, Ends(low=low, high=high)), None
 
     return rule
 
@@ -159,19 +146,19 @@ def _tan(b: Body, x: Ends) -> _Result:
     pole = _meets(b, x, 1 / math.pi, -0.5)
     exists = b.logic("xor", pole, constant(True, pole.width, "b"))
     exists = b.logic("and", exists, b.compare("ole", low, high))
-    return defined(b, exists, Ends(low=low, high=high)), None
+    return arithmetic.defined(b, exists, Ends(low=low, high=high)), None
 
 
 # -- functions of two arguments --------------------------------------------------------------------
 
 
 def _hypot(b: Body, x: Ends, y: Ends) -> _Result:
-    x, y = absolute_of(b, x), absolute_of(b, y)
+    x, y = arithmetic.absolute_of(b, x), arithmetic.absolute_of(b, y)
     low = function_downwards(b, applied(b, "hypot", x.low, y.low))
     high = function_upwards(b, applied(b, "hypot", x.high, y.high))
     is_number = b.logic("and", b.compare("ord", x.low, y.low), b.compare("ord", low, high))
     size = Ends(low=larger(b, 0.0, low), high=high, not_negative=True)
-    return defined(b, is_number, size), None
+    return arithmetic.defined(b, is_number, size), None
 
 
 def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
@@ -185,7 +172,7 @@ def _corners(b: Body, name: str, x: Ends, y: Ends) -> Ends:
         low, high = smaller(b, value, low), larger(b, value, high)
         numbers = b.logic("and", numbers, b.compare("ord", value, value))
     bounds = Ends(low=function_downwards(b, low), high=function_upwards(b, high))
-    return defined(b, numbers, bounds)
+    return arithmetic.defined(b, numbers, bounds)
 
 
 def _power(b: Body, x: Ends, y: Ends) -> _Result:
@@ -194,7 +181,7 @@ def _power(b: Body, x: Ends, y: Ends) -> _Result:
     exists = b.logic("or", b.compare("ogt", x.low, 0.0), at_zero)
     result = _corners(b, "power", x, y)
     result = Ends(low=larger(b, 0.0, result.low), high=result.high, not_negative=True)
-    return defined(b, exists, result), None
+    return arithmetic.defined(b, exists, result), None
 
 
 def _arctan2(b: Body, y: Ends, x: Ends) -> _Result:
@@ -210,42 +197,43 @@ def _rest(name: str) -> Callable[..., _Result]:
     """Return the rule of a remainder: x - y q, where q is x / y rounded by `name`."""
 
     def rule(b: Body, x: Ends, y: Ends) -> _Result:
-        least, most = (applied(b, name, v) for v in div(b, x, y).values)
+        least, most = (applied(b, name, v) for v in arithmetic.div(b, x, y).values)
         q, jumps = Ends(low=least, high=most), b.compare("une", least, most)
-        one = sub(b, x, mul(b, y, q))
-        zero = point_of(0.0, x.low.width)
-        other = absolute_of(b, y)
-        bound = hull_of(b, zero, y) if name == "floor" else hull_of(b, other, neg(b, other))
+        one = arithmetic.sub(b, x, arithmetic.mul(b, y, q))
+        zero = arithmetic.point_of(0.0, x.low.width)
+        other = arithmetic.absolute_of(b, y)
+        sides = (zero, y) if name == "floor" else (other, arithmetic.neg(b, other))
+        bound = arithmetic.hull_of(b, *sides)
         low = b.select(jumps, bound.low, larger(b, bound.low, one.low))
         high = b.select(jumps, bound.high, smaller(b, bound.high, one.high))
         is_number = b.logic("and", b.compare("ord", q.low, q.high), b.compare("ord", low, high))
-        return defined(b, is_number, Ends(low=low, high=high)), jumps
+        return arithmetic.defined(b, is_number, Ends(low=low, high=high)), jumps
 
     return rule
 
 
 def _copysign(b: Body, x: Ends, y: Ends) -> _Result:
-    a = absolute_of(b, x)
-    mirrored = neg(b, a)
+    a = arithmetic.absolute_of(b, x)
+    mirrored = arithmetic.neg(b, a)
     positive, negative = b.compare("ogt", y.low, 0.0), b.compare("olt", y.high, 0.0)
     low = b.select(positive, a.low, mirrored.low)
     high = b.select(negative, mirrored.high, a.high)
     open_ = b.logic("xor", b.logic("or", positive, negative), constant(True, low.width, "b"))
-    return defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
+    return arithmetic.defined(b, b.compare("ord", y.low, y.high), Ends(low=low, high=high)), open_
 
 
 def _heaviside(b: Body, x: Ends, h: Ends) -> _Result:
-    zero, one = point_of(0.0, x.low.width), point_of(1.0, x.low.width)
+    zero, one = arithmetic.point_of(0.0, x.low.width), arithmetic.point_of(1.0, x.low.width)
     after, before = b.compare("ogt", x.low, 0.0), b.compare("olt", x.high, 0.0)
     here = b.logic("and", b.compare("oeq", x.low, 0.0), b.compare("oeq", x.high, 0.0))
-    every = hull_of(b, hull_of(b, zero, one), h)
+    every = arithmetic.hull_of(b, arithmetic.hull_of(b, zero, one), h)
     ends = []
     for all_, at in zip(every.values, h.values, strict=True):
         ends.append(b.select(after, 1.0, b.select(before, 0.0, b.select(here, at, all_))))
     known = b.logic("or", b.logic("or", after, before), here)
     jumps = b.logic("xor", known, constant(True, known.width, "b"))
     step = Ends(low=ends[0], high=ends[1])
-    return defined(b, b.compare("ord", x.low, x.high), step), jumps
+    return arithmetic.defined(b, b.compare("ord", x.low, x.high), step), jumps
 
 
 def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
@@ -253,17 +241,17 @@ def _logaddexp(b: Body, x: Ends, y: Ends) -> _Result:
 
     def at(v: Value, w: Value) -> Ends:
         one, other = Ends(low=v, high=v), Ends(low=w, high=w)
-        apart = neg(b, absolute_of(b, sub(b, one, other)))
+        apart = arithmetic.neg(b, arithmetic.absolute_of(b, arithmetic.sub(b, one, other)))
         small = _by_ends(b, "log1p", MONOTONE["log1p"], _by_ends(b, "exp", MONOTONE["exp"], apart))
-        return add(b, maximum(b, one, other), small)
+        return arithmetic.add(b, arithmetic.maximum(b, one, other), small)
 
     low, high = at(x.low, y.low).low, at(x.high, y.high).high
-    return defined(b, b.compare("ord", low, high), Ends(low=low, high=high)), None
+    return arithmetic.defined(b, b.compare("ord", low, high), Ends(low=low, high=high)), None
 
 
 RULES: dict[str, Callable[..., _Result]] = {
-    "absolute": lambda b, x: (absolute_of(b, x), None),
-    "sqrt": lambda b, x: (root_of(b, x), None),
+    "absolute": lambda b, x: (arithmetic.absolute_of(b, x), None),
+    "sqrt": lambda b, x: (arithmetic.root_of(b, x), None),
     "cosh": _cosh,
     "sin": _circular("sin", 0.25),
     "cos": _circular("cos", 0.0),

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
+from ..machine.address import call_enclosure
 from ..machine.machine_code import kept
-from .address import call_enclosure
 
 ALL_PROVED, REFUTED, LEFT, FULL = range(4)
 FINEST = 1e-6  # of a tolerance: where the bound is near 0, nothing finer is tried

@@ -10,34 +10,15 @@ row k of `v` the same of result k.  What `judge` writes is in `JudgedRows`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import accumulate
+from typing import NamedTuple
 
 from ...expressions.continuity import is_an_extreme
 from ...expressions.graph import COMPARISONS, LOGIC, Expr, needed
 from ..codegen.ir.numbers import one_line
 from ..codegen.ir.text import Body, Module, Value
-from .arithmetic import (
-    NAN,
-    Ends,
-    absolute_of,
-    add,
-    choice_of,
-    comparison_of,
-    div,
-    finite,
-    left_open,
-    logic,
-    logic_not,
-    maximum,
-    minimum,
-    mul,
-    neg,
-    point_of,
-    routine,
-    select_truth,
-    sub,
-    truth,
-)
+from . import arithmetic
+from .arithmetic import Ends
 from .rounding import larger, smaller
 from .rules import interval_of
 
@@ -45,70 +26,48 @@ LANES = 8
 # operations up to which rules become part of what calls them: beyond, code of a third more speed
 # would take three times as long to make
 INLINED = 400
-_ARITHMETIC = {"sub": sub, "mul": mul, "div": div}
+_ARITHMETIC = {"sub": arithmetic.sub, "mul": arithmetic.mul, "div": arithmetic.div}
 _INF = float("inf")
 
 
-@dataclass(frozen=True, kw_only=True)
-class JudgedRows:
+class JudgedRows(NamedTuple):
     """Where `judge` writes what it finds, in rows of one number per lane."""
 
-    # of the box, and of the function
-    sides: int
-    results: int
-
-    BOUND = 0  # upper bound of the least result
-    MET = 1  # its lower bound at the centre
-    ABOVE = 2  # its upper bound there
-
-    @property
-    def centre(self) -> int:
-        """The point, a row per side; not a number for a side without an end."""
-        return 3
-
-    @property
-    def weight(self) -> int:
-        """How much each side matters, a row per side; not a number where that is not known."""
-        return 3 + self.sides
-
-    @property
-    def inner(self) -> int:
-        """The box that stands for the centre."""
-        return 3 + 2 * self.sides
-
-    @property
-    def values(self) -> int:
-        """Enclosures of the results there."""
-        return self.inner + 2 * self.sides
-
-    @property
-    def count(self) -> int:
-        """All rows."""
-        return self.values + 2 * self.results
+    centre: int  # the point, a row per side; not a number for a side without an end
+    weight: int  # how much each side matters, a row per side; not a number where that is unknown
+    inner: int  # the box that stands for the centre
+    values: int  # enclosures of the results there
+    count: int  # all rows
 
 
-def enclosure_text(
-    results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int, lanes: int = LANES
-) -> str:
+_BEFORE = 3  # rows: upper bound of the least result, and its lower and upper bound at the centre
+
+
+def judged_rows(sides: int, results: int) -> JudgedRows:
+    """Return where things are of a box with so many sides, and of so many results."""
+    return JudgedRows(*accumulate((_BEFORE, sides, sides, 2 * sides, 2 * results)))
+
+
+def enclosure_text(results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int) -> str:
     """Return the IR of both functions."""
     all_of_it = needed([*results, *(g for gradient in gradients for g in gradient)])
     module = Module(inlined=len(all_of_it) <= INLINED)
-    texts = [_values(module, results, lanes), _judge(module, results, gradients, sides, lanes)]
+    texts = [_values(module, results), _judge(module, results, gradients, sides)]
     return "\n".join([module.text(), *texts])
 
 
-def values_text(results: Sequence[Expr], lanes: int = LANES) -> str:
+def values_text(results: Sequence[Expr]) -> str:
     """Return the IR of `values` alone."""
     module = Module(inlined=len(needed(results)) <= INLINED)
-    text = _values(module, results, lanes)
+    text = _values(module, results)
     return f"{module.text()}\n{text}"
 
 
 class EnclosureWriter:
     """Writes enclosures of expressions; `names` says what each is called so far."""
 
-    def __init__(self, b: Body, lanes: int) -> None:
-        self.b, self.lanes = b, lanes
+    def __init__(self, b: Body) -> None:
+        self.b = b
         self.names: dict[Expr, Ends] = {}
         self.jumps: dict[Expr, Value] = {}  # where an expression may jump for a reason of its own
 
@@ -122,26 +81,26 @@ class EnclosureWriter:
     def _operation(self, node: Expr) -> Ends:
         b, args = self.b, [self.names[a] for a in node.args]
         if node.op == "const":
-            known = truth if node.kind == "b" else point_of
-            return known(node.data, self.lanes)
+            known = arithmetic.truth if node.kind == "b" else arithmetic.point_of
+            return known(node.data, LANES)
         if node.op == "leaf":
             return self.ends("x", 2 * node.data[1])
         if node.op == "add":
-            return add(b, *args)
+            return arithmetic.add(b, *args)
         if node.op in _ARITHMETIC and args[0] is not args[1]:
-            return routine(b, node.op, _ARITHMETIC[node.op], *args)
+            return arithmetic.routine(b, node.op, _ARITHMETIC[node.op], *args)
         if node.op in _ARITHMETIC:  # of one quantity: less than of two in one range
-            return routine(
+            return arithmetic.routine(
                 b, f"{node.op}.same", lambda c, x: _ARITHMETIC[node.op](c, x, x), args[0]
             )
         if node.op == "neg":
-            return neg(b, args[0])
+            return arithmetic.neg(b, args[0])
         if node.op in COMPARISONS:
-            return comparison_of(b, node.op, *args)
+            return arithmetic.comparison_of(b, node.op, *args)
         if node.op == "not":
-            return logic_not(b, args[0])
+            return arithmetic.logic_not(b, args[0])
         if node.op in LOGIC:
-            return logic(b, node.op, *args)
+            return arithmetic.logic(b, node.op, *args)
         if node.op == "select":
             return self._choice(node, *args)
         result, jumps = interval_of(b, node.op, *args)
@@ -151,26 +110,24 @@ class EnclosureWriter:
 
     def _choice(self, node: Expr, condition: Ends, x: Ends, y: Ends) -> Ends:
         if node.kind == "b":
-            return select_truth(self.b, condition, x, y)
+            return arithmetic.select_truth(self.b, condition, x, y)
         if is_an_extreme(node):
             question, first = node.args[0], node.args[1]
             smaller = (question.args[0] is first) == (question.op in ("lt", "le"))
-            return (minimum if smaller else maximum)(self.b, x, y)
-        self.jumps[node] = left_open(self.b, condition)
-        return choice_of(self.b, condition, x, y)
+            return (arithmetic.minimum if smaller else arithmetic.maximum)(self.b, x, y)
+        self.jumps[node] = arithmetic.left_open(self.b, condition)
+        return arithmetic.choice_of(self.b, condition, x, y)
 
     def ends(self, array: str, row: int) -> Ends:
         """Read an interval from two rows."""
-        low, high = (
-            self.b.load(self.b.address(array, (row + k) * self.lanes), self.lanes) for k in (0, 1)
-        )
+        low, high = (self.b.load(self.b.address(array, (row + k) * LANES), LANES) for k in (0, 1))
         return Ends(low=low, high=high)
 
     def keep(self, array: str, row: int, *values: Value | float) -> None:
         """Write values to consecutive rows."""
         for k, value in enumerate(values):
-            wide = self.b.wide(value, self.lanes)
-            self.b.store(wide, self.b.address(array, (row + k) * self.lanes))
+            wide = self.b.wide(value, LANES)
+            self.b.store(wide, self.b.address(array, (row + k) * LANES))
 
     def may_jump(self, expr: Expr) -> Value | None:
         """Return where an expression may jump; None if nowhere."""
@@ -187,30 +144,26 @@ def _function(b: Body, name: str, *arguments: str) -> str:
     return f"define void @{name}({given}) nounwind {{\nentry:\n{b.text()}}}\n"
 
 
-def _values(module: Module, results: Sequence[Expr], lanes: int) -> str:
+def _values(module: Module, results: Sequence[Expr]) -> str:
     b = Body(module)
-    w = EnclosureWriter(b, lanes)
+    w = EnclosureWriter(b)
     w.write(results)
     for k, expr in enumerate(results):
-        w.keep("v", 2 * k, *finite(w.names[expr]).values)
+        w.keep("v", 2 * k, *arithmetic.finite(w.names[expr]).values)
     b.write("ret void")
     return _function(b, "values", "x", "v")
 
 
 def _judge(
-    module: Module,
-    results: Sequence[Expr],
-    gradients: Sequence[Sequence[Expr]],
-    sides: int,
-    lanes: int,
+    module: Module, results: Sequence[Expr], gradients: Sequence[Sequence[Expr]], sides: int
 ) -> str:
-    b, rows = Body(module), JudgedRows(sides=sides, results=len(results))
-    w = EnclosureWriter(b, lanes)
+    b, rows = Body(module), judged_rows(sides, len(results))
+    w = EnclosureWriter(b)
     w.write([*results, *(g for gradient in gradients for g in gradient)])
     box = [w.ends("x", 2 * i) for i in range(sides)]
     slopes = [[w.names[g] for g in gradient] for gradient in gradients]
     steps = [_centre(w, rows, i, box[i], slopes[0][i]) for i in range(sides)]
-    inner, written = (b.address("o", at * lanes) for at in (rows.inner, rows.values))
+    inner, written = (b.address("o", at * LANES) for at in (rows.inner, rows.values))
     b.write(f"call void @values(ptr {inner}, ptr {written})")
     bounds, at_centre = [], []
     for k, expr in enumerate(results):
@@ -238,10 +191,10 @@ def _centre(w: EnclosureWriter, rows: JudgedRows, i: int, side: Ends, slope: End
     point = b.select(b.compare("oge", slope.low, 0.0), high, point)
     point = b.select(b.compare("ole", slope.high, 0.0), low, point)
     point = smaller(b, high, larger(b, low, point))
-    w.keep("o", rows.centre + i, b.select(ends, point, NAN))
+    w.keep("o", rows.centre + i, b.select(ends, point, arithmetic.NAN))
     first, last = b.select(ends, point, low), b.select(ends, point, high)
     w.keep("o", rows.inner + 2 * i, first, last)
-    step = sub(b, side, Ends(low=point, high=point))
+    step = arithmetic.sub(b, side, Ends(low=point, high=point))
     return step, b.logic("and", ends, b.compare("olt", low, high))
 
 
@@ -250,12 +203,12 @@ def _bound(
 ) -> Value:
     """Return the upper bound of a result: by its value and by the mean-value form."""
     # The latter holds where nothing jumps; infinite where there is no value.
-    b, value, mean = w.b, finite(w.names[expr]), at_centre
+    b, value, mean = w.b, arithmetic.finite(w.names[expr]), at_centre
     for slope, (step, moves) in zip(slopes, steps, strict=True):
         if slope.point != 0:
-            change = routine(b, "mul", mul, slope, step)
+            change = arithmetic.routine(b, "mul", arithmetic.mul, slope, step)
             low, high = (b.select(moves, v, 0.0) for v in change.values)
-            mean = add(b, mean, Ends(low=low, high=high))
+            mean = arithmetic.add(b, mean, Ends(low=low, high=high))
     jumps = w.may_jump(expr)
     other = mean.high if jumps is None else b.select(jumps, _INF, mean.high)
     other = b.select(b.compare("ord", mean.low, other), other, _INF)
@@ -266,7 +219,7 @@ def _bound(
 def _weights(b: Body, box: Sequence[Ends], slopes: Sequence[Ends]) -> list[Value]:
     """Return how much a result changes along each side; not a number if one is not known."""
     widths = [b.sub(side.high, side.low, exact=True) for side in box]
-    steep = [absolute_of(b, slope).high for slope in slopes]
+    steep = [arithmetic.absolute_of(b, slope).high for slope in slopes]
     weights = [b.mul(s, width, exact=True) for s, width in zip(steep, widths, strict=True)]
     known = b.wide(0.0, box[0].low.width)
     for s in steep:
@@ -288,7 +241,7 @@ def _kept(
         smaller = b.compare("olt", bounds[k], bound)
         bound = b.select(smaller, bounds[k], bound)
         weight = [b.select(smaller, v, u) for v, u in zip(weights[k], weight, strict=True)]
-        value = minimum(b, Ends(low=met, high=above), at_centre[k])
+        value = arithmetic.minimum(b, Ends(low=met, high=above), at_centre[k])
         met, above = value.values
-    w.keep("o", JudgedRows.BOUND, bound, met, above)
+    w.keep("o", 0, bound, met, above)
     w.keep("o", rows.weight, *weight)

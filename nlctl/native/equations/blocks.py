@@ -12,7 +12,7 @@ import numpy as np
 
 from ...blocks import supplied_of
 from ...errors import CompileError
-from ...expressions.arrays import Tracer, as_array, concatenated, leaf_vector, scalar
+from ...expressions.arrays import Tracer, concatenated, leaf_vector
 from ...expressions.graph import Ambiguous, Expr, Graph, Untraceable
 from ...expressions.trace import trace
 from ...responses.watched import watches_nan
@@ -27,7 +27,7 @@ from ..diagram.schedule import Schedule, during
 from ..diagram.trace import time
 from ..opaque.called import Call
 from .located import Conditions, Located, found_conditions
-from .reader import Reader
+from .reader import Reader, vector_of
 from .relays import with_sliding
 
 
@@ -135,14 +135,8 @@ def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     row = sum(count_switching_functions(node) for node in reader.blocks)
     functions = []
     for function in (condition.function for condition in switches.located):
-        size = function.size or 1
-        array = (
-            Tracer(reader.graph, as_array(function), 0, size)
-            if function.size
-            else scalar(reader.graph, function).reshape(1)
-        )
-        functions.append((row, array))
-        row += size
+        functions.append((row, vector_of(reader.graph, function)))
+        row += function.size or 1
     return functions
 
 

@@ -72,11 +72,9 @@ class Conditions:
 
     @property
     def partners(self) -> list[int]:
-        """How many rows behind it, or with a sign before, the partner of each row is; 0 for none.
-
-        Where the function of even integers is 0, it rises with what is counted if the other one is
-        below 0; where that one is 0, if the first is above.
-        """
+        """How many rows behind it, or with a sign before, each row's partner is; 0 for none."""
+        # Where the function of even integers is 0, it rises with what is counted if the other one
+        # is below 0; where that one is 0, if the first is above.
         return [one.integers * one.rows for one in self.located for _ in range(one.rows)]
 
     @property
@@ -108,7 +106,8 @@ def found_conditions(
     rows = beyond = 0
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
-    p = _values(reader)
+    # values of parameters: 1 for those that are not known
+    p = np.ones(length(reader.layout)) if reader.p is None else reader.p
     for condition, node in _undeclared(reader, rates, guards, others, watched):
         if condition in timed and condition in inside:
             of_time[condition] = None
@@ -144,11 +143,6 @@ def _with_sides(graph: Graph, condition: Expr) -> list[tuple[Expr, int]]:
     functions = switching_functions(graph, condition)
     sides = (1, -1) if at_integers(condition) else (0,) * len(functions)
     return list(zip(functions, sides, strict=True))
-
-
-def _values(reader: Reader) -> np.ndarray:
-    """Return values of parameters: those that are known, and 1 for others."""
-    return np.ones(length(reader.layout)) if reader.p is None else reader.p
 
 
 def _pieces(arrays: Iterable[Tracer]) -> list[Expr]:
@@ -267,17 +261,14 @@ def _frequencies(
     if node not in known:
         known[node] = None
         if node.op in ("sin", "cos"):
-            (slope,) = tangents(graph, node.args, lambda leaf: _time_slope(graph, leaf))
+            one = graph.const(1.0)
+            (slope,) = tangents(graph, node.args, lambda e: one if e.data[0] == "t" else None)
             known[node] = None if slope is None or slope.varies else (slope,)
         elif node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed):
             parts = [_frequencies(graph, arg, timed, known) for arg in node.args]
             if not any(part is None for part in parts):
                 known[node] = tuple(slope for part in parts for slope in part or ())
     return known[node]
-
-
-def _time_slope(graph: Graph, leaf: Expr) -> Expr | None:
-    return graph.const(1.0) if leaf.data[0] == "t" else None
 
 
 _PRODUCTS = (

@@ -98,8 +98,7 @@ class Reader:
                 f"the algebraic loop through {names} cannot be solved: {why}; put a state into it"
             ) from error
         self.solvers[name] = search
-        pieces = [Tracer(self.graph, as_array(e), 0, e.size) if e.size else
-                  scalar(self.graph, e).reshape(1) for e in given]  # fmt: skip
+        pieces = [vector_of(self.graph, expr) for expr in given]
         results = _results(self.graph, "solve", name, pieces, search.count)
         self.solved.append(results)
         self._guessed(schedule, places, loop.torn, [results[k] for k in range(search.count)])
@@ -358,6 +357,12 @@ def _results(graph: Graph, op: str, name: str, given: Sequence[Tracer], count: i
         return traced(graph, 0.0).reshape(1)[:0]
     node = graph.node(op, *args, data=(name, sizes), size=count, varies=True)
     if count > SMALL:
-        return Tracer(graph, as_array(node), 0, count)
-    items = [scalar(graph, graph.item(node, k)).reshape(1) for k in range(count)]
-    return concatenated(graph, items)
+        return vector_of(graph, node)
+    return concatenated(graph, [vector_of(graph, graph.item(node, k)) for k in range(count)])
+
+
+def vector_of(graph: Graph, expr: Expr) -> Tracer:
+    """Return a vector, or a number as one of a single entry."""
+    if expr.size:
+        return Tracer(graph, as_array(expr), 0, expr.size)
+    return scalar(graph, expr).reshape(1)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 
 from ...blocks import supplied_of
-from ...expressions.arrays import Tracer, concatenated, scalar
+from ...expressions.arrays import Tracer, concatenated
 from ...expressions.graph import Expr, Graph
 from ...sliding.relay import SLIDING
 from ..diagram.nodes import Node
@@ -15,7 +15,7 @@ from ..diagram.schedule import Schedule
 from ..diagram.trace import traced_parameters
 from ..sliding.rates import OUTPUTS, Motion, SlidingInput, sliding_rates
 from ..sliding.second import Limits
-from .reader import Reader
+from .reader import Reader, vector_of
 
 
 def relay_places(blocks: Sequence[Node]) -> list[int]:
@@ -69,7 +69,7 @@ def with_sliding(reader: Reader, schedule: Schedule) -> Reader:
 
 
 def _array(graph: Graph, parts: Sequence[Expr]) -> Tracer:
-    return concatenated(graph, [scalar(graph, part).reshape(1) for part in parts])
+    return concatenated(graph, [vector_of(graph, part) for part in parts])
 
 
 def _limits(reader: Reader, i: int) -> Limits:

@@ -87,11 +87,9 @@ def _judge(task, lanes, w, found):
 
 @numba.njit(**INNER)
 def _accept(task, lanes, w, found, done, passed):
-    """Accept the steps that were found to be right, and propose the next.
-
-    ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
-    memory in motion.  Return whether any lane has passed.
-    """
+    """Accept the steps that were found to be right, and propose the next."""
+    # ``done`` becomes whether one was accepted, ``passed`` whether it ended with an event or set a
+    # memory in motion. Return whether any lane has passed.
     any_passed, memories = False, task.rows.memory.size
     for j in range(lanes.size):
         lane, event = lanes[j], found[j] == EVENT
@@ -240,12 +238,10 @@ def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
 
 
 def advance(rhs, point, along, task, w, rounds):
-    """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times.
-
-    A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
-    before the stiff method knows where to get its Jacobian from, or METHOD where another one pays
-    or is needed.
-    """
+    """Try at most `rounds` steps in every lane; fill ``w.samples[m, :, lane]`` for passed times."""
+    # A run's ``lane.status`` is RUNNING until it has ended, or DERIVATIVES where it cannot go on
+    # before the stiff method knows where to get its Jacobian from, or METHOD where another one pays
+    # or is needed.
     lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
@@ -295,11 +291,9 @@ def _see(task, lanes, w):
 
 @numba.njit(**INNER)
 def _note_jumps(task, lanes, w, done):
-    """Note the functions that the run watches whose signs have jumped at the ends of steps.
-
-    With a condition of t alone, a sample, or a state behind a guard's fall.  One that has jumped to
-    0 is noted where it leaves that for the other side, by another jump or without.
-    """
+    """Note the functions that the run watches whose signs have jumped at the ends of steps."""
+    # With a condition of t alone, a sample, or a state behind a guard's fall. One that has jumped
+    # to 0 is noted where it leaves that for the other side, by another jump or without.
     events = w.events
     for i in range(task.rows.watched, task.rows.watched + task.rows.ways.size):
         ends = task.rows.ending[i - task.rows.watched]
@@ -338,10 +332,8 @@ def _counts(task, lane, i, end):
 
 @numba.njit(**INNER)
 def _note_events(task, lanes, w, found, done):
-    """Note the switching functions that have changed their signs in accepted steps.
-
-    Guards are noted where they fall.  Where none has changed its sign it was a memory.
-    """
+    """Note the switching functions that have changed their signs in accepted steps."""
+    # Guards are noted where they fall. Where none has changed its sign it was a memory.
     events, rows = w.events, task.rows
     for j in range(lanes.size):
         if done[j]:
@@ -367,21 +359,17 @@ def _note_events(task, lanes, w, found, done):
 
 @numba.njit(**INNER)
 def _rises(task, w, i, now, j):
-    """Whether what switches rises where its function changes its sign to that of `now`.
-
-    Functions of integers rise and fall in turns: the partner's sign says what that means.
-    """
+    """Whether what switches rises where its function changes its sign to that of `now`."""
+    # Functions of integers rise and fall in turns: the partner's sign says what that means.
     partner = task.rows.partners[i]
     return (now > 0.0) != (partner != 0 and partner * w.events.g[i + partner, j] > 0.0)
 
 
 @numba.njit(**INNER)
 def _note_left(task, lane, w, located, j):
-    """Note the conditions that a step has led away from 0: to the side that they do not come from.
-
-    What has been 0 since the run began comes from neither; no run ends by that.  What blocks
-    declare is 0 as long as a memory is carried along: where it turns is no event.
-    """
+    """Note conditions that a step has led away from 0: to the side that they do not come from."""
+    # What has been 0 since the run began comes from neither; no run ends by that. What blocks
+    # declare is 0 as long as a memory is carried along: where it turns is no event.
     events, rows = w.events, task.rows
     for i in range(rows.bending if rows.memory.size else 0, rows.guarded):
         before, now, came = events.g_start[i, j], events.g[i, j], events.came[i, j]
@@ -399,10 +387,8 @@ def _note_left(task, lane, w, located, j):
 
 @numba.njit(**INNER)
 def _happens(task, lanes, w, passed, sampled):
-    """Let happen what is due at the times that lanes have come to; add them to ``passed``.
-
-    Return whether anything is.
-    """
+    """Let happen what is due at the times that lanes have come to; add them to ``passed``."""
+    # Return whether anything is.
     again = False
     if task.timed.jumps.shape[1] and pass_jumps(task, lanes, sampled):
         again = True

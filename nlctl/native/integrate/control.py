@@ -41,11 +41,9 @@ def choose_step(lane, stop, over, max_steps):
 
 @numba.njit(**INNER)
 def limit_step(task, lane, j):
-    """Shorten the step that is proposed where it might pass over a function of t alone.
-
-    A function that is called as it stands may move at any time: from rest, where error control
-    sees nothing of it, no step passes an output sample, or is longer than `opaque`.
-    """
+    """Shorten the step that is proposed where it might pass over a function of t alone."""
+    # A function that is called as it stands may move at any time: from rest, where error control
+    # sees nothing of it, no step passes an output sample, or is longer than `opaque`.
     if task.fixed > 0.0 or lane.tries > 0 or lane.status != RUNNING:
         return
     longest, cells = task.timed.longest[j], task.timed.reach.shape[1]
@@ -61,16 +59,12 @@ def limit_step(task, lane, j):
 
 @numba.njit(**INNER)
 def memory_error(task, x, m, m_other, j):
-    """Return the largest difference of what a lane's memories would become, over its tolerance.
-
-    A memory that is carried along is a state like any other, and follows from the others by an
-    equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
-    at which the memory is seen to reverse.  So `m` is of a step's solution and `m_other` of one
-    that differs from it by the error.
-
-    What only one of them moves does not count: where a relay switches, or a memory begins to move,
-    is an event, and is located as one.
-    """
+    """Return the largest difference of what a lane's memories would become, over its tolerance."""
+    # A memory that is carried along is a state like any other, and follows from the others by an
+    # equation that may amplify their errors: in Example 2 that of r by 6000, and with it the time
+    # at which the memory is seen to reverse. So `m` is of a step's solution and `m_other` of one
+    # that differs from it by the error. What only one of them moves does not count: where a relay
+    # switches, or a memory begins to move, is an event, and is located as one.
     largest, spoilt = 0.0, 0.0
     for i in range(m.shape[0]):
         before = x[task.rows.memory[i], j]
@@ -88,11 +82,8 @@ def rejected(lane, error, task):
     finite = np.isfinite(error)
     if error <= 1.0 or (task.fixed > 0.0 and finite):
         return False
-    lane.rejected += 1
-    lane.tries = lane.seeks = lane.traces = 0
-    lane.cross = 0.0
     order = rodas5p.ORDER if lane.stiff else task.pair.order
-    lane.h = lane.step * (max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
+    shorten(lane, max(0.2, 0.9 * error ** (-1.0 / order)) if finite else 0.1)
     if task.fixed > 0.0 or not (finite or lane.h > SMALLEST * abs(lane.t)):
         lane.status = DIVERGED
     return True
@@ -113,11 +104,7 @@ def next_step(lane, error, rate, task):
     if task.taylor.highest and task.fixed == 0.0:
         lane.h = max(lane.h, lane.step)  # coefficients will say how long it is to be
         return
-    log_error, memories, slower = (
-        np.log(max(error, 1e-10)),
-        task.rows.memory.size,
-        5.0 / task.pair.order,
-    )
+    log_error, slower = np.log(max(error, 1e-10)), 5.0 / task.pair.order
     # at equilibrium the error is 0.17 of its tolerance; of the stiff method, whose steps cost
     # more and do not end at a limit of stability, 0.44
     now, before = (0.17, 0.04) if lane.stiff else (0.14 * slower, 0.08 * slower)
@@ -132,7 +119,7 @@ def next_step(lane, error, rate, task):
     elif not lane.stiff:
         limit = min(_reach(task), 0.8 * task.pair.stable)
         lane.slow = lane.slow + 1 if lane.h * rate > limit else 0
-        if memories and lane.slow:
+        if task.rows.memory.size and lane.slow:
             lane.h = limit / rate
 
 
@@ -145,11 +132,9 @@ def _reach(task):
 
 @numba.njit(**INNER)
 def choose_method(lane, task):
-    """Go over to the stiff method where stability limits the step, and back where it does not pay.
-
-    The stiff method is first tried; it stays while it gets further with a step tried than the
-    explicit one would by more than what its steps cost, `cost` explicit ones each.
-    """
+    """Go over to the stiff method where stability limits steps, and back where it does not pay."""
+    # The stiff method is first tried; it stays while it gets further with a step tried than the
+    # explicit one would by more than what its steps cost, `cost` explicit ones each.
     tried = lane.accepted + lane.rejected
     if not lane.stiff:
         if lane.slow >= lane.patience * (1 if task.alone else 100):

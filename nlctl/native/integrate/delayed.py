@@ -78,10 +78,8 @@ def piece_at(starts, column, low, high, t):
 
 @numba.njit(**INNER)
 def _within(start, length, t):
-    """Return where a time lies in a piece, from -1 to 1.
-
-    What looks ahead of a step, or of the run, sees the polynomial standing still.
-    """
+    """Return where a time lies in a piece, from -1 to 1."""
+    # What looks ahead of a step, or of the run, sees the polynomial standing still.
     z = 2.0 * (t - start) / length - 1.0
     return min(max(z, -1.0 - 1e-6), 1.0 + 1e-6)
 
@@ -109,10 +107,9 @@ def sent(task, i, j, t):
 
 @numba.njit(**INNER)
 def arrival(task, i, j, s):
-    """Return when leaves line `i` of a lane what it is given at time s; inf behind the run.
-
-    The delay grows by less than 1 s per second: Newton's method, with the bracket that this gives.
-    """
+    """Return when leaves line `i` of a lane what it is given at time s; inf behind the run."""
+    # The delay grows by less than 1 s per second: Newton's method, with the bracket that this
+    # gives.
     lines = task.lines
     if lines.varied[i] == 0:
         return s + lines.delays[i, j]
@@ -139,10 +136,8 @@ def arrival(task, i, j, s):
 
 @numba.njit(**INNER)
 def past_value(task, w, i, j, t):
-    """Return what leaves line `i` of a lane at time t.
-
-    Of the polynomials between two breaks only, so that rounding never reads the other side.
-    """
+    """Return what leaves line `i` of a lane at time t."""
+    # Of the polynomials between two breaks only, so that rounding never reads the other side.
     past = w.past
     s = sent(task, i, j, t)
     last = past.next[i, j] - 1 if past.next[i, j] >= 0 else past.kept[j] - 1

@@ -53,11 +53,9 @@ def next_break(task, w, lane, j, stop):
 
 @numba.njit(**INNER)
 def _read(task, w, lane, i, j):
-    """Return when a step that begins now has read enough of the past of a line.
-
-    Pieces are short where a signal moves: a longer step would go over a pulse that was kept.  A
-    step that was given is taken as it is.
-    """
+    """Return when a step that begins now has read enough of the past of a line."""
+    # Pieces are short where a signal moves: a longer step would go over a pulse that was kept. A
+    # step that was given is taken as it is.
     past = w.past
     now = piece_at(past.t, j, past.first[i, j], past.kept[j] - 1, sent(task, i, j, lane.t))
     ahead = now + PAST_PIECES
@@ -125,11 +123,9 @@ def _fit(task, w, j):
 
 @numba.njit(**INNER)
 def unresolved(task, lane, w, j, event):
-    """Whether polynomials miss too much of a step in which nothing else is wrong.
-
-    A jump that no switching function tells of is driven into a very short step, and accepted.
-    Right behind an event the signal at the end says nothing of the step.
-    """
+    """Whether polynomials miss too much of a step in which nothing else is wrong."""
+    # A jump that no switching function tells of is driven into a very short step, and accepted.
+    # Right behind an event the signal at the end says nothing of the step.
     past = w.past
     if not event and not past.missed_at_end[j] <= past.missed[j]:
         past.missed[j] = past.missed_at_end[j]
@@ -147,11 +143,9 @@ def unresolved(task, lane, w, j, event):
 
 @numba.njit(**INNER)
 def keep(task, lanes, w, done, passed):
-    """Keep the signals of the accepted steps, and let arrive what arrives at their ends.
-
-    ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
-    events if there are memories.  Return whether a jump arrives in any lane.
-    """
+    """Keep the signals of the accepted steps, and let arrive what arrives at their ends."""
+    # ``passed`` becomes where derivatives are to be evaluated anew: at a jump that arrives, and at
+    # events if there are memories. Return whether a jump arrives in any lane.
     jumped = False
     for j in range(lanes.size):
         if not done[j]:
@@ -161,10 +155,7 @@ def keep(task, lanes, w, done, passed):
         broke = 0 if passed[j] or w.past.missed[j] < 0.0 else SMOOTH
         if lanes[j].t == task.times[lanes[j].segment] and _has_kink(task, lanes[j].segment):
             broke = min(broke, 1)
-        if (
-            lanes[j].tick < task.clocks.ticks.shape[1]
-            and task.clocks.ticks[j, lanes[j].tick] <= lanes[j].t
-        ):
+        if is_due(task, lanes[j], j):
             broke = 0
         for i in range(task.lines.delays.shape[0]):
             w.past.fresh[i, j] = broke
@@ -174,6 +165,13 @@ def keep(task, lanes, w, done, passed):
         passed[j] = jumps or (passed[j] and task.rows.memory.size > 0)
         _show(task, lanes[j], w, j, True)
     return jumped
+
+
+@numba.njit(**INNER)
+def is_due(task, lane, j):
+    """Whether something happens to sampled blocks at the time that a lane has come to."""
+    ticks = task.clocks.ticks
+    return lane.tick < ticks.shape[1] and ticks[j, lane.tick] <= lane.t
 
 
 @numba.njit(**INNER)
@@ -197,10 +195,8 @@ def _has_kink(task, m):
         return False
     before, after = task.times[m] - task.times[m - 1], task.times[m + 1] - task.times[m]
     for i in range(task.inputs.shape[0]):
-        rise, next_rise = (
-            task.inputs[i, m] - task.inputs[i, m - 1],
-            (task.inputs[i, m + 1] - task.inputs[i, m]),
-        )
+        rise = task.inputs[i, m] - task.inputs[i, m - 1]
+        next_rise = task.inputs[i, m + 1] - task.inputs[i, m]
         if rise * after != next_rise * before:
             return True
     return False

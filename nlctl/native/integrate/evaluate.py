@@ -49,11 +49,9 @@ def on_this_side(lanes, w):
 
 @numba.njit(**INNER)
 def inputs_at(task, lanes, w):
-    """Fill w.u with the inputs at the times w.t: linear within a segment of the time grid.
-
-    What leaves transport delays then follows behind them, and the inputs' rates where ideal relays
-    ask for them.
-    """
+    """Fill w.u with the inputs at the times w.t: linear within a segment of the time grid."""
+    # What leaves transport delays then follows behind them, and the inputs' rates where ideal
+    # relays ask for them.
     t, times, inputs, u = w.t, task.times, task.inputs, w.u
     for j in range(lanes.size):
         m = min(lanes[j].segment, times.size - 2)  # a lane that has finished is not moved on
@@ -91,10 +89,8 @@ def evaluate(rhs, task, lanes, w, x, dx, g, m):
 
 
 def outputs(rhs, out, task, w):
-    """Fill ``w.y[m, :, lane]`` with the outputs at ``w.samples[m, :, lane]``.
-
-    Samples inside a step have the memory of its beginning; here they get their own.
-    """
+    """Fill ``w.y[m, :, lane]`` with the outputs at ``w.samples[m, :, lane]``."""
+    # Samples inside a step have the memory of its beginning; here they get their own.
     states, y = w.samples, w.y
     for m in range(task.times.size):
         for j in range(w.t.size):

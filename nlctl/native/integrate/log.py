@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numba
 
-from .memory import Places1, Places2, Reals1, arrays_of
+from .memory import Places1, Places2, Reals1
 from .state import INNER
 
 OF_TIME = -1  # instead of a row: a condition of t alone
@@ -19,11 +19,6 @@ class Log(NamedTuple):
     t: Reals1  # when (s)
     row: Places1  # twice the row of g, and 1 if it rises
     table: Places2
-
-
-def new_log(room: int) -> Log:
-    """Return a log with room for so many entries."""
-    return arrays_of(Log, t=(room,), row=(room,))
 
 
 def log_room(task: Any, rows: int, expected: int = 0) -> int:

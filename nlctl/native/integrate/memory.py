@@ -11,6 +11,7 @@ import ctypes
 import functools
 import math
 import struct
+from collections.abc import Iterator
 from typing import Annotated, Any, cast, get_origin, get_type_hints
 
 import numba
@@ -70,7 +71,7 @@ class Pointed(types.Type):
 def type_of(record: Any) -> Pointed:
     """Return the type of a class of records in machine code, as its fields are annotated."""
     hints = get_type_hints(record, include_extras=True)
-    return Pointed({name: _kind(hints[name]) for name in _named(record)})
+    return Pointed({name: _kind(hints[name]) for name in record._fields[:-1]})
 
 
 def _kind(hint: Any) -> Any:
@@ -82,11 +83,9 @@ def _kind(hint: Any) -> Any:
 
 
 def with_table(record: Any, **values: Any) -> Any:
-    """Return a named tuple of these values; its table holds as long as it does.
-
-    Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
-    that this function has made.
-    """
+    """Return a named tuple of these values; its table holds as long as it does."""
+    # Its last field is ``table``, the others are C-contiguous arrays, floats, integers, and records
+    # that this function has made.
     numbers: list[int] = []
     for name, (dtype, ndim) in type_of(record).formats.items():
         numbers.extend(_entry(record, name, values[name], dtype, ndim))
@@ -168,16 +167,29 @@ def arrays_of(record: Any, **shapes: tuple[int, ...]) -> Any:
     return with_table(record, **made)
 
 
+def arrays_alike(record: Any, shape: tuple[int, ...], **others: tuple[int, ...]) -> Any:
+    """Return a record of zeros of one shape, but for some of its fields."""
+    return arrays_of(record, **dict.fromkeys(record._fields[:-1], shape) | others)
+
+
+def named_arrays(
+    record: Any, path: tuple[str, ...] = ()
+) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Yield the arrays of a record, and of those inside, with their names."""
+    for name in record._fields[:-1]:
+        value = getattr(record, name)
+        if hasattr(value, "_fields"):
+            yield from named_arrays(value, (*path, name))
+        elif isinstance(value, np.ndarray):
+            yield (*path, name), value
+
+
 def zeros(shape: tuple[int, ...]) -> np.ndarray:
     """Return zeros that begin with a line of the cache, so that no SIMD register reads two."""
     size = math.prod(shape)
     whole = np.zeros(size + _LINE)
     first = -whole.ctypes.data // whole.itemsize % _LINE
     return whole[first : first + size].reshape(shape)
-
-
-def _named(record: Any) -> tuple[str, ...]:
-    return record._fields[:-1]
 
 
 @register_model(Pointed)

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ...accumulation import PACE, jumps_end
+from ...accumulation import jumps_end
 from ..machine.address import call_out
 from .evaluate import evaluate, inputs_at
 from .log import note
-from .memory import Places1, Places2, Reals2, Reals3, arrays_of
+from .memory import Places1, Places2, Reals2, Reals3
 from .restart import restart
 from .state import DIVERGED, INNER, RUNNING, ZENO
 
@@ -41,15 +41,8 @@ class Guards(NamedTuple):
 
     above: Places2  # whether it was not negative when last seen
     rising: Reals2  # the value of one that was negative behind its jump and is to rise, or NaN
-    pace: Reals3  # how its jumps follow each other, see `jumps_end`
+    pace: Reals3  # (guards, lanes, PACE): how its jumps follow each other, see `jumps_end`
     table: Places2
-
-
-def new_guards(guards: int, lanes: int) -> Guards:
-    """Return the arrays for so many guards."""
-    return arrays_of(
-        Guards, above=(guards, lanes), rising=(guards, lanes), pace=(guards, lanes, PACE)
-    )
 
 
 @numba.njit(**INNER)
@@ -143,10 +136,8 @@ def _jump(task, lanes, w, fallen, chosen):
 
 @numba.njit(**INNER)
 def _counted(task, lane):
-    """Count jumps without progress of time, or in the first step after another.
-
-    Too many have no end.  That they do not end is so from the first of them on.
-    """
+    """Count jumps without progress of time, or in the first step after another."""
+    # Too many have no end. That they do not end is so from the first of them on.
     gone = lane.t - lane.fell_at
     still = max(_STILL * abs(lane.t), _HOVERS * (task.times[-1] - task.times[0]))
     lane.crowd = lane.crowd + 1 if gone <= max(still, 1.5 * lane.last) else 0

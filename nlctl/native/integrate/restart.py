@@ -15,11 +15,10 @@ AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
 
 @numba.njit(**INNER)
 def memory_rates(rhs, task, lanes, w, x, dx):
-    """Fill w.memories with the rates at which memories would be carried along.
-
-    A difference over a small part of the step: its error moves the turning point by so little
-    that the turning value does not change.  Where functions of t alone jump, it is taken backwards.
-    """
+    """Fill w.memories with the rates at which memories would be carried along."""
+    # A difference over a small part of the step: its error moves the turning point by so little
+    # that the turning value does not change. Where functions of t alone jump, it is taken
+    # backwards.
     ahead, memories = w.ahead, w.memories
     for j in range(lanes.size):
         w.t[j] = ahead.begin[j] + AHEAD * max(lanes[j].h, 1e-12)
@@ -45,10 +44,8 @@ def memory_rates(rhs, task, lanes, w, x, dx):
 
 @numba.njit(**INNER)
 def restart(rhs, task, lanes, w, chosen):
-    """Make the chosen lanes' derivatives, event functions and memories those of their state.
-
-    What is carried along is first what it was at the end of the step, before anything jumps.
-    """
+    """Make the chosen lanes' derivatives, event functions and memories those of their state."""
+    # What is carried along is first what it was at the end of the step, before anything jumps.
     memories = w.memories
     for i in range(memories.m.shape[0]):
         for j in range(lanes.size):
@@ -117,15 +114,12 @@ def _adopt(w, chosen):
 
 @numba.njit(**INNER)
 def _lock(rhs, task, lanes, w, chosen):
-    """Move memories that are being carried along far behind what carries them.
-
-    The stages of a step are approximations: with the memory right behind, one that falls back a
-    little would see it standing still, and the step would not be smooth.  Only where the memory
-    reverses does its value count again, and there it is committed.
-
-    A memory that counts wherever it stands, a relay's, is not carried but about to jump.  It
-    keeps its value up to the break point where it jumps; at that break point already, it jumps.
-    """
+    """Move memories that are being carried along far behind what carries them."""
+    # The stages of a step are approximations: with the memory right behind, one that falls back a
+    # little would see it standing still, and the step would not be smooth. Only where the memory
+    # reverses does its value count again, and there it is committed. A memory that counts wherever
+    # it stands, a relay's, is not carried but about to jump. It keeps its value up to the break
+    # point where it jumps; at that break point already, it jumps.
     memories, memory = w.memories, task.rows.memory
     if not _any_moves(w, chosen):
         return
@@ -174,10 +168,8 @@ def _at_break_point(g, j):
 
 @numba.njit(**INNER)
 def _carried(rhs, task, lanes, w, chosen, which, carried):
-    """Move memories far behind; fill `carried`: whether nothing else in a lane has changed by that.
-
-    Return whether it holds for all lanes.  Where the memories stood is left in w.ahead.x.
-    """
+    """Move memories far behind; fill `carried`: whether nothing else of a lane changes by that."""
+    # Return whether it holds for all lanes. Where the memories stood is left in w.ahead.x.
     for i in range(w.x.shape[0]):
         for j in range(lanes.size):
             w.ahead.x[i, j] = w.x[i, j]

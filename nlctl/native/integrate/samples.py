@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from ..machine.address import call_out
-from .delays import next_break
+from .delays import is_due, next_break
 from .evaluate import inputs_at
 from .memory import Places1, Places2, Reals1, Reals2
 from .state import INNER, RUNNING
@@ -37,11 +37,9 @@ class Timed(NamedTuple):
 
 @numba.njit(**INNER)
 def next_stop(task, lane, w, j):
-    """Return where a step must end.
-
-    That is when something happens to sampled blocks, with inputs at their next break point, where a
-    break leaves a transport delay, and at the last time.
-    """
+    """Return where a step must end."""
+    # That is when something happens to sampled blocks, with inputs at their next break point, where
+    # a break leaves a transport delay, and at the last time.
     times = task.times
     stop = times[-1]
     if task.inputs.shape[0] and lane.segment < times.size - 1:
@@ -55,13 +53,11 @@ def next_stop(task, lane, w, j):
 
 @numba.njit(**INNER)
 def take_samples(task, lanes, w, sampled):
-    """Let happen what is due in each lane; fill ``sampled``: whether that is anything.
-
-    Return whether it is in any lane.
-    """
+    """Let happen what is due in each lane; fill ``sampled``: whether that is anything."""
+    # Return whether it is in any lane.
     found = False
     for j in range(lanes.size):
-        sampled[j] = _is_due(task, lanes[j], j)
+        sampled[j] = lanes[j].status == RUNNING and is_due(task, lanes[j], j)
         found |= sampled[j]
     for j in range(lanes.size):
         if sampled[j] and lanes[j].segment == task.times.size - 1:
@@ -89,10 +85,8 @@ def take_samples(task, lanes, w, sampled):
 
 @numba.njit(**INNER)
 def pass_jumps(task, lanes, jumped):
-    """Go on to the other side of the break points that lanes have come to; fill ``jumped``.
-
-    Return whether any lane has come to one.
-    """
+    """Go on to the other side of the break points that lanes have come to; fill ``jumped``."""
+    # Return whether any lane has come to one.
     found, count = False, task.timed.jumps.shape[1]
     rounding = 1e-14 * max(abs(task.times[0]), abs(task.times[task.times.size - 1]))
     for j in range(lanes.size):
@@ -116,30 +110,17 @@ def before(t):
 
 @numba.njit(**INNER)
 def begin_afresh(task, lanes, w, sampled):
-    """Forget what was known of steps where a sample is taken: a run that resumes there knows none.
-
-    The first step tried is the time to what comes next.
-    """
+    """Forget what was known of steps where a sample is taken: a run that resumes there has none."""
+    # The first step tried is the time to what comes next.
     for j in range(lanes.size):
         lane = lanes[j]
         if not sampled[j]:
             continue
         gap = next_stop(task, lane, w, j) - lane.t
         lane.h = task.fixed if task.fixed > 0.0 else max(gap, 1e-12 * abs(lane.t))
-        lane.log_error_before = lane.last = lane.low = lane.high = 0.0
-        lane.cross = 0.0
-        lane.tries = lane.seeks = lane.same_side = lane.short = lane.quiet = lane.slow = 0
-        lane.traces = 0
-
-
-@numba.njit(**INNER)
-def _is_due(task, lane, j):
-    running = lane.status == RUNNING
-    return (
-        running
-        and lane.tick < task.clocks.ticks.shape[1]
-        and task.clocks.ticks[j, lane.tick] <= lane.t
-    )
+        lane.log_error_before = lane.last = lane.low = lane.high = lane.cross = 0.0
+        lane.tries = lane.seeks = lane.traces = lane.same_side = 0
+        lane.short = lane.quiet = lane.slow = 0
 
 
 @numba.njit(**INNER)

@@ -120,9 +120,7 @@ def opposite(a, b):
 
 @numba.njit(**INNER)
 def is_stiff(lane):
-    """Whether the step being tried is one of the stiff method.
-
-    One that leads across a condition is explicit: it is as short as can be, and begins with the
-    right-hand side of the near side, while stages that look behind would hold it back.
-    """
+    """Whether the step being tried is one of the stiff method."""
+    # One that leads across a condition is explicit: it is as short as can be, and begins with the
+    # right-hand side of the near side, while stages that look behind would hold it back.
     return lane.stiff != 0 and lane.across == 0

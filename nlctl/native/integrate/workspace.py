@@ -10,23 +10,16 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from ...accumulation import PACE
 from .delayed import DelayLines, KeptSignals, new_past
 from .evaluate import Scratch, new_ahead
-from .events.functions import (
-    EventRows,
-    Events,
-    Inside,
-    Memories,
-    new_events,
-    new_inside,
-    new_memories,
-)
-from .log import Log, new_log
-from .memory import Places2, Reals1, Reals2, Reals3, type_of, with_fields, with_table
+from .events.functions import EventRows, Events, Inside, Memories
+from .log import Log
+from .memory import Places2, Reals1, Reals2, Reals3, arrays_alike, type_of, with_fields, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
 from .methods.tableau import ExplicitPair
 from .methods.taylor import TaylorArrays, TaylorMethod, new_terms
-from .resets import Guards, Resets, new_guards
+from .resets import Guards, Resets
 from .samples import Ticks, Timed
 from .state import LANE, new_lanes
 
@@ -106,11 +99,9 @@ def new_work(
     terms: tuple[int, int] = (1, 0),
     log: int = 0,
 ) -> Work:
-    """Return the arrays for integrating members from `x0` (states, lanes) on.
-
-    The inputs include the lines, and so do the outputs what arrives there.  `terms` are the
-    numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
-    """
+    """Return the arrays for integrating members from `x0` (states, lanes) on."""
+    # The inputs include the lines, and so do the outputs what arrives there. `terms` are the
+    # numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
     n, lanes = x0.shape
     states = {name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage")}
     states["x"][:] = x0
@@ -130,13 +121,15 @@ def new_work(
         s=np.zeros((sampled, lanes)),
         resume=np.zeros((n, lanes)),
         ahead=new_ahead(n, events, memories, lanes),
-        events=new_events(events, lanes),
-        memories=new_memories(memories, lanes),
-        inside=new_inside(lanes),
+        events=arrays_alike(Events, (events, lanes), g_inside=(4, events, lanes)),
+        memories=arrays_alike(Memories, (memories, lanes), m_inside=(4, memories, lanes)),
+        inside=arrays_alike(
+            Inside, (lanes,), values=(5,), newton=(5,), bracket=(3, lanes), height=(3, lanes)
+        ),
         stiff=new_stiff(n if lanes == 1 else 0, inputs),  # that method is for single runs
         taylor=new_terms(*terms, inputs, lanes),
-        guards=new_guards(guards, lanes),
-        log=new_log(log),
+        guards=arrays_alike(Guards, (guards, lanes), pace=(guards, lanes, PACE)),
+        log=arrays_alike(Log, (log,)),
         past=new_past(times.size, outputs, lines, lanes),
     )
 

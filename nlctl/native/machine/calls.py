@@ -62,11 +62,10 @@ class Native:
 
 def plain_calls(calls: Mapping[str, Call]) -> dict[str, Callable[[np.ndarray, int, int], None]]:
     """Return calls as plain Python, called with c, a row and a member."""
-    return {name: _plain(call) for name, call in calls.items()}
-
-
-def _plain(call: Call) -> Callable[[np.ndarray, int, int], None]:
-    return lambda c, row, lane: call.of_column(c[row : row + call.rows, lane])
+    return {
+        name: lambda c, row, lane, call=call: call.of_column(c[row : row + call.rows, lane])
+        for name, call in calls.items()
+    }
 
 
 def native_calls(calls: Mapping[str, Call], lanes: int) -> Native:

@@ -301,15 +301,12 @@ def _of_object(thing: object, seen: _Seen) -> Iterator[str]:
         if not (seen.deep and name in LAID_OUT):
             yield name
             yield from _fingerprint(value, seen)
+    # objects of a library's class may hold what is in no attribute of Python's
     bases = [base for base in type(thing).__mro__[:-1] if not _is_users(base)]
-    if seen.deep and any(_has_content(base) for base in bases):
+    held_apart = (b.__flags__ & HEAP_TYPE == 0 or b.__module__.startswith("pandas.") for b in bases)
+    if seen.deep and any(held_apart):
         held = inherited(thing)  # a float with a name, a list with more
         yield from (held,) if isinstance(held, str) else _fingerprint(held, seen)
-
-
-def _has_content(base: type) -> bool:
-    """Whether objects of a library's class may hold what is in no attribute of Python's."""
-    return base.__flags__ & HEAP_TYPE == 0 or base.__module__.startswith("pandas.")
 
 
 def _slots(kind: type) -> Iterator[str]:

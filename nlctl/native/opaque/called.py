@@ -8,8 +8,8 @@ argument that the function takes apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import pairwise
 from types import FunctionType
 from typing import Any
@@ -123,11 +123,11 @@ class _AsItStands:
     slots: Mapping[str, Slot]
     record: type | None
     lengths: tuple[int, ...]
-    start: int = field(init=False)
 
-    def __post_init__(self) -> None:
-        first = min((s.offset for s in self.slots.values()), default=0)
-        object.__setattr__(self, "start", first)
+    @cached_property
+    def start(self) -> int:
+        """Where the parameters begin in the program's vector."""
+        return min((s.offset for s in self.slots.values()), default=0)
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
         """Return the results."""

@@ -26,6 +26,7 @@ from .values import (
     OUTSIDE,
     Bound,
     Cached,
+    Given,
     Impure,
     Instance,
     KnownValue,
@@ -65,7 +66,7 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReadin
         error.place = f"{source_file(plain)}, line {plain.__code__.co_firstlineno}"
         raise error
     walk = FunctionWalk()
-    walk.call(captured(function), list(arguments), {})
+    walk.call(captured(function), Given(tuple(arguments)))
     return FunctionReading(
         captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound))
     )
@@ -80,56 +81,45 @@ class FunctionWalk(Walk):
         self.walked: set[ast.AST] = set()  # functions inside others, while they are walked
         self.bodies = 0
 
-    def call(
-        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
+    def call(self, function: KnownValue, given: Given) -> KnownValue:
         thing = function.known
         if isinstance(thing, Unknown):
             raise Impure("calls what is only known when it runs", "call a function by its name")
         if isinstance(thing, OneOf):
-            return least_upper_bound([self.call(choice, given, named) for choice in thing.choices])
+            return least_upper_bound([self.call(choice, given) for choice in thing.choices])
         if isinstance(thing, ListOf):
             raise Impure("calls a list", "call what is in it")
         if isinstance(thing, Pure):
             if thing.gives_parts:
-                return element(given[0]) if given else FRESH
+                return element(given.places[0]) if given.places else FRESH
             return KnownValue(True, function.inside, known=thing)
         if isinstance(thing, Bound):
-            first = list(thing.given)
-            return self.call(thing.function, first + given, dict(thing.named) | named)
+            return self.call(thing.function, thing.given + given)
         if isinstance(thing, Cached):
-            return handed_out_again(self.call(thing.function, given, named))
+            return handed_out_again(self.call(thing.function, given))
         if isinstance(thing, Instance):
-            method = made.attribute(self, function, "__call__")
-            return self.call(method, given, named)
+            return self.call(made.attribute(self, function, "__call__"), given)
         if isinstance(thing, Local):
-            return self.body(thing.node, thing.frame.function, thing.frame, given, named)
+            return self.body(thing.node, thing.frame.function, thing.frame, given)
         if isinstance(thing, functools.partial):
             self.note(noted_partial(thing))
-            first = [captured(v) for v in thing.args]
-            more = {k: captured(v) for k, v in thing.keywords.items()}
-            return self.call(captured(thing.func), first + given, more | named)
-        return known_calls.call(self, thing, given, named)
+            named = {k: captured(v) for k, v in thing.keywords.items()}
+            first = Given(tuple(map(captured, thing.args)), named)
+            return self.call(captured(thing.func), first + given)
+        return known_calls.call(self, thing, given)
 
-    def function(
-        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
+    def function(self, thing: FunctionType, given: Given) -> KnownValue:
         self.note(noted_function(thing))
         try:
-            return self.body(definition(thing), thing, None, given, named)
+            return self.body(definition(thing), thing, None, given)
         except Unreadable as error:
             reason = f"calls {thing.__qualname__}, and {error}"
             raise Impure(reason, error.advice) from None
 
     def body(
-        self,
-        node: Definition,
-        function: FunctionType,
-        parent: Frame | None,
-        given: list[KnownValue],
-        named: dict[str, KnownValue],
+        self, node: Definition, function: FunctionType, parent: Frame | None, given: Given
     ) -> KnownValue:
-        frame = Frame(_bound(node.args, function, parent, given, named), function, parent)
+        frame = Frame(_bound(node.args, function, parent, given), function, parent)
         self.bodies += 1
         if self.bodies > _BUDGET:
             raise Impure("calls too many functions to be followed", "make it simpler")
@@ -148,11 +138,7 @@ class FunctionWalk(Walk):
 
 
 def _bound(
-    arguments: ast.arguments,
-    function: FunctionType,
-    parent: Frame | None,
-    given: list[KnownValue],
-    named: dict[str, KnownValue],
+    arguments: ast.arguments, function: FunctionType, parent: Frame | None, given: Given
 ) -> dict[str, KnownValue]:
     """Return the names of a call's arguments with their values."""
     places = [a.arg for a in arguments.posonlyargs + arguments.args]
@@ -163,10 +149,10 @@ def _bound(
         ends = places[len(places) - len(defaults) :]
         bound |= {k: captured(v) for k, v in zip(ends, defaults, strict=True)}
         bound |= {k: captured(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    bound |= dict(zip(places, given, strict=False))
-    bound |= {k: v for k, v in named.items() if k in names}
+    bound |= dict(zip(places, given.places, strict=False))
+    bound |= {k: v for k, v in given.names.items() if k in names}
     if arguments.vararg:
-        bound[arguments.vararg.arg] = holder(given[len(places) :])
+        bound[arguments.vararg.arg] = holder(given.places[len(places) :])
     if arguments.kwarg:
-        bound[arguments.kwarg.arg] = holder(v for k, v in named.items() if k not in names)
+        bound[arguments.kwarg.arg] = holder(v for k, v in given.names.items() if k not in names)
     return bound

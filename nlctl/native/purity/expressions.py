@@ -22,6 +22,7 @@ from .values import (
     PLAIN,
     SLICE,
     UNKNOWN_VALUE,
+    Given,
     Impure,
     Instance,
     KnownValue,
@@ -157,12 +158,12 @@ class Expressions(ast.NodeVisitor):
             setter = made.operator_of(self.walk, base, "__setitem__")
             if setter is None:
                 raise Impure(f"writes into an object of {base.known.cls.__name__}", CHANGES)
-            self.walk.function(setter, [base, OUTSIDE, value], {})
+            self.walk.function(setter, Given((base, OUTSIDE, value)))
             return
         setter = inspect.getattr_static(base.known.cls, target.attr, None)
         if isinstance(setter, property):
             if setter.fset is not None:
-                self.walk.call(captured(setter.fset), [base, value], {})
+                self.walk.call(captured(setter.fset), Given((base, value)))
             return
         base.known.learn(target.attr, value)
         self.kept(base, [value])
@@ -196,7 +197,7 @@ class Expressions(ast.NodeVisitor):
         value = self.visit(node.operand)
         operator = made.operator_of(self.walk, value, _SIGNS.get(type(node.op), ""))
         if operator is not None:
-            return self.walk.function(operator, [value], {})
+            return self.walk.function(operator, Given((value,)))
         self.operands([value])
         return FRESH
 
@@ -209,7 +210,7 @@ class Expressions(ast.NodeVisitor):
             if operator is None:
                 plain.append(one)
             else:
-                results.append(self.walk.function(operator, [one, other], {}))
+                results.append(self.walk.function(operator, Given((one, other))))
         if results:
             return least_upper_bound(results)
         self.operands(plain)
@@ -287,7 +288,7 @@ class Expressions(ast.NodeVisitor):
             return element(base) if lists else base
         getter = made.operator_of(self.walk, base, "__getitem__")
         if getter is not None:
-            return self.walk.function(getter, [base, *values[:1]], {})
+            return self.walk.function(getter, Given((base, *values[:1])))
         if isinstance(base.known, dict | list | tuple) and isinstance(keys[0], Unknown):
             parts = base.known.values() if isinstance(base.known, dict) else base.known
             return replace(element(base), known=function_choice(map(captured, parts)))
@@ -329,7 +330,7 @@ class Expressions(ast.NodeVisitor):
         if isinstance(entry, property | functools.cached_property) and library(type(thing)) is None:
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
-            result = self.walk.call(captured(getter), [base], {})
+            result = self.walk.call(captured(getter), Given((base,)))
             if getter is not getattr(entry, "fget", None):
                 return handed_out_again(result)
             return result if not result.own else FRESH
@@ -345,24 +346,24 @@ class Expressions(ast.NodeVisitor):
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
     def visit_Call(self, node: ast.Call) -> KnownValue:
-        given = [self.visit(part) for part in node.args]
-        named = {k.arg or "**": self.visit(k.value) for k in node.keywords}
-        if "out" in named and not named["out"].own:
+        places = tuple(self.visit(part) for part in node.args)
+        given = Given(places, {k.arg or "**": self.visit(k.value) for k in node.keywords})
+        if "out" in given.names and not given.names["out"].own:
             raise Impure("writes into an array with out=, which it did not make", CHANGES)
         if isinstance(node.func, ast.Attribute):
             base = self.visit(node.func.value)
-            bound = known_calls.method(self.walk, base, node.func.attr, given, named)
+            bound = known_calls.method(self.walk, base, node.func.attr, given)
             if bound is not None:
-                self.kept(base, [*given, *named.values()])
+                self.kept(base, given.every)
                 return bound
         function = self.visit(node.func)
-        if function.known is super and not given:
+        if function.known is super and not places:
             return self.parent_class()
-        if function.known is getattr and isinstance(given[1].known, str):
-            return self.attribute(given[0], given[1].known)
-        result = self.made_once(node, self.walk.call(function, given, named))
-        for value in (*given, *named.values()):  # a list may have been given something to keep
-            self.kept(value, [*given, *named.values()])
+        if function.known is getattr and isinstance(places[1].known, str):
+            return self.attribute(places[0], places[1].known)
+        result = self.made_once(node, self.walk.call(function, given))
+        for value in given.every:  # a list may have been given something to keep
+            self.kept(value, given.every)
         return result
 
     def made_once(self, node: ast.Call, result: KnownValue) -> KnownValue:

@@ -10,6 +10,7 @@ import inspect
 import logging
 import warnings
 from collections import Counter, OrderedDict, defaultdict, deque
+from collections.abc import Sequence
 from dataclasses import replace
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType, SimpleNamespace
 from typing import Any
@@ -24,6 +25,7 @@ from .values import (
     UNKNOWN_VALUE,
     Bound,
     Cached,
+    Given,
     Impure,
     Instance,
     KnownValue,
@@ -108,83 +110,75 @@ _PLAIN = {"abs", "all", "any", "bool", "callable", "chr", "complex", "divmod", "
           "repr", "round", "slice", "str", "sum", "bytes", "object", "bin", "hex"}  # fmt: skip
 
 
-def call(
-    walk: Walk, thing: object, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
+def call(walk: Walk, thing: object, given: Given) -> KnownValue:
     """Return what is known of the result of calling an object."""
     if isinstance(thing, functools._lru_cache_wrapper):
         wrapped = walk.captured(thing, "__wrapped__", thing.__wrapped__)
-        return handed_out_again(walk.call(wrapped, given, named))
+        return handed_out_again(walk.call(wrapped, given))
     if thing in (np.errstate,) or (isinstance(thing, type) and issubclass(thing, BaseException)):
         return FRESH
     owner = getattr(thing, "__self__", None)
     if _is_builtin(thing):
-        return _builtin(walk, thing, given, named)
+        return _builtin(walk, thing, given)
     if isinstance(thing, BuiltinFunctionType) and isinstance(owner, CONTAINERS):
-        bound = method(walk, captured(owner), thing.__name__, given, named)
+        bound = method(walk, captured(owner), thing.__name__, given)
         return OUTSIDE if bound is None else bound
-    special = _of_python(walk, thing, given, named)
+    special = _of_python(walk, thing, given)
     if special is not None:
         return special
     module = library(thing)
     if module is not None and module.partition(".")[0] != "control":
-        return _library(walk, thing, module, given, named)
+        return _library(walk, thing, module, given)
     if isinstance(thing, type):
-        return _made(walk, thing, given, named)
-    return _called(walk, thing, owner, given, named)
+        return _made(walk, thing, given)
+    return _called(walk, thing, owner, given)
 
 
-def _of_python(
-    walk: Walk, thing: object, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue | None:
+def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
     """Return what is known of the result of functions of Python's own that make others."""
+    places = given.places
     if thing is functools.partial:
-        rest = tuple(named.items())
-        return KnownValue(True, True, known=Bound(given[0], tuple(given[1:]), rest))
+        return KnownValue(True, True, known=Bound(places[0], Given(places[1:], given.names)))
     if thing is functools.wraps:
-        after = (("wrapped", given[0]),)
-        return KnownValue(True, True, known=Bound(captured(functools.update_wrapper), (), after))
+        after = Given((), {"wrapped": places[0]})
+        return KnownValue(True, True, known=Bound(captured(functools.update_wrapper), after))
     if thing is functools.update_wrapper:
-        return given[0]
+        return places[0]
     if thing is functools.lru_cache or thing is functools.cache:
-        is_function = bool(given) and not isinstance(given[0].known, int | None)
-        known = Cached(given[0]) if is_function else Bound(captured(functools.cache), ())
+        is_function = bool(places) and not isinstance(places[0].known, int | None)
+        known = Cached(places[0]) if is_function else Bound(captured(functools.cache), Given())
         return KnownValue(True, True, known=known)
-    if thing is functools.reduce and not isinstance(given[0].known, Unknown):
-        first = [element(given[1]), *given[2:]]
-        return least_upper_bound([*first, walk.call(given[0], [OUTSIDE, first[0]], {})])
-    if isinstance(thing, enum.EnumType) and len(given) == 1 and not issubclass(thing, enum.Flag):
+    if thing is functools.reduce and not isinstance(places[0].known, Unknown):
+        first = [element(places[1]), *places[2:]]
+        return least_upper_bound([*first, walk.call(places[0], Given((OUTSIDE, first[0])))])
+    if isinstance(thing, enum.EnumType) and len(places) == 1 and not issubclass(thing, enum.Flag):
         if inspect.getattr_static(thing, "_missing_") is not vars(enum.Enum)["_missing_"]:
             raise Impure(f"looks up a member of {thing.__name__}, which has '_missing_'", "name it")
         return element(captured(thing))
     if thing is np.frompyfunc:
-        _call_functions(walk, given[:1])
+        _call_functions(walk, places[:1])
         return KnownValue(True, True, known=Pure())
     if isinstance(thing, np.vectorize):
         _call_functions(walk, [walk.captured(thing, "pyfunc", thing.pyfunc)])
         return FRESH
-    if thing is dataclasses.replace and given:
-        return made.replaced_fields(walk, given[0], named)
+    if thing is dataclasses.replace and places:
+        return made.replaced_fields(walk, places[0], given.names)
     reading = (dataclasses.astuple, dataclasses.asdict, dataclasses.fields)
     return OUTSIDE if any(thing is reader for reader in reading) else None
 
 
-def _made(
-    walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
+def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
     """Return what is known of a new object of somebody's class."""
-    parts, holds = [*given, *named.values()], cls in HOLDERS
+    parts, holds = given.every, cls in HOLDERS
     if holds:
         _call_functions(walk, parts)
-        parts = [v for v in parts if not isinstance(v.known, type)]
+        parts = tuple(v for v in parts if not isinstance(v.known, type))
     if holds or (issubclass(cls, tuple) and hasattr(cls, "_fields")):
         return KnownValue(True, all(v.own and v.inside for v in parts), True)
-    return made.instance(walk, cls, given, named)
+    return made.instance(walk, cls, given)
 
 
-def _called(
-    walk: Walk, thing: Any, owner: Any, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
+def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     """Return what is known of the result of a function or method of Python code."""
     function = python_function(thing)
     if type(owner).__module__.startswith(VARYING):
@@ -210,21 +204,20 @@ def _called(
         text = f"{module}.{name}" if module else name
         raise Impure(f"calls {text}, whose code cannot be read", "write the formula out")
     if isinstance(thing, FunctionType) or thing.__class__.__name__ == "CPUDispatcher":
-        return walk.function(function, given, named)
+        return walk.function(function, given)
     if not isinstance(thing, MethodType):
         walk.captured(type(thing), "__call__", function)
-    return walk.function(function, [captured(owner if owner is not None else thing), *given], named)
+    first = captured(owner if owner is not None else thing)
+    return walk.function(function, Given((first,)) + given)
 
 
-def method(
-    walk: Walk, base: KnownValue, name: str, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue | None:
+def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue | None:
     """Return what is known of the result of a method of a container; None if it is another's."""
     thing = base.known
     if isinstance(thing, ListOf):
-        return _of_list(base, name, given)
+        return _of_list(base, name, given.places)
     if isinstance(thing, Pure) and name == "shuffle":
-        _written(given[0], "shuffle()")
+        _written(given.places[0], "shuffle()")
     if isinstance(thing, ModuleType | type | super | OneOf | Instance | Bound | Pure | Parent):
         return None
     if not isinstance(thing, Unknown | CONTAINERS):
@@ -236,10 +229,10 @@ def method(
         if isinstance(member, FunctionType) or not callable(member):
             return None
     if name == "at" and isinstance(thing, np.ufunc):
-        _written(given[0], "an array with .at()")
+        _written(given.places[0], "an array with .at()")
         return FRESH
     if name in READING:
-        return _read(base, name, given)
+        return _read(base, name, given.places)
     if name in VIEWS or name in ("T", "flat"):
         return forgotten(base)
     if name in CHANGING:
@@ -250,7 +243,7 @@ def method(
     raise Impure(f"calls a method '{name}()' that is not known", "use NumPy's functions")
 
 
-def _of_list(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
+def _of_list(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method of a list or dict of functions."""
     if name in ("values", "items", "copy"):
         return base
@@ -261,7 +254,7 @@ def _of_list(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue
     raise Impure(f"calls {name}() of a list of functions or objects", "make a new list")
 
 
-def _read(base: KnownValue, name: str, given: list[KnownValue]) -> KnownValue:
+def _read(base: KnownValue, name: str, given: Sequence[KnownValue]) -> KnownValue:
     """Return what is known of the result of a method that changes nothing."""
     if name == "get" and given:
         key = given[0].known
@@ -320,31 +313,29 @@ def _is_builtin(thing: object) -> bool:
     return getattr(builtins, name, None) is thing if isinstance(name, str) else False
 
 
-def _builtin(
-    walk: Walk, thing: Any, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
-    name = thing.__name__
-    for value in given if name not in ("isinstance", "issubclass", "callable", "type") else ():
+def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
+    name, places = thing.__name__, given.places
+    for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         _check_parts(value, name)
     if name == "slice":
         return SLICE
-    if name == "type" and len(given) == 1:
-        known = given[0].known
+    if name == "type" and len(places) == 1:
+        known = places[0].known
         return OUTSIDE if isinstance(known, Unknown) else captured(type(known))
     if name in ("min", "max"):
-        _call_functions(walk, named.values())
+        _call_functions(walk, given.names.values())
         return least_upper_bound(
-            [element(given[0])] if len(given) == 1 else [forgotten(v) for v in given]
+            [element(places[0])] if len(places) == 1 else [forgotten(v) for v in places]
         )
-    if thing is map and not isinstance(given[0].known, Unknown):
-        return holder([walk.call(given[0], list(map(element, given[1:])), {})])
+    if thing is map and not isinstance(places[0].known, Unknown):
+        return holder([walk.call(places[0], Given(tuple(map(element, places[1:]))))])
     if thing in MAKING:
-        _call_functions(walk, [*given, *named.values()])
-        inside = all(v.inside for v in given)
-        return KnownValue(True, inside, True, known=_rows(thing, given))
+        _call_functions(walk, given.every)
+        inside = all(v.inside for v in places)
+        return KnownValue(True, inside, True, known=_rows(thing, places))
     if name == "next":
-        _written(given[0], "next()")
-        return element(given[0])
+        _written(places[0], "next()")
+        return element(places[0])
     if name in _PLAIN:
         return FRESH
     advice = OUTPUT if name in ("print", "input", "open") else "do without it"
@@ -366,7 +357,7 @@ def _check_parts(value: KnownValue, name: str) -> None:
                 check_object(captured(part), f"calls {name}() of a list that holds")
 
 
-def _functions_in(given: list[KnownValue]) -> Any:
+def _functions_in(given: Sequence[KnownValue]) -> Any:
     """Return the choice between the functions in what is gone through, for what calls one."""
     parts = [element(v) for v in given]
     kinds = OneOf | Instance | Bound | Cached | Local | FunctionType
@@ -377,7 +368,7 @@ def _functions_in(given: list[KnownValue]) -> Any:
     return ListOf(tuple(functions)) if functions else UNKNOWN_VALUE
 
 
-def _rows(thing: object, given: list[KnownValue]) -> Any:
+def _rows(thing: object, given: Sequence[KnownValue]) -> Any:
     """Return the rows of `zip` or `enumerate` where there are functions or objects in them."""
     kept = _functions_in(given)
     if not isinstance(kept, ListOf) or thing not in (zip, enumerate):
@@ -388,11 +379,9 @@ def _rows(thing: object, given: list[KnownValue]) -> Any:
     return ListOf((KnownValue(True, every, True, known=RowOf(parts)),))
 
 
-def _library(
-    walk: Walk, thing: object, module: str, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
+def _library(walk: Walk, thing: object, module: str, given: Given) -> KnownValue:
     name = getattr(thing, "__name__", "")
-    if name in _SEEDED and given and type(given[0].known) is int:
+    if name in _SEEDED and given.places and type(given.places[0].known) is int:
         return KnownValue(True, True, known=Pure())  # its numbers are the same in every call
     if module.startswith(VARYING):
         raise Impure(f"calls {module}.{name}, which may differ from call to call", DRAW)
@@ -400,20 +389,20 @@ def _library(
         raise Impure(f"calls {name}, which reads or writes files", _OTHERS["load"])
     if name in _OTHERS:
         raise Impure(f"calls {module}.{name}, which is more than its result", _OTHERS[name])
-    _call_functions(walk, [*given, *named.values()])
-    for value in (*given, *named.values()):
+    _call_functions(walk, given.every)
+    for value in given.every:
         if not callable(value.known):
             check_object(value, f"hands {name}")
     if name in WRITERS or (module.endswith("operator") and name in IN_PLACE):
-        _written(given[0], f"{name}()")
+        _written(given.places[0], f"{name}()")
         return FRESH
     if module in ("operator", "_operator") and isinstance(thing, type):
         return KnownValue(True, True, known=Pure(gives_parts=True))
     if _makes_objects(thing, module):
-        kept = [*given, *named.values()]  # it may hold what it is given, instead of copies
-        return KnownValue(True, all(v.own and v.inside for v in kept), known=Pure())
-    if name in VIEWS or ("copy" in named and named["copy"].known is not True):
-        return forgotten(given[0]) if given else FRESH
+        # it may hold what it is given, instead of copies
+        return KnownValue(True, all(v.own and v.inside for v in given.every), known=Pure())
+    if name in VIEWS or given.names.get("copy", captured(True)).known is not True:
+        return forgotten(given.places[0]) if given.places else FRESH
     return FRESH
 
 
@@ -434,4 +423,4 @@ def _call_functions(walk: Walk, values: Any) -> None:
         if isinstance(thing, OneOf):  # some of them may be lists
             _call_functions(walk, thing.choices)
         elif isinstance(thing, Local | Bound | Cached | Instance) or callable(thing):
-            walk.call(value, [OUTSIDE] * 8, {})
+            walk.call(value, Given((OUTSIDE,) * 8))

@@ -9,12 +9,14 @@ import abc
 import dataclasses
 import enum
 import inspect
+from collections.abc import Mapping
 from types import FunctionType
 from typing import Any, Generic, Protocol
 
 from .values import (
     OUTSIDE,
     Bound,
+    Given,
     Impure,
     Instance,
     KnownValue,
@@ -30,23 +32,21 @@ _RULING = ("__setattr__", "__delattr__", "__getattribute__", "__getattr__", "__d
 _NEUTRAL = (object, Generic, Protocol, abc.ABC)
 
 
-def instance(
-    walk: Walk, cls: type, given: list[KnownValue], named: dict[str, KnownValue]
-) -> KnownValue:
+def instance(walk: Walk, cls: type, given: Given) -> KnownValue:
     """Return what is known of a new object of somebody's class."""
     _check_plain(cls)
     new = Instance(cls)
     value = KnownValue(True, True, True, known=new)
     start = inspect.getattr_static(cls, "__init__", None)
     if dataclasses.is_dataclass(cls) and _is_generated(start):
-        _of_fields(walk, new, given, dict(named))
+        _of_fields(walk, new, given)
         after = inspect.getattr_static(cls, "__post_init__", None)
         if isinstance(after, FunctionType):
-            walk.function(after, [value], {})
+            walk.function(after, Given((value,)))
     elif isinstance(start, FunctionType):
         walk.captured(cls, "__init__", start)
-        walk.function(start, [value, *given], named)
-    elif given or named:
+        walk.function(start, Given((value,)) + given)
+    elif given.every:
         raise Impure(f"makes an object of {cls.__name__}", "use numbers and arrays")
     return KnownValue(True, all(v.own and v.inside for v in new.attributes.values()), True, new)
 
@@ -68,11 +68,9 @@ def _is_generated(start: Any) -> bool:
     return isinstance(start, FunctionType) and start.__code__.co_filename == "<string>"
 
 
-def _of_fields(
-    walk: Walk, new: Instance, given: list[KnownValue], named: dict[str, KnownValue]
-) -> None:
+def _of_fields(walk: Walk, new: Instance, given: Given) -> None:
     """Note the attributes that a dataclass's generated ``__init__`` writes."""
-    waiting = list(given)
+    waiting, named = list(given.places), dict(given.names)
     for field in dataclasses.fields(new.cls):  # type: ignore[arg-type]
         if not field.init:
             value = OUTSIDE
@@ -83,7 +81,7 @@ def _of_fields(
         elif field.default is not dataclasses.MISSING:
             value = captured(field.default)
         elif field.default_factory is not dataclasses.MISSING:
-            value = walk.call(captured(field.default_factory), [], {})
+            value = walk.call(captured(field.default_factory), Given())
         else:  # among *args or **kwargs, or an error where it runs
             value = named.get("**", OUTSIDE)
         new.learn(field.name, value)
@@ -101,7 +99,7 @@ def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:
     return of_class(walk, base, member)
 
 
-def replaced_fields(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) -> KnownValue:
+def replaced_fields(walk: Walk, base: KnownValue, named: Mapping[str, KnownValue]) -> KnownValue:
     """Return what is known of what `dataclasses.replace` makes of an object."""
     thing = base.known
     known = isinstance(thing, Instance)
@@ -114,7 +112,7 @@ def replaced_fields(walk: Walk, base: KnownValue, named: dict[str, KnownValue]) 
         else captured(getattr(thing, field.name))
         for field in dataclasses.fields(cls)
     }
-    return instance(walk, cls, [], before | named)
+    return instance(walk, cls, Given((), {**before, **named}))
 
 
 def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
@@ -132,16 +130,16 @@ def of_parent(walk: Walk, parent: Parent, name: str) -> KnownValue:
 def of_class(walk: Walk, base: KnownValue, member: Any) -> KnownValue:
     """Return what is known of what an object finds in its class."""
     if isinstance(member, property):
-        return walk.call(captured(member.fget), [base], {})
+        return walk.call(captured(member.fget), Given((base,)))
     if hasattr(member, "func") and hasattr(member, "attrname"):  # a cached property
-        return walk.call(captured(member.func), [base], {})
+        return walk.call(captured(member.func), Given((base,)))
     if isinstance(member, staticmethod):
         return captured(member.__func__)
     if isinstance(member, classmethod):
         cls = captured(base.known.cls)
-        return KnownValue(True, True, known=Bound(captured(member.__func__), (cls,)))
+        return KnownValue(True, True, known=Bound(captured(member.__func__), Given((cls,))))
     if isinstance(member, FunctionType):
-        return KnownValue(True, True, known=Bound(captured(member), (base,)))
+        return KnownValue(True, True, known=Bound(captured(member), Given((base,))))
     return captured(member)
 
 

@@ -63,13 +63,14 @@ def frozen(function: Any) -> Any:
     same = all(new is old for new, (_, old) in zip(new_cells, old_cells, strict=True))
     if same and not new_globals:
         return function
-    return _with(function, function.__globals__ | new_globals, new_cells)
+    return _with(function, function.__code__, function.__globals__ | new_globals, new_cells)
 
 
-def _with(function: FunctionType, names: dict[str, Any], cells: list[CellType]) -> FunctionType:
-    copied = FunctionType(
-        function.__code__, names, function.__name__, function.__defaults__, tuple(cells)
-    )
+def _with(
+    function: FunctionType, code: CodeType, names: dict[str, Any], cells: Any
+) -> FunctionType:
+    """Return a function with other code, which finds other things around it."""
+    copied = FunctionType(code, names, function.__name__, function.__defaults__, tuple(cells))
     copied.__kwdefaults__ = function.__kwdefaults__
     copied.__module__, copied.__qualname__ = function.__module__, function.__qualname__
     return copied
@@ -159,12 +160,7 @@ def without_imports(function: FunctionType) -> FunctionType:
     names = dict(function.__globals__)
     exec(compile(ast.Module(hoisted.found, []), "imports", "exec"), names)
     code = _moved(body, function)
-    result = FunctionType(
-        code, names, function.__name__, function.__defaults__,
-        tuple(cells_of(function)[name] for name in code.co_freevars),
-    )  # fmt: skip
-    result.__module__, result.__qualname__ = function.__module__, function.__qualname__
-    return result
+    return _with(function, code, names, map(cells_of(function).get, code.co_freevars))
 
 
 class _Hoist(ast.NodeTransformer):

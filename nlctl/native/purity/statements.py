@@ -18,6 +18,7 @@ from .values import (
     FRESH,
     OUTSIDE,
     UNKNOWN_VALUE,
+    Given,
     Impure,
     Instance,
     KnownValue,
@@ -117,7 +118,7 @@ class CallWalker(Expressions):
         name = OPERATORS.get(type(node.op), "")
         operator = made.operator_of(self.walk, value, f"__i{name}__")
         if operator is not None:
-            return self.walk.function(operator, [value, added], {})
+            return self.walk.function(operator, Given((value, added)))
         return self.operated(type(node.op), value, added)
 
     def visit_Delete(self, node: ast.Delete) -> None:
@@ -238,7 +239,7 @@ class CallWalker(Expressions):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         value = KnownValue(True, True, known=Local(node, self.frame))
         for decorator in reversed(node.decorator_list):
-            value = self.walk.call(self.visit(decorator), [value], {})
+            value = self.walk.call(self.visit(decorator), Given((value,)))
         self.assign(node.name, value)
 
     def visit_ClassDef(self, node: ast.ClassDef) -> None:

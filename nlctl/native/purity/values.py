@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import EnumType
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
@@ -65,12 +65,27 @@ class RowOf:
 
 
 @dataclass(frozen=True)
+class Given:
+    """The arguments of a call."""
+
+    places: tuple[KnownValue, ...] = ()
+    names: Mapping[str, KnownValue] = field(default_factory=dict)
+
+    @property
+    def every(self) -> tuple[KnownValue, ...]:
+        """All of them."""
+        return (*self.places, *self.names.values())
+
+    def __add__(self, more: Given) -> Given:
+        return Given(self.places + more.places, {**self.names, **more.names})
+
+
+@dataclass(frozen=True)
 class Bound:
     """A function some of whose arguments are given: a method, a `functools.partial`."""
 
     function: KnownValue
-    given: tuple[KnownValue, ...]
-    named: tuple[tuple[str, KnownValue], ...] = ()
+    given: Given
 
 
 @dataclass(frozen=True)
@@ -148,8 +163,8 @@ def _marks(known: Any) -> Any:
     if isinstance(known, Local):
         return "local", id(known.node), id(known.frame)
     if isinstance(known, Bound):
-        named = tuple((name, v.marks) for name, v in known.named)
-        return "bound", known.function.marks, tuple(v.marks for v in known.given), named
+        given = tuple(v.marks for v in known.given.every)
+        return "bound", known.function.marks, given, tuple(known.given.names)
     if isinstance(known, Cached):
         return "cached", known.function.marks
     if isinstance(known, Instance):

@@ -9,7 +9,7 @@ from types import FunctionType
 from typing import Any
 
 from .captured import Captured, noted
-from .values import KnownValue, captured
+from .values import Given, KnownValue, captured
 
 
 class Walk(ABC):
@@ -37,13 +37,9 @@ class Walk(ABC):
             self.read.setdefault((id(note.holder), note.name), note)
 
     @abstractmethod
-    def call(
-        self, function: KnownValue, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
+    def call(self, function: KnownValue, given: Given) -> KnownValue:
         """Return what is known of the result of a call."""
 
     @abstractmethod
-    def function(
-        self, thing: FunctionType, given: list[KnownValue], named: dict[str, KnownValue]
-    ) -> KnownValue:
+    def function(self, thing: FunctionType, given: Given) -> KnownValue:
         """Return what is known of the result of somebody's Python function."""

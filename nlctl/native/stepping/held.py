@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,43 +21,25 @@ from ..results import Trajectory, made
 from ..run import Run
 from ..settings import Settings
 from ..taylor.turns import turned, with_turns
+from .sampled_run import SteppedRun
 from .window import HELD_STEPS, Window, first_window, following, in_full, packed_window, until
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Kept:
-    """What a run was before a step: the window and a copy of its memory, and the last inputs."""
-
-    window: Window
-    memory: np.ndarray
-    k: int
-    inputs: np.ndarray
-    states: np.ndarray
-
-
-class HeldRun:
+class HeldRun(SteppedRun):
     """A run that continues whenever it is given inputs for another step."""
 
     def __init__(self, compiled: Compiled, dt: float, settings: Settings) -> None:
-        self.compiled, self.dt, self.settings = compiled, dt, settings
+        super().__init__(compiled, dt)
+        self.settings = settings
         self._functions = integrators()
         self._called: tuple[Any, tuple[Any, ...]] = None, ()
         self._shown: tuple[Any, tuple[Any, ...]] = None, ()
-        self.k, self.start = 0, 0.0
-        self.states = np.zeros(0)
-        self.p = np.zeros(0)
         self._laid: tuple[bytes, Window, np.ndarray] | None = None
-
-    @property
-    def time(self) -> float:
-        """Time that is reached (s)."""
-        return float(self.start + self.dt * self.k)
 
     def begin(self, x0: np.ndarray, p: np.ndarray, start: float) -> None:
         """Stand at the initial state; what happens there waits for the first inputs."""
+        super().begin(x0, p, start)
         key = p.tobytes() + np.float64(start).tobytes()
-        self.p, self.k, self.start, self.states = p, 0, start, x0.copy()
-        self.inputs = np.zeros(self.compiled.system.ninputs or 0)
         if self._laid is None or self._laid[0] != key:
             window = first_window(self.compiled, (start, self.dt), x0, p, self.settings)
             run = with_turns(self.compiled, window.run, self.settings)
@@ -164,22 +146,18 @@ class HeldRun:
         run.machine.check(task.p)
         return work.y[0, : task.outputs, 0].copy(), work.samples[0, :, 0].copy()
 
-    def keep(self) -> Kept:
-        """Return all that the run knows."""
-        memory = self.window.memory.copy()
-        return Kept(
-            window=self.window, memory=memory, k=self.k, inputs=self.inputs, states=self.states
-        )
+    def keep(self) -> tuple[Any, ...]:
+        """Return all that the run knows: the window and a copy of its memory, and the last step."""
+        return self.window, self.window.memory.copy(), self.k, self.inputs, self.states
 
-    def go_back(self, kept: Kept) -> None:
+    def go_back(self, kept: tuple[Any, ...]) -> None:
         """Stand where the run once stood."""
-        self.window, self.k = kept.window, kept.k
-        self.window.memory[:] = kept.memory
-        self.inputs, self.states = kept.inputs, kept.states
+        self.window, memory, self.k, self.inputs, self.states = kept
+        self.window.memory[:] = memory
         if self.k:
             end = self.window.place(self.k) - 1
             first = max(end - 1, 0)
-            self.window.run.task.inputs[:, first : end + 1] = kept.inputs[:, None]
+            self.window.run.task.inputs[:, first : end + 1] = self.inputs[:, None]
 
     def compared(self, _: np.ndarray, params: Any, audit: Audit) -> None:
         """Compare the program with python-control at both ends of the step that was made."""

@@ -1,4 +1,4 @@
-"""A run in discrete time, from sample to sample."""
+"""Runs in steps of one length, and one in discrete time, from sample to sample."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ..machine.evaluations import prepared_parameters
 from ..results import Statistics, Trajectory
 
 
-class SampledRun:
-    """x[k+1] = f(t[k], x[k], u[k]), and y = h(t[k+1], x[k+1], u[k]) while u[k] still holds."""
+class SteppedRun:
+    """A run of a diagram in steps of one length, and where it stands."""
 
     def __init__(self, compiled: Compiled, dt: float) -> None:
         self.compiled, self.dt = compiled, dt
@@ -33,6 +33,14 @@ class SampledRun:
         """Stand at the initial state."""
         self.p, self.k, self.start, self.states = p, 0, start, x0.copy()
         self.inputs = np.zeros(self.compiled.system.ninputs or 0)
+
+
+class SampledRun(SteppedRun):
+    """x[k+1] = f(t[k], x[k], u[k]), and y = h(t[k+1], x[k+1], u[k]) while u[k] still holds."""
+
+    def begin(self, x0: np.ndarray, p: np.ndarray, start: float) -> None:
+        """Stand at the initial state."""
+        super().begin(x0, p, start)
         self.code, self.c = prepared_parameters(self.compiled, p)
         rows = self.code.lowered.rows
         self._given = np.zeros(1), np.zeros((x0.size, 1)), np.zeros((self.inputs.size, 1))

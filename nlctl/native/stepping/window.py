@@ -14,7 +14,7 @@ import numpy as np
 from ...upstream.numba_internals import is_jit_disabled
 from ..compiled import Compiled
 from ..driver import Course, prepared
-from ..integrate.memory import data_address, type_of, with_fields
+from ..integrate.memory import data_address, named_arrays, type_of, with_fields
 from ..integrate.workspace import Task
 from ..run import Run
 from ..settings import Settings
@@ -199,17 +199,7 @@ def _places(work: Any) -> tuple[dict[int, int], int]:
 
 def _kept_arrays(work: Any) -> dict[tuple[str, ...], np.ndarray]:
     """Return the arrays of a workspace that a run reads again, by their names."""
-    return {path: a for path, a in _arrays(work) if a.size and path not in _SHOWN}
-
-
-def _arrays(record: Any, path: tuple[str, ...] = ()) -> Any:
-    """Yield the arrays of a record, and of those inside, by their names."""
-    for name in record._fields[:-1]:
-        value = getattr(record, name)
-        if hasattr(value, "_fields"):
-            yield from _arrays(value, (*path, name))
-        elif isinstance(value, np.ndarray):
-            yield (*path, name), value
+    return {path: a for path, a in named_arrays(work) if a.size and path not in _SHOWN}
 
 
 def _with_arrays(record: Any, views: dict[tuple[str, ...], np.ndarray]) -> Any:

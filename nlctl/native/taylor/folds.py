@@ -50,28 +50,22 @@ def taylor_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
 def _orders_text(layout: SeriesLayout) -> str:
     """Write the loop over the orders; the last one has the states alone."""
     b, lanes, size = Body(Module(inlined=False)), layout.lanes, layout.rows * layout.lanes
-    place = {
-        name: b.new(f"getelementptr double, ptr %c, i64 {row * lanes}").text
-        for name, row in layout.at.items()
-    }
+    place = {name: b.moved("%c", row * lanes) for name, row in layout.at.items()}
     highest = b.new(f"fptosi {b.load(place['order'], 0)} to i64").text
     b.write(f"call void @first(ptr %t, ptr %x, ptr %u, ptr %c, ptr {place['o']}, ptr %k)")
-    b.write("br label %orders")
-    b.begin("orders")
-    b.write("%order = phi i64 [1, %entry], [%following, %orders]")
-    _write_weights(b, place["w"], "%order", lanes)
-    b.write(f"call void @sums(ptr %k, i64 %order, ptr {place['a']}, ptr {place['q']})")
-    before, here = _orders_at(b, "%order", size)
+    turns = Turns(b, [constant(1, kind="i")])
+    order = turns.carried[0].text
+    _write_weights(b, place["w"], order, lanes)
+    b.write(f"call void @sums(ptr %k, i64 {order}, ptr {place['a']}, ptr {place['q']})")
+    before, here = _orders_at(b, order, size)
     given = ", ".join(
         f"ptr {p}"
         for p in ("%t", "%x", "%u", "%c", "%v", *(place[n] for n in "wo"), before,
                   place["a"], place["q"], here)
     )  # fmt: skip
     b.write(f"call void @following({given})")
-    b.write("%following = add i64 %order, 1")
-    more = b.new(f"icmp slt i64 %following, {highest}").text
-    b.write(f"br i1 {more}, label %orders, label %last")
-    b.begin("last")
+    following = b.new(f"add i64 {order}, 1")
+    turns.end(b.new(f"icmp slt i64 {following.text}, {highest}"), [following])
     _write_weights(b, place["w"], highest, lanes)
     before, here = _orders_at(b, highest, size)
     b.write(f"call void @last(ptr {place['w']}, ptr {before}, ptr {here})")
@@ -83,8 +77,8 @@ def _orders_text(layout: SeriesLayout) -> str:
 def _orders_at(b: Body, order: str, size: int) -> tuple[str, str]:
     """Return where the coefficients of the order before and of an order are."""
     at = b.new(f"mul i64 {order}, {size}").text
-    here = b.new(f"getelementptr double, ptr %k, i64 {at}").text
-    return b.new(f"getelementptr double, ptr {here}, i64 {-size}").text, here
+    here = b.moved("%k", at)
+    return b.moved(here, -size), here
 
 
 def _write_weights(b: Body, place: str, order: str, lanes: int) -> None:
@@ -96,8 +90,7 @@ def _write_weights(b: Body, place: str, order: str, lanes: int) -> None:
         IS_FIRST_ROW: b.select(is_first, constant(1.0), constant(0.0)),
     }
     for row, weight in weights.items():
-        where = b.new(f"getelementptr double, ptr {place}, i64 {row * lanes}").text
-        b.store(b.wide(weight, lanes) if lanes > 1 else weight, where)
+        b.store(b.wide(weight, lanes) if lanes > 1 else weight, b.moved(place, row * lanes))
 
 
 def _sums_text(folds: Sequence[Fold], layout: SeriesLayout) -> str:
@@ -147,8 +140,7 @@ def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
     def factor(pointer: str, at: int, step: int) -> Value:
         key = (pointer, at, step)
         if key not in known:
-            where = b.new(f"getelementptr double, ptr {pointer}, i64 {at}").text
-            one = b.load(where, width if step else 0)
+            one = b.load(b.moved(pointer, at), width if step else 0)
             known[key] = one if step else b.wide(one, width)
         return known[key]
 
@@ -166,5 +158,4 @@ def _chunk(b: Body, sums: Sequence[_Sum], lanes: int, size: int) -> None:
         for new in added
     ]
     for s, result in zip(sums, results, strict=True):
-        where = b.new(f"getelementptr double, ptr %{s.array}, i64 {s.target}").text
-        b.store(result, where)
+        b.store(result, b.moved(f"%{s.array}", s.target))

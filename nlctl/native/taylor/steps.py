@@ -63,7 +63,7 @@ class _Function:
         return self.b.new(f"add i64 {order}, -1").text
 
     def place(self, array: str, at: str) -> str:
-        return self.b.new(f"getelementptr double, ptr %{array}, i64 {at}").text
+        return self.b.moved(f"%{array}", at)
 
     def coefficients(self, order: str) -> str:
         """Return where the coefficients of an order are."""
@@ -111,7 +111,7 @@ class _Function:
         """Return a polynomial's value at h, and its slope: from the highest order downwards."""
         # With `magnitudes` the terms' magnitudes are added up, for h > 0.
         b, width = self.b, h.width
-        top = b.new(f"getelementptr double, ptr {self.coefficients(highest)}, i64 {at}").text
+        top = b.moved(self.coefficients(highest), at)
         read = self.magnitude if magnitudes else lambda value: value
         start = [read(b.load(top, width))] + [constant(0.0, width)] * slope
         turns = Turns(b, [Value(top, 0, "p"), *start, Value(highest, 0, "i")])
@@ -177,8 +177,7 @@ class _Function:
             scale = self.weight(size, tolerances)
             parts = []
             for order, before in zip(orders, largest, strict=True):
-                where = b.new(f"getelementptr double, ptr {order}, i64 {at}").text
-                part = b.mul(self.magnitude(b.load(where, width)), scale)
+                part = b.mul(self.magnitude(b.load(b.moved(order, at), width)), scale)
                 parts.append(self.larger(before, part))
             return parts
 
@@ -217,8 +216,8 @@ class _Function:
             scale = self.weight(size, tolerances)
             missed = b.mul(self.magnitude(b.mul(h, b.sub(dx, slope))), scale)
             missed = b.add(missed, b.mul(x_new, 0.0))
-            where = b.new(f"getelementptr double, ptr {last}, i64 {at}").text
-            term = b.mul(self.magnitude(b.mul(power, b.load(where, width))), scale)
+            last_terms = b.load(b.moved(last, at), width)
+            term = b.mul(self.magnitude(b.mul(power, last_terms)), scale)
             parts = zip(largest, (missed, term), strict=True)
             return [self.larger(before, part) for before, part in parts]
 
@@ -239,11 +238,9 @@ class _Function:
             first = self.magnitude(self.read("k", here, width))
             orders = [b.new(f"add i64 {highest}, {-i}").text for i in range(2)]
             last, other = (
-                self.magnitude(b.load(b.new(
-                    f"getelementptr double, ptr {self.coefficients(order)}, i64 {here}"
-                ).text, width))
+                self.magnitude(b.load(b.moved(self.coefficients(order), here), width))
                 for order in orders
-            )  # fmt: skip
+            )
             ending = b.mul(power, b.add(other, b.mul(last, h)))
             doubt = b.sub(ending, b.mul(total, FOLLOWED))
             crossing = b.sub(total, b.mul(first, 2.0))

@@ -38,7 +38,13 @@ class OfTime:
     @cached_property
     def parameters(self) -> np.ndarray:
         """Places of the parameters that they depend on."""
-        return read_parameters(self.conditions)
+        found, places = self.conditions, set[int]()
+        waves = (slope for wave in found.waves for slope in wave)
+        for node in needed([*found.of_time, *found.pulses, *waves]):
+            if node.op == "leaf" and node.data[0] == "p":
+                _, start, step = node.data
+                places.update(start + step * i for i in range(node.size or 1))
+        return np.array(sorted(places), dtype=np.int64)
 
 
 def ahead(
@@ -48,12 +54,10 @@ def ahead(
     count = p.shape[1]
     span = float(times[0]), float(times[-1])
     own = [_of(timed, p[:, j], span) for j in range(count)]
-    breaks = [one.breaks for one in own]
-    jumps = np.full((count, max(each.size for each in breaks)), np.inf)
-    cells = max(one.reach.size for one in own)
-    limits = np.full((count, cells), np.inf)
+    jumps = np.full((count, max(one.breaks.size for one in own)), np.inf)
+    limits = np.full((count, max(one.reach.size for one in own)), np.inf)
     for j, one in enumerate(own):
-        jumps[j, : breaks[j].size] = breaks[j]
+        jumps[j, : one.breaks.size] = one.breaks
         if one.reach.size:
             limits[j] = one.reach
     longest = np.minimum(max_step, np.array([one.longest for one in own]))
@@ -62,19 +66,16 @@ def ahead(
 
 def _of(timed: OfTime, p: np.ndarray, span: tuple[float, float]) -> Ahead:
     """Return it for one parameter vector, from what is known of the program already."""
-    known, key = timed.known, (span, p[timed.parameters].tobytes())
+    known, key, found = timed.known, (span, p[timed.parameters].tobytes()), timed.conditions
     if key not in known:
         if len(known) >= _KEPT:
             known.clear()
-        known[key] = _read(timed.conditions, p, span)
+        fastest = _fastest(found.waves, p)
+        pulses = reach(found.pulses, p, span) if found.pulses else np.zeros(0)
+        breaks = break_points(found.of_time, p, span, fastest) if found.of_time else np.zeros(0)
+        longest = np.pi / fastest if fastest else np.inf
+        known[key] = Ahead(breaks=breaks, longest=longest, reach=pulses)
     return known[key]
-
-
-def _read(found: Conditions, p: np.ndarray, span: tuple[float, float]) -> Ahead:
-    fastest = _fastest(found.waves, p)
-    pulses = reach(found.pulses, p, span) if found.pulses else np.zeros(0)
-    breaks = break_points(found.of_time, p, span, fastest) if found.of_time else np.zeros(0)
-    return Ahead(breaks=breaks, longest=np.pi / fastest if fastest else np.inf, reach=pulses)
 
 
 def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:
@@ -84,17 +85,6 @@ def _fastest(waves: tuple[tuple[Expr, ...], ...], p: np.ndarray) -> float:
     largest = iter(float(np.abs(each).max(initial=0.0)) for each in values)
     sums = [sum(next(largest) for _ in wave) for wave in waves]
     return max((each for each in sums if np.isfinite(each)), default=0.0)
-
-
-def read_parameters(found: Conditions) -> np.ndarray:
-    """Return the places of the parameters that any of it depends on."""
-    exprs = [*found.of_time, *found.pulses, *(slope for wave in found.waves for slope in wave)]
-    places: set[int] = set()
-    for node in needed(exprs):
-        if node.op == "leaf" and node.data[0] == "p":
-            _, start, step = node.data
-            places.update(start + step * i for i in range(node.size or 1))
-    return np.array(sorted(places), dtype=np.int64)
 
 
 def reach(terms: Sequence[Expr], p: np.ndarray, span: tuple[float, float]) -> np.ndarray:

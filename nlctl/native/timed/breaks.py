@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,8 @@ _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
+# of times: one integer between two switches and another one behind
+Indicator = Callable[[np.ndarray], np.ndarray]
 
 
 def break_points(
@@ -35,16 +38,17 @@ def break_points(
     lines = as_lines(args, constant, span)
     found = [np.zeros(0)]
     for condition in conditions:
-        places, indicators = _known(condition, lines), _indicators(condition)
+        places, elements = _known(condition, lines), range(condition.size or 1)
+        indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
         if places is None:
             places = levels_met(condition, lines, constant)
             if places is not None:  # how many elements hold
-                indicators = [lambda values, t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
+                indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
             if places is None:
-                found.append(_sought(indicator, values, span, fastest))
+                found.append(_sought(indicator, span, fastest))
             else:
-                found.append(_exact(indicator, places, values, span))
+                found.append(_exact(indicator, places, span))
     every = np.unique(np.concatenate(found))
     return every[(every > span[0]) & (every <= span[1])]
 
@@ -59,14 +63,8 @@ def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
         return None
 
 
-def _indicators(condition: Expr) -> list[Callable[[Values, np.ndarray], np.ndarray]]:
-    """Return what is one integer between two switches and another one behind, by element."""
-    return [
-        lambda values, t, k=k: _level(condition, values, t, k) for k in range(condition.size or 1)
-    ]
-
-
-def _level(condition: Expr, values: Values, t: np.ndarray, k: int) -> np.ndarray:
+def _level(condition: Expr, values: Values, k: int, t: np.ndarray) -> np.ndarray:
+    """Return the indicator of an element."""
     op, args = condition.op, condition.args
 
     def element(array: np.ndarray) -> np.ndarray:
@@ -86,48 +84,33 @@ def _level(condition: Expr, values: Values, t: np.ndarray, k: int) -> np.ndarray
         return (a < 0.0).astype(float)
 
 
-def _exact(
-    indicator: Callable[[Values, np.ndarray], np.ndarray],
-    places: np.ndarray,
-    values: Values,
-    span: tuple[float, float],
-) -> np.ndarray:
+def _exact(indicator: Indicator, places: np.ndarray, span: tuple[float, float]) -> np.ndarray:
     """Return the numbers at which an indicator changes near `places`."""
     if not places.size:
         return places
     width = _NEAR * max(abs(span[0]), abs(span[1]))
     gaps = np.diff(places)
     width = min(width, 0.25 * gaps.min()) if gaps.size else width
-    low, high = places - width, places + width
-    return _bisected(indicator, low, high, values, places)
+    return _bisected(indicator, places - width, places + width, places)
 
 
-def _sought(
-    indicator: Callable[[Values, np.ndarray], np.ndarray],
-    values: Values,
-    span: tuple[float, float],
-    fastest: float,
-) -> np.ndarray:
+def _sought(indicator: Indicator, span: tuple[float, float], fastest: float) -> np.ndarray:
     """Return where an indicator changes on a grid that is fine enough for its fastest sine."""
     waves = fastest * (span[1] - span[0]) / (2.0 * np.pi)
     count = int(min(max(_GRID, _PER_WAVE * waves), _MOST))
     t = np.linspace(*span, count + 1)
-    level = indicator(values, t)
+    level = indicator(t)
     at = np.flatnonzero(level[1:] != level[:-1])
-    return _bisected(indicator, t[at], t[at + 1], values, None)
+    return _bisected(indicator, t[at], t[at + 1], None)
 
 
 def _bisected(
-    indicator: Callable[[Values, np.ndarray], np.ndarray],
-    low: np.ndarray,
-    high: np.ndarray,
-    values: Values,
-    otherwise: np.ndarray | None,
+    indicator: Indicator, low: np.ndarray, high: np.ndarray, otherwise: np.ndarray | None
 ) -> np.ndarray:
     """Halve brackets down to neighbouring numbers; `otherwise` where nothing changes in one."""
     if not low.size:
         return low
-    before, after = indicator(values, low), indicator(values, high)
+    before, after = indicator(low), indicator(high)
     changes = before != after
     low, high = low.copy(), high.copy()
     for _ in range(1100):
@@ -135,7 +118,7 @@ def _bisected(
         inside = (middle > low) & (middle < high) & changes
         if not inside.any():
             break
-        same = indicator(values, middle) == before
+        same = indicator(middle) == before
         low = np.where(inside & same, middle, low)
         high = np.where(inside & ~same, middle, high)
     return high[changes] if otherwise is None else np.where(changes, high, otherwise)

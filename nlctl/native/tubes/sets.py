@@ -175,10 +175,8 @@ def renewed(c, P, even, B, r, most):
         rounded = 0.0
         for k in range(n):
             rounded += abs(Q[k, i, 0]) * np.abs(P[k]).sum()
-        box[i, 0], box[i, 1] = (
-            down(box[i, 0] - _ROUNDED * rounded),
-            up(box[i, 1] + _ROUNDED * rounded),
-        )
+        box[i, 0] = down(box[i, 0] - _ROUNDED * rounded)
+        box[i, 1] = up(box[i, 1] + _ROUNDED * rounded)
     add_left_out(Q, transposed, whole, c)
     P.fill(0.0)
     for i in range(n):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..enclosures.address import call_enclosure
+from ..machine.address import call_enclosure
 from ..machine.machine_code import kept
 from .intervals import AS_NUMPY, down, interval_product, power_of_time, up, write_into
 

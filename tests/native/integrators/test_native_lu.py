@@ -1,7 +1,6 @@
 """Linear equations of the stiff method: their structure is sound, their solution LAPACK's."""
 
-from collections import namedtuple
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import control as ct
@@ -17,7 +16,6 @@ from nlctl.expressions.dependence import structure
 from nlctl.native.along import Along, derivatives
 from nlctl.native.integrate.methods.lu import (
     WHOLE,
-    Elimination,
     cost,
     elimination,
     factorise,
@@ -37,10 +35,6 @@ class Work(NamedTuple):
     columns: np.ndarray
     factors: np.ndarray
     pivots: np.ndarray
-
-
-# an `Elimination`, as machine code takes it here
-Order = namedtuple("Order", [field.name for field in fields(Elimination)])
 
 
 @numba.njit(error_model="numpy")
@@ -83,7 +77,7 @@ def solved(order, diagonal, matrix, b):
     """Return the solution of (diagonal I - matrix) x = b, and whether entries alone were used."""
     x = b.copy()
     with np.errstate(all="ignore"):
-        only_entries = both(Order(**vars(order)), diagonal, work(matrix), x)
+        only_entries = both(order, diagonal, work(matrix), x)
     return x, only_entries
 
 
@@ -145,7 +139,7 @@ class TestSolution:
         matrix, v = np.where(where, rng.normal(size=(n, n)), 0.0), rng.normal(size=n)
         for order in (elimination(where), WHOLE):
             found = np.full(n, np.nan)
-            times(Order(**vars(order)), work(matrix).jacobian_flat, v, found)
+            times(order, work(matrix).jacobian_flat, v, found)
             np.testing.assert_allclose(found, matrix @ v, rtol=1e-13, atol=1e-14)
 
     def test_a_small_pivot_is_exchanged(self):

@@ -179,19 +179,21 @@ def _sin_and_cos(b: Body, x: Value) -> Results:
     in_cosine = b.integer("and", b.integer("shl", b.integer("add", bits, 1), 62), sign)
     s = b.real(b.logic("xor", b.bits(b.select(odd, cosine, sine)), in_sine))
     c = b.real(b.logic("xor", b.bits(b.select(odd, sine, cosine)), in_cosine))
-    return _exact_if_far(b, x, {"sin": s, "cos": c})
+    # but the C library's values for the elements that are too large
+    return b.unless_larger(x, LARGEST_ANGLE, {"sin": s, "cos": c})
 
 
 def _sin(b: Body, x: Value) -> Results:
     """An odd polynomial of what is left of the nearest multiple of pi."""
     m = b.fma(x, 1 / math.pi, ROUND)
-    return _exact_if_far(b, x, {"sin": _half_turn(b, x, m, 0.0, b.bits(m))})
+    return b.unless_larger(x, LARGEST_ANGLE, {"sin": _half_turn(b, x, m, 0.0, b.bits(m))})
 
 
 def _cos(b: Body, x: Value) -> Results:
     """A sine from the nearest odd multiple of pi / 2 on."""
     m = b.add(b.fma(x, 1 / math.pi, -0.5), ROUND, exact=True)
-    return _exact_if_far(b, x, {"cos": _half_turn(b, x, m, 0.5, b.integer("xor", b.bits(m), 1))})
+    cosine = _half_turn(b, x, m, 0.5, b.integer("xor", b.bits(m), 1))
+    return b.unless_larger(x, LARGEST_ANGLE, {"cos": cosine})
 
 
 def _half_turn(b: Body, x: Value, m: Value, shift: float, sign: Value) -> Value:
@@ -201,11 +203,6 @@ def _half_turn(b: Body, x: Value, m: Value, shift: float, sign: Value) -> Value:
     z = b.mul(r, r)
     y = b.muladd(b.mul(r, z), _polynomial(b, SIN_WIDE, z), r)
     return b.real(b.logic("xor", b.bits(y), b.integer("shl", sign, 63)))
-
-
-def _exact_if_far(b: Body, x: Value, near: dict[str, Value]) -> Results:
-    """Return what is near, but the C library's values for the elements that are too large."""
-    return b.unless_larger(x, LARGEST_ANGLE, near)
 
 
 # -- choices ---------------------------------------------------------------------------------------

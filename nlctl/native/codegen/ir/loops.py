@@ -22,13 +22,8 @@ def elements_per_turn(size: int) -> int:
     return next(k for k in (_WIDE, 2, 1) if k <= size)
 
 
-def written(w: Writer, loop: LoopOfLevel) -> None:
-    """Write a loop with the sums that begin before and end after it."""
-    _Loop(w, loop).write()
-
-
-class _Loop:
-    """Writes one loop."""
+class LoopWriter:
+    """Writes one loop with the sums that begin before and end after it."""
 
     def __init__(self, w: Writer, loop: LoopOfLevel) -> None:
         self.w, self.b, self.loop, self.lanes = w, w.b, loop, w.lanes
@@ -124,7 +119,7 @@ class _Loop:
             parts = vector.data[at : at + self.step]
             return Value(f"<{', '.join(f'double {float_text(v)}' for v in parts)}>", self.chunk)
         moved = b.new(f"add i64 {index}, {at}").text
-        where = b.new(f"getelementptr double, ptr {b.module.table(vector.data)}, i64 {moved}").text
+        where = b.moved(b.module.table(vector.data), moved)
         if self.lanes > 1:
             return b.wide(b.load(where, 0), self.chunk)
         return b.load(where, self.chunk)

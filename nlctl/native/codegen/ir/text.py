@@ -262,7 +262,8 @@ class Body:
         self, name: str, make: Callable[..., tuple[Value, ...]], args: list[Value], count: int
     ) -> tuple[Value, ...]:
         """Call a function with some results, which `make` writes when it is first needed."""
-        width, full = args[0].width, self._full(name, args[0].width)
+        width = args[0].width
+        full = f"@nlctl.{name}.{width or 1}{'.portable' if self.portable else ''}"
         kind = llvm_type(width)
         kind = f"{{{kind}, {kind}}}" if count == 2 else kind
         if full not in self.module.functions:
@@ -274,9 +275,6 @@ class Body:
         return tuple(
             self.new(f"extractvalue {kind} {result.text}, {i}", width) for i in range(count)
         )
-
-    def _full(self, name: str, width: int) -> str:
-        return f"@nlctl.{name}.{width or 1}{'.portable' if self.portable else ''}"
 
     def _defined(self, full: str, kind: str, make: Callable[..., Any], args: list[Value]) -> str:
         """Return the text of a function."""
@@ -343,14 +341,14 @@ class Body:
     def address(self, array: str, at: int, index: str | None = None, step: int = 1) -> str:
         """Return the address of entry `at` of an array, or of ``index * step + at``."""
         if index is None:
-            return (
-                self.new(f"getelementptr double, ptr %{array}, i64 {at}").text
-                if at
-                else (f"%{array}")
-            )
+            return self.moved(f"%{array}", at) if at else f"%{array}"
         scaled = self.new(f"mul i64 {index}, {step}").text if step != 1 else index
         moved = self.new(f"add i64 {scaled}, {at}").text if at else scaled
-        return self.new(f"getelementptr double, ptr %{array}, i64 {moved}").text
+        return self.moved(f"%{array}", moved)
+
+    def moved(self, where: str, by: int | str) -> str:
+        """Return the address that is so many numbers behind another one."""
+        return self.new(f"getelementptr double, ptr {where}, i64 {by}").text
 
     def load(self, where: str, width: int) -> Value:
         """Return the number, or as many as a vector has, at an address."""

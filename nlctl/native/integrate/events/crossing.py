@@ -35,11 +35,9 @@ _LEAST = 1e-12  # of the time: shorter steps are taken, by the explicit method, 
 
 @numba.njit(**INNER)
 def crossing(task, lane, w, j):
-    """Look for conditions in the step just tried: what becomes of it, or NOTHING.
-
-    With AGAIN, ``lane.step`` is the next length to try; with REFUSED a shorter one is proposed;
-    with CLEAR a step across follows.
-    """
+    """Look for conditions in the step just tried: what becomes of it, or NOTHING."""
+    # With AGAIN, ``lane.step`` is the next length to try; with REFUSED a shorter one is proposed;
+    # with CLEAR a step across follows.
     if lane.across:
         return _across(task, lane, w, j)
     if lane.tries > 0 and lane.traces == 0:
@@ -57,11 +55,9 @@ def crossing(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _has_seen_a_jump(task, lane, w, j):
-    """Whether a step is wrong: one of its stages has looked behind, whatever is said of its end.
-
-    On the near side the error of a shorter step is smaller at least by the cube of its part, and
-    that of a longer one larger by no more than the sixth power.
-    """
+    """Whether a step is wrong: one of its stages has looked behind, whatever is said of its end."""
+    # On the near side the error of a shorter step is smaller at least by the cube of its part, and
+    # that of a longer one larger by no more than the sixth power.
     most = 1.0
     if lane.traces > 0 and not task.taylor.highest:
         most = min(1.0, 10.0 * (lane.step / lane.whole) ** 3 + _ROUNDING / task.rtol)
@@ -73,11 +69,9 @@ def _has_seen_a_jump(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _shortened(lane, beyond):
-    """Propose a shorter step in the place of one with a stage behind a condition.
-
-    The stiff method's stages may hold each other back there, however short it is: what is too
-    short for that is tried again as a step across.
-    """
+    """Propose a shorter step in the place of one with a stage behind a condition."""
+    # The stiff method's stages may hold each other back there, however short it is: what is too
+    # short for that is tried again as a step across.
     if not lane.step > _LEAST * max(abs(lane.t), lane.last):
         if not is_stiff(lane):
             return NOTHING
@@ -112,21 +106,17 @@ def _meets(w, i, j):
 
 @numba.njit(**INNER)
 def _leaves(task, lane, w, i, j):
-    """Whether a step begins where a condition is exactly 0.
-
-    What the right-hand side is at 0 need not be what it is on the side to which the step leads.
-    That counts once in a row: what comes back to 0 and leaves it with every step is rounding.
-    """
+    """Whether a step begins where a condition is exactly 0."""
+    # What the right-hand side is at 0 need not be what it is on the side to which the step leads.
+    # That counts once in a row: what comes back to 0 and leaves it with every step is rounding.
     return i < task.rows.guarded and w.events.g_start[i, j] == 0.0 and not lane.left_zero
 
 
 @numba.njit(**INNER)
 def _beyond(task, lane, w, j):
-    """Return how far a stage of the step just tried lies behind a condition, as far as kept.
-
-    In parts of what the switching function is at the start; what follows a shorter step begins
-    nearer, and has better stages.
-    """
+    """Return how far a stage of the step just tried lies behind a condition, as far as kept."""
+    # In parts of what the switching function is at the start; what follows a shorter step begins
+    # nearer, and has better stages.
     known = task.pair.inside[1 if is_stiff(lane) else 0, 0] != 0.0
     if not known or task.fixed > 0.0:
         return 0.0
@@ -141,10 +131,8 @@ def _beyond(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _across(task, lane, w, j):
-    """Accept the step across a condition, unless its end is not finite or what jumps is too much.
-
-    In that case it is tried again as any other: what is close is then a part of this short step.
-    """
+    """Accept a step across a condition, unless its end is not finite or what jumps is too much."""
+    # In that case it is tried again as any other: what is close is then a part of this short step.
     if not np.isfinite(w.error[j]):
         return NOTHING
     if task.fixed == 0.0 and _costs_too_much(task, lane, w, j):
@@ -209,11 +197,9 @@ def has_crossed(task, w, i, end, j):
 
 @numba.njit(**INNER)
 def bracket(task, lane, w, bad, j):
-    """Take the step just tried into the bracket of lengths: too long, or all on the near side.
-
-    Of the near side the last two are kept, by which is foreseen where the condition lies: what a
-    step that is wrong says of its end is made of both sides.
-    """
+    """Take the step just tried into the bracket of lengths: too long, or all on the near side."""
+    # Of the near side the last two are kept, by which is foreseen where the condition lies: what a
+    # step that is wrong says of its end is made of both sides.
     events = w.events
     first = lane.traces == 0
     if first:
@@ -230,10 +216,8 @@ def bracket(task, lane, w, bad, j):
         if first:
             events.g_low[i, j] = events.g_before[i, j] = events.g_start[i, j]
         if bad or first:
-            events.g_high[i, j], events.g_low[i, j] = (
-                events.g[i, j],
-                events.g_low[i, j] * weight,
-            )
+            events.g_high[i, j] = events.g[i, j]
+            events.g_low[i, j] *= weight
         else:
             events.g_before[i, j], events.g_low[i, j] = events.g_low[i, j], events.g[i, j]
             events.g_high[i, j] *= weight
@@ -274,11 +258,9 @@ def next_try(task, lane, w, bad, j):
 
 @numba.njit(**INNER)
 def _close(task, lane):
-    """Return how close before a condition a step is to end.
-
-    No closer than rounding allows, which is more than that of the time where a state hardly moves:
-    what a short step adds to it may be lost, and the step across leads nowhere.
-    """
+    """Return how close before a condition a step is to end."""
+    # No closer than rounding allows, which is more than that of the time where a state hardly
+    # moves: what a short step adds to it may be lost, and the step across leads nowhere.
     t_end = max(abs(lane.t), abs(lane.t + lane.high))
     wider = _WIDER ** min(max(lane.misses - 1, 0), _TRIES)
     return wider * max(BEFORE_CONDITION * task.rtol * lane.whole, _CLOSEST * t_end)
@@ -286,11 +268,9 @@ def _close(task, lane):
 
 @numba.njit(**INNER)
 def _foreseen(task, lane, w, bad, j):
-    """Return where the first condition lies in the bracket, -1 if nothing is known of that.
-
-    Between both ends where the farther one is right, unless the near side leads away from 0;
-    otherwise by what is known of the near side.
-    """
+    """Return where the first condition lies in the bracket, -1 if nothing is known of that."""
+    # Between both ends where the farther one is right, unless the near side leads away from 0;
+    # otherwise by what is known of the near side.
     first = -1.0
     for i in range(task.rows.declared, task.rows.switching):
         root = -1.0
@@ -310,11 +290,9 @@ def _foreseen(task, lane, w, bad, j):
 
 @numba.njit(**INNER)
 def _extrapolated(lane, w, i, j):
-    """Return where a function is 0 by its last values on the near side, -1 if it goes elsewhere.
-
-    By a secant, and where there are three values by the parabola through them, one step of Newton's
-    method from there.
-    """
+    """Return where a function is 0 by its last values on the near side, -1 if it goes elsewhere."""
+    # By a secant, and where there are three values by the parabola through them, one step of
+    # Newton's method from there.
     before, now, length = w.events.g_before[i, j], w.events.g_low[i, j], lane.low - lane.low_before
     if before * now <= 0.0 or abs(now) >= abs(before):
         return -1.0

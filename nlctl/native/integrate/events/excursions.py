@@ -38,10 +38,8 @@ _DOUBLE = 2.0  # growth of a step up to which the noise of stages does not count
 
 @numba.njit(**INNER)
 def look_between(rhs, task, lanes, w, found):
-    """Have shorter steps tried where an accepted one has passed over something.
-
-    ``found`` becomes AGAIN there, and w.inside.resolved the longest step to be tried next.
-    """
+    """Have shorter steps tried where an accepted one has passed over something."""
+    # ``found`` becomes AGAIN there, and w.inside.resolved the longest step to be tried next.
     inside, wanted, any_wanted = w.inside, w.inside.wanted, False
     shortest = 1e-7 * (task.times[-1] - task.times[0])
     for j in range(lanes.size):
@@ -92,10 +90,8 @@ def _suspected(task, lane, w, j):
 
 @numba.njit(**INNER)
 def _known(task, lane, w, i, j, row):
-    """Return what is known of a switching function, and where it may be least.
-
-    Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
-    """
+    """Return what is known of a switching function, and where it may be least."""
+    # Of `f`, which is above 0 at both ends of the step: sign times the function plus offset.
     inside, at = w.inside, task.pair.inside[row]
     values = inside.values
     sign, offset = _side(w, i, j)
@@ -200,10 +196,8 @@ def _is_far(w, i, j):
 
 @numba.njit(**INNER)
 def _may_turn(lane, w, i, j):
-    """Whether a memory that is carried along may turn twice: _SUSPECT, by its rates at both ends.
-
-    At the stages it may be far less accurate than at the ends, where other states follow from it.
-    """
+    """Whether a memory that is carried along may turn twice: _SUSPECT, by rates at both ends."""
+    # At the stages it may be far less accurate than at the ends, where other states follow from it.
     memories = w.memories
     change = memories.m[i, j] - memories.m_start[i, j]
     first, last = lane.step * memories.slope_start[i, j], lane.step * memories.slope[i, j]
@@ -228,11 +222,9 @@ def _slope(newton, at, x, carried):
 
 @numba.njit(**INNER)
 def _side(w, i, j):
-    """Return sign and offset that make a switching function positive at both ends of a step.
-
-    Where a step ends right behind its event, twice of that rest is the level; where it begins
-    right behind one and ends in front of it, twice of that rest.
-    """
+    """Return sign and offset that make a switching function positive at both ends of a step."""
+    # Where a step ends right behind its event, twice of that rest is the level; where it begins
+    # right behind one and ends in front of it, twice of that rest.
     start, end = w.events.g_start[i, j], w.events.g[i, j]
     side = 1.0 if start > 0.0 or (start == 0.0 and w.events.g_inside[0, i, j] > 0.0) else -1.0
     if side * end >= 0.0:
@@ -263,10 +255,8 @@ def _standing(task, w, i, j, row):
 
 @numba.njit(**INNER)
 def _go_on(task, lane, w, found, carried, first, j):
-    """Go on to the next event function that is to be looked at, from `first` on.
-
-    Memories, if it is one that is carried, otherwise switching functions and then memories.
-    """
+    """Go on to the next event function that is to be looked at, from `first` on."""
+    # Memories, if it is one that is carried, otherwise switching functions and then memories.
     w.inside.sought[j] = -1
     for i in range(w.events.g.shape[0] if carried else first, w.events.g.shape[0]):
         if not _is_far(w, i, j):
@@ -312,16 +302,8 @@ def _bracket(w, x, j):
     k = min(int(4.0 * x), 3)
     inner = k + 1 if inside.values[k + 1] < inside.values[k] else k
     low, high = (k, k + 1) if inner == 0 or inner == 4 else (inner - 1, inner + 1)
-    inside.bracket[0, j], inside.bracket[1, j], inside.bracket[2, j] = (
-        0.25 * low,
-        0.25 * inner,
-        0.25 * high,
-    )
-    inside.height[0, j], inside.height[1, j], inside.height[2, j] = (
-        inside.values[low],
-        inside.values[inner],
-        inside.values[high],
-    )
+    for n, place in enumerate((low, inner, high)):
+        inside.bracket[n, j], inside.height[n, j] = 0.25 * place, inside.values[place]
     if inner == 0 or inner == 4:
         inside.bracket[1, j] = -1.0
     inside.part[j], inside.foreseen[j] = x, np.inf

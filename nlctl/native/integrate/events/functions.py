@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from ..memory import Places1, Places2, Reals1, Reals2, Reals3, arrays_of
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3
 from ..state import INNER
 from .location import SMALL_KINK
 
@@ -63,8 +63,8 @@ class Memories(NamedTuple):
 class Inside(NamedTuple):
     """What is looked at inside of the step being tried, one number for each lane or more."""
 
-    values: Reals1  # of one event function over a step
-    newton: Reals1
+    values: Reals1  # of one event function over a step: (5,)
+    newton: Reals1  # (5,)
     wanted: Places1  # whether a step is to be looked into
     resolved: Reals1  # the longest step over which event functions can be followed
     sought: Places1  # the event function whose minimum is sought, -1 if none is
@@ -76,28 +76,9 @@ class Inside(NamedTuple):
     wrong: Reals1  # what the polynomial may be wrong by
     narrow: Reals1  # part of the step below which it is not sought closer
     floor: Reals1  # below 0: what is not told from it
-    bracket: Reals2  # parts below, at and above the least value that is known
+    bracket: Reals2  # (3, lanes): parts below, at and above the least value that is known
     height: Reals2  # and the values there
     table: Places2
-
-
-def new_events(rows: int, lanes: int) -> Events:
-    """Return the arrays for so many rows of g."""
-    every = dict.fromkeys(Events._fields[:-1], (rows, lanes))
-    return arrays_of(Events, **every | {"g_inside": (4, rows, lanes)})
-
-
-def new_memories(count: int, lanes: int) -> Memories:
-    """Return the arrays for so many memories."""
-    every = dict.fromkeys(Memories._fields[:-1], (count, lanes))
-    return arrays_of(Memories, **every | {"m_inside": (4, count, lanes)})
-
-
-def new_inside(lanes: int) -> Inside:
-    """Return the arrays for looks at the inside of steps."""
-    every = dict.fromkeys(Inside._fields[:-1], (lanes,))
-    several = dict.fromkeys(("bracket", "height"), (3, lanes))
-    return arrays_of(Inside, **every | dict.fromkeys(("values", "newton"), (5,)) | several)
 
 
 @numba.njit(**INNER)

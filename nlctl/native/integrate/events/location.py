@@ -28,11 +28,9 @@ PATIENCE, REST = 3, 20  # after so many short ones, so many steps without memory
 
 @numba.njit(**INNER)
 def triggered(start, end, behind):
-    """Whether a switching function's values at the ends of a step show an event in between.
-
-    With `behind` its own event was the end of the step before: on a surface that attracts from
-    both sides, going back through it at once is no event.
-    """
+    """Whether a switching function's values at the ends of a step show an event in between."""
+    # With `behind` its own event was the end of the step before: on a surface that attracts from
+    # both sides, going back through it at once is no event.
     return opposite(start, end) and not (behind and abs(start) <= STARTS_BEHIND * abs(end))
 
 
@@ -44,11 +42,9 @@ def behind_event(rtol):
 
 @numba.njit(**INNER)
 def first_root(lane, task, every, w, low, high, j):
-    """Return where the first event between the lengths low and high lies, -1 if there is none.
-
-    `low` and `high` are values of the switching functions there.  Conditions at which something may
-    jump, and guards, are for `crossing`, unless `every` event is asked for.
-    """
+    """Return where the first event between the lengths low and high lies, -1 if there is none."""
+    # `low` and `high` are values of the switching functions there. Conditions at which something
+    # may jump, and guards, are for `crossing`, unless `every` event is asked for.
     first, rows, small = -1.0, task.rows, SMALL_KINK * task.atol
     start, behind = w.events.g_start, w.events.behind
     for i in range(rows.switching if every else rows.declared):
@@ -63,10 +59,8 @@ def first_root(lane, task, every, w, low, high, j):
 
 @numba.njit(**INNER)
 def first_turn(lane, w, low, high, j):
-    """Return where the first memory between the lengths low and high turns, -1 if none does.
-
-    `low` and `high` are the rates there.
-    """
+    """Return where the first memory between the lengths low and high turns, -1 if none does."""
+    # `low` and `high` are the rates there.
     first, start = -1.0, w.memories.rate_start
     for i in range(start.shape[0]):
         if start[i, j] != 0.0 and not opposite(start[i, j], -high[i, j]):
@@ -87,10 +81,8 @@ def _root(lane, low, high):
 
 @numba.njit(**INNER)
 def locate(lane, task, w, j):
-    """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT.
-
-    With AGAIN, ``lane.step`` is the next length to try.
-    """
+    """Look for events in the step just tried: AGAIN, or accepted as CLEAR or with an EVENT."""
+    # With AGAIN, ``lane.step`` is the next length to try.
     root, memory = _narrowed(lane, task, w, j)
     if root < 0.0:
         return CLEAR
@@ -115,10 +107,8 @@ def locate(lane, task, w, j):
 
 @numba.njit(**INNER)
 def _narrowed(lane, task, w, j):
-    """Take the attempt into the bracket; return the first root in it, -1 if there is none.
-
-    And whether it is a memory's.
-    """
+    """Take the attempt into the bracket; return the first root in it, -1 if there is none."""
+    # And whether it is a memory's.
     events, memories, before, weight, inside = w.events, w.memories, lane.high, 1.0, True
     if lane.tries == 0:
         lane.low, lane.high, lane.same_side = 0.0, lane.step, 0
@@ -161,11 +151,9 @@ def _nearer(inside, weight, low, high, end, j):
 
 @numba.njit(**INNER)
 def jumped(task, lane, w, j):
-    """Whether a memory that stands still at both ends of the step just tried is another behind it.
-
-    And no event of the step says why.  Where such a jump is being located, one at a stage counts:
-    it is the first that is sought.
-    """
+    """Whether a memory that stands still at both ends of a step just tried is another behind it."""
+    # And no event of the step says why. Where such a jump is being located, one at a stage counts:
+    # it is the first that is sought.
     memories, events = w.memories, w.events
     for i in range(memories.m.shape[0]):
         before = w.x_new[task.rows.memory[i], j]
@@ -201,7 +189,7 @@ def locate_jump(lane, rtol, is_behind):
     else:
         lane.low = lane.step
     lane.tries += 1
-    rest = max(min(10.0 * rtol, 1e-4) * lane.high, 4e-16 * abs(lane.t))
+    rest = max(behind_event(rtol) * lane.high, 4e-16 * abs(lane.t))
     found = lane.high - lane.low <= rest
     if found and (is_behind or lane.low == lane.high):
         return EVENT

@@ -11,20 +11,18 @@ import numpy as np
 
 from ..methods.dense import events_at_parts
 from ..state import INNER, opposite
-from .location import EVENT
+from .location import EVENT, behind_event
 
 _HALVINGS = 24  # of the way to a break point that is farther back
 
 
 @numba.njit(**INNER)
 def look_before(rhs, task, lanes, w, found):
-    """Make memories in w.memories.m what they are just before a break point that ends a step.
-
-    Behind it, what carries a memory along may have jumped back: it keeps what it was before.
-    """
+    """Make memories in w.memories.m what they are just before a break point that ends a step."""
+    # Behind it, what carries a memory along may have jumped back: it keeps what it was before.
     inside, ahead, memories = w.inside, w.ahead, w.memories
     wanted, any_wanted, nearer = inside.wanted, False, w.events.g_inside[3]
-    back = 2.5 * min(10.0 * task.rtol, 1e-4)  # see `locate`: the break point is not so far back
+    back = 2.5 * behind_event(task.rtol)  # the break point is not so far back
     for j in range(lanes.size):
         wanted[j] = found[j] == EVENT and _crosses(task, w, w.events.g, j)
         any_wanted |= wanted[j]
@@ -52,17 +50,13 @@ def look_before(rhs, task, lanes, w, found):
 
 @numba.njit(**INNER)
 def _halve(rhs, task, lanes, w, back):
-    """Set w.inside.part right before the first break point of the lanes that are sought.
-
-    Where a memory turns at the break point at which its input jumps, a step ends farther behind.
-    """
+    """Set w.inside.part right before the first break point of the lanes that are sought."""
+    # Where a memory turns at the break point at which its input jumps, a step ends farther behind.
     inside = w.inside
     for j in range(lanes.size):
         if inside.sought[j] > 0:
-            inside.bracket[0, j], inside.bracket[2, j] = (
-                lanes[j].low / lanes[j].step,
-                1.0 - back,
-            )
+            inside.bracket[0, j] = lanes[j].low / lanes[j].step
+            inside.bracket[2, j] = 1.0 - back
             inside.part[j] = 0.5 * (inside.bracket[0, j] + inside.bracket[2, j])
     for _ in range(_HALVINGS):
         events_at_parts(rhs, task, lanes, w, w.ahead.g, w.ahead.m)

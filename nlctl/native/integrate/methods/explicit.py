@@ -50,11 +50,9 @@ def explicit_attempt(rhs, task, lanes, w):
 
 @numba.njit(**INNER)
 def combined(x, h, A, k, s, result):
-    """Fill `result` with x + h (A[s, 0] k[0] + ... + A[s, s-1] k[s-1]).
-
-    All are flat, over states and lanes, so that SIMD registers are full whatever the number of
-    lanes; one loop per stage keeps every loop free of decisions.
-    """
+    """Fill `result` with x + h (A[s, 0] k[0] + ... + A[s, s-1] k[s-1])."""
+    # All are flat, over states and lanes, so that SIMD registers are full whatever the number of
+    # lanes; one loop per stage keeps every loop free of decisions.
     a0, a1, a2, a3, a4, a5 = A[s, 0], A[s, 1], A[s, 2], A[s, 3], A[s, 4], A[s, 5]
     if s == 1:
         for j in range(x.size):
@@ -119,13 +117,11 @@ def weighed(x, x_new, change, rtol, atol, result):
 
 @numba.njit(**INNER)
 def errors(parts, x_new, x_stage, k, error, rate):
-    """Fill, lane by lane, the error over its tolerance, and the fastest rate seen (1/s).
-
-    The error is the largest of the states' `parts`; it is not finite if a state is not.  (A mean
-    would let the many weights of a network hide the few states that move.)  The rate
-    |k_m - k_{m-1}| / |x_m - x_{m-1}| of the two stages at the end of the step estimates the
-    largest eigenvalue (Hairer, Wanner, Solving ODEs II, IV.2).
-    """
+    """Fill, lane by lane, the error over its tolerance, and the fastest rate seen (1/s)."""
+    # The error is the largest of the states' `parts`; it is not finite if a state is not. (A mean
+    # would let the many weights of a network hide the few states that move.) The rate |k_m -
+    # k_{m-1}| / |x_m - x_{m-1}| of the two stages at the end of the step estimates the largest
+    # eigenvalue (Hairer, Wanner, Solving ODEs II, IV.2).
     n, lanes = x_new.shape
     last = k.shape[0] - 1
     for j in range(lanes):

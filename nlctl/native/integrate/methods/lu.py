@@ -9,11 +9,12 @@ whole, with partial pivoting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
+from ..memory import Places2, Unsigned1, arrays_alike, with_table
 from ..state import DIRECTIONS, INNER
 
 # pivot, of the entries below it; as in KLU (Davis and Natarajan, TOMS 907, 2010)
@@ -21,54 +22,33 @@ LEAST_PIVOT = 1e-3
 SPARSE = 0.3  # of all entries; with more of them loops over all are faster
 
 
-@dataclass(frozen=True, kw_only=True)
-class Elimination:
+class Elimination(NamedTuple):
     """An order of pivots, and where the factors have entries.
 
     The entries are kept row by row in the order of the pivots: those on the left of the pivot,
     it, those on its right.
-
-    Attributes
-    ----------
-    order : ndarray of uint64
-        The diagonal entries, as they are eliminated; empty for elimination of whole columns.
-    rank : ndarray of uint64
-        When each of them is eliminated.
-    start : ndarray of uint64
-        Where the entries of each pivot's row begin; one more, for the end.
-    pivot : ndarray of uint64
-        Where each pivot is among them.
-    column : ndarray of uint64
-        The column of each entry; in a row those on the left in the order of the pivots.
-    source : ndarray of uint64
-        Where entries come from (`jacobian_place`).
-    target : ndarray of uint64
-        Where among them eliminations subtract: for each row, for each entry on the left, for each
-        on the right in the row of its column's pivot.
     """
 
-    order: np.ndarray
-    rank: np.ndarray
-    start: np.ndarray
-    pivot: np.ndarray
-    column: np.ndarray
-    source: np.ndarray
-    target: np.ndarray
+    order: Unsigned1  # the diagonal entries, as they are eliminated; none: by whole columns
+    rank: Unsigned1  # when each of them is eliminated
+    start: Unsigned1  # where the entries of each pivot's row begin; one more, for the end
+    pivot: Unsigned1  # where each pivot is among them
+    column: Unsigned1  # of each entry; in a row those on the left in the order of the pivots
+    source: Unsigned1  # where entries come from (`jacobian_place`)
+    # where among them eliminations subtract: for each row, for each entry on the left, for each on
+    # the right in the row of its column's pivot
+    target: Unsigned1
+    table: Places2
 
 
 INDEX = np.uint64  # without a sign: numba asks of the others whether they count from the end
 ONE = INDEX(1)
-_NONE = np.zeros(0, dtype=INDEX)
-WHOLE = Elimination(
-    order=_NONE, rank=_NONE, start=_NONE, pivot=_NONE, column=_NONE, source=_NONE, target=_NONE
-)
+WHOLE = arrays_alike(Elimination, (0,))
 
 
 def elimination(structure: np.ndarray) -> Elimination:
-    """Order pivots after Markowitz: the next is the one that can create the fewest entries.
-
-    Shapes: `structure` (n, n).
-    """
+    """Order pivots after Markowitz: the next is the one that can create the fewest entries."""
+    # Shapes: `structure` (n, n).
     n = len(structure)
     here = structure | np.eye(n, dtype=bool)
     waiting, order, below, right = np.ones(n, dtype=bool), [], [], []
@@ -87,12 +67,10 @@ def elimination(structure: np.ndarray) -> Elimination:
 
 
 def cost(n: int, order: Elimination) -> float:
-    """Return what a step of the stiff method for n states takes, in steps of the explicit one.
-
-    Measured, of eight diagrams within a factor of 2: 2 for what does not depend on n, the Jacobian
-    matrix, and one step for 1500 multiplications in factorising and in nine solutions, or for 6000
-    where whole columns fill SIMD registers.
-    """
+    """Return what a step of the stiff method for n states takes, in steps of the explicit one."""
+    # Measured, of eight diagrams within a factor of 2: 2 for what does not depend on n, the
+    # Jacobian matrix, and one step for 1500 multiplications in factorising and in nine solutions,
+    # or for 6000 where whole columns fill SIMD registers.
     if order.order.size:
         return 2.0 + 0.06 * n + (order.target.size + 9 * order.source.size) / 1500.0
     return 2.0 + 0.06 * n + (n**3 / 3 + 9 * n * n) / 6000.0
@@ -115,7 +93,8 @@ def _placed(order: list[int], below: list[np.ndarray], right: list[np.ndarray]) 
         for p, one in zip(order, left, strict=True) for q in one for j in right[rank[q]]
     ]  # fmt: skip
     start = np.cumsum([0, *map(len, rows)], dtype=INDEX)
-    return Elimination(
+    return with_table(
+        Elimination,
         order=np.array(order, dtype=INDEX),
         rank=rank.astype(INDEX),
         start=start,
@@ -127,10 +106,8 @@ def _placed(order: list[int], below: list[np.ndarray], right: list[np.ndarray]) 
 
 
 def jacobian_place(i: int, j: int, n: int) -> int:
-    """Return where the entry of row i and column j of n states is kept, time in column n.
-
-    Columns are kept as they are made: `DIRECTIONS` of them together, row by row.
-    """
+    """Return where the entry of row i and column j of n states is kept, time in column n."""
+    # Columns are kept as they are made: `DIRECTIONS` of them together, row by row.
     return (j // DIRECTIONS * n + i) * DIRECTIONS + j % DIRECTIONS
 
 
@@ -162,17 +139,10 @@ def solve(method, only_entries, work, b):
 
 @numba.njit(**INNER)
 def _factorise_entries(method, diagonal, jacobian, factors):
-    """Factorise with the pivots of an `Elimination`; return whether all are large enough.
-
-    Row by row: what is subtracted is on the right of pivots that are done.  Of these their
-    inverses are kept.
-    """
-    start, pivot, column, rank = (
-        method.start,
-        method.pivot,
-        method.column,
-        method.rank,
-    )
+    """Factorise with the pivots of an `Elimination`; return whether all are large enough."""
+    # Row by row: what is subtracted is on the right of pivots that are done. Of these their
+    # inverses are kept.
+    start, pivot, column, rank = method.start, method.pivot, method.column, method.rank
     source, target, done = method.source, method.target, INDEX(0)
     for e in range(source.size):
         factors[e] = -jacobian[source[e]]
@@ -196,12 +166,7 @@ def _factorise_entries(method, diagonal, jacobian, factors):
 @numba.njit(**INNER)
 def _solve_entries(method, factors, b):
     """Solve with the factors of `_factorise_entries`, both times by sums over rows."""
-    order, start, pivot, column = (
-        method.order,
-        method.start,
-        method.pivot,
-        method.column,
-    )
+    order, start, pivot, column = method.order, method.start, method.pivot, method.column
     for k in range(order.size):
         total = b[order[k]]
         for e in range(start[k], pivot[k]):
@@ -223,20 +188,17 @@ def multiply(method, jacobian, v, product):
         for j in range(0 if method.order.size else n):
             product[i] += jacobian[place(i, j, n)] * v[j]
     for k in range(method.order.size):
-        for e in range(
-            method.start[k], method.start[k + 1]
-        ):  # also where only factors have entries
+        # also where only factors have entries
+        for e in range(method.start[k], method.start[k + 1]):
             product[method.order[k]] += jacobian[source[e]] * v[column[e]]
 
 
 @numba.njit(**INNER)
 def _factorise_all(columns, pivots):
-    """Factorise a square matrix in place, P M = L U, with partial pivoting.
-
-    Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
-    adds nothing up, so that SIMD registers are full and no order of additions is left to a
-    compiler.
-    """
+    """Factorise a square matrix in place, P M = L U, with partial pivoting."""
+    # Row `c` of `columns` is the matrix's column `c`: every inner loop then runs through memory and
+    # adds nothing up, so that SIMD registers are full and no order of additions is left to a
+    # compiler.
     n = columns.shape[0]
     for c in range(n):
         best = c

@@ -12,11 +12,9 @@ _POINTS = 32
 
 @numba.njit(**INNER)
 def quartic(f, at, n):
-    """Fill `n` with Newton's coefficients of the polynomial through `f` at 0, `at` and 1.
-
-    The nodes, see `following_nodes`, are taken in the order 0, at[0], at[1], 1, at[2]: the last
-    coefficient is what the third value inside says besides the other four.
-    """
+    """Fill `n` with Newton's coefficients of the polynomial through `f` at 0, `at` and 1."""
+    # The nodes, see `following_nodes`, are taken in the order 0, at[0], at[1], 1, at[2]: the last
+    # coefficient is what the third value inside says besides the other four.
     a, b, c = at[0], at[1], at[2]
     n[0] = f[0]
     n[1] = (f[1] - f[0]) / a
@@ -46,10 +44,8 @@ def slope_at(n, at, x):
 
 @numba.njit(**INNER)
 def doubt(n, at):
-    """Return by how much the polynomial may be wrong.
-
-    That is its last term, or a tenth of the one before: both do not vanish by chance.
-    """
+    """Return by how much the polynomial may be wrong."""
+    # That is its last term, or a tenth of the one before: both do not vanish by chance.
     return max(at[4] * abs(n[4]), 0.1 * at[3] * abs(n[3]))
 
 
@@ -62,11 +58,9 @@ def following_nodes(parts):
 
 @numba.njit(**INNER)
 def least_value(n, at, slope, inner=False):
-    """Return the least value of the polynomial, or with `slope` of its derivative, and its place.
-
-    On a grid of [0, 1] that is closer at both ends, where steps begin and end near minima; of the
-    parabola through the three values around the least one.  `inner` ones are minima in between.
-    """
+    """Return the least value of a polynomial, or with `slope` of its derivative, and its place."""
+    # On a grid of [0, 1] that is closer at both ends, where steps begin and end near minima; of the
+    # parabola through the three values around the least one. `inner` ones are minima in between.
     least, where = np.inf, 0
     for k in range(_POINTS + 1):
         y = _either(n, at, _node(k), slope)
@@ -95,10 +89,8 @@ def _is_undercut(n, at, slope, k, y):
 
 @numba.njit(**INNER)
 def parabola(low, middle, high, below, least, above):
-    """Return the slope at the middle of three places, and the bend, of the parabola through them.
-
-    It is least + slope (x - middle) + bend (x - middle)^2.
-    """
+    """Return the slope at the middle of three places, and the bend of the parabola through them."""
+    # It is least + slope (x - middle) + bend (x - middle)^2.
     left, right = (least - below) / (middle - low), (above - least) / (high - middle)
     bend = (right - left) / (high - low)
     return left + bend * (middle - low), bend

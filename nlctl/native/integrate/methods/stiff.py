@@ -10,7 +10,7 @@ import numpy as np
 from ...machine.address import call_along, call_point
 from ..control import TRIAL, memory_error
 from ..evaluate import evaluate, inputs_at
-from ..memory import Places1, Places2, Reals1, Reals2, Reals3, Unsigned1, with_table
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table
 from ..state import DIRECTIONS, INNER
 from . import lu, rodas5p
 from .lu import Elimination, cost, place
@@ -30,13 +30,7 @@ class StiffMethod(NamedTuple):
     derivatives: int  # UNKNOWN until it asks for them
     c: Reals2  # what exact ones read besides their arguments
     cost: float  # of a step, in explicit ones
-    order: Unsigned1  # of pivots, and where their entries are: see `lu.Elimination`
-    rank: Unsigned1
-    start: Unsigned1
-    pivot: Unsigned1
-    column: Unsigned1
-    source: Unsigned1
-    target: Unsigned1
+    elimination: Elimination
     table: Places2
 
 
@@ -60,9 +54,10 @@ class StiffArrays(NamedTuple):
 
 def stiff_method(n: int, derivatives: int, c: np.ndarray, order: Elimination) -> StiffMethod:
     """Return the stiff method for n states."""
+    cost_of_step = cost(n, order)
     return with_table(
-        StiffMethod, derivatives=derivatives, c=c, cost=cost(n, order), **vars(order)
-    )  # fmt: skip
+        StiffMethod, derivatives=derivatives, c=c, cost=cost_of_step, elimination=order
+    )
 
 
 def new_stiff(n: int, inputs: int) -> StiffArrays:
@@ -95,10 +90,8 @@ def directions(n: int, inputs: int) -> np.ndarray:
 
 @numba.njit(**INNER)
 def _jacobian(rhs, point, along, task, lanes, w):
-    """Fill w.stiff.jacobian and w.stiff.f_t at the start of a step.
-
-    Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
-    """
+    """Fill w.stiff.jacobian and w.stiff.f_t at the start of a step."""
+    # Where a derivative is not finite, that of sqrt(x) at 0 for instance, differences are taken.
     lane = lanes[0]
     w.t[0] = lane.t
     if task.stiff.derivatives == DIFFERENCES or not _exact(point, along, task, lanes, w):
@@ -124,19 +117,12 @@ def _exact(point, along, task, lanes, w):
     for i in range(task.inputs.shape[0]):  # inputs change as time goes on
         rise = task.inputs[i, k + 1] - task.inputs[i, k]
         stiff.v[last, n + i, n - last * wide] = rise / (task.times[k + 1] - task.times[k])
-    call_point(point, stiff.t_along, stiff.x_along, stiff.u_along, task.stiff.c)
+    t, x, u, c = stiff.t_along, stiff.x_along, stiff.u_along, task.stiff.c
+    call_point(point, t, x, u, c)
     total = 0.0
     for part in range(last + 1):
         found = stiff.jacobian[part]
-        call_along(
-            along,
-            stiff.t_along,
-            stiff.x_along,
-            stiff.u_along,
-            task.stiff.c,
-            stiff.v[part],
-            found,
-        )
+        call_along(along, t, x, u, c, stiff.v[part], found)
         for i in task.rows.memory:
             for j in range(wide):
                 found[i, j] = 0.0
@@ -179,7 +165,7 @@ def _spectral_radius(task, w):
         v[i] = 0.5 + (0.6180339887 * (i + 1)) % 1.0  # like no matrix's null space
     for _ in range(8):
         before, after = 0.0, 0.0
-        lu.multiply(task.stiff, w.stiff.jacobian_flat, v, product)
+        lu.multiply(task.stiff.elimination, w.stiff.jacobian_flat, v, product)
         for i in range(n):
             before += v[i] * v[i]
             after += product[i] * product[i]
@@ -193,18 +179,16 @@ def _spectral_radius(task, w):
 
 @numba.njit(**INNER)
 def _memory_error(rhs, task, lanes, w, only_entries):
-    """Return the largest error of what memories would become, over its tolerance.
-
-    Estimated by the defect f - x' of the solution at the end of the step, divided by
-    1 / (h gamma) - J.  Most of that is the polynomial's, which is of order 3 in what fast
-    components amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
-    """
+    """Return the largest error of what memories would become, over its tolerance."""
+    # Estimated by the defect f - x' of the solution at the end of the step, divided by 1 / (h
+    # gamma) - J. Most of that is the polynomial's, which is of order 3 in what fast components
+    # amplify; less than `SHARE` of it (a tenth, measured) is the solution's, of order 4.
     ahead = w.ahead
     error = w.x_stage_flat  # not needed any more
     rodas5p.end_slope(lanes[0].step, w.x_flat, w.x_new_flat, w.stiff.U, error)
     for i in range(error.size):
         error[i] = w.k[w.k.shape[0] - 1, i, 0] - error[i]
-    lu.solve(task.stiff, only_entries, w.stiff, error)
+    lu.solve(task.stiff.elimination, only_entries, w.stiff, error)
     for i in range(error.size):
         ahead.x[i, 0] = w.x_new[i, 0] + error[i]
     evaluate(rhs, task, lanes, w, ahead.x, ahead.dx, ahead.g, ahead.m)
@@ -214,13 +198,13 @@ def _memory_error(rhs, task, lanes, w, only_entries):
 @numba.njit(**INNER)
 def stiff_attempt(rhs, point, along, task, lanes, w):
     """Try a step of Rodas5P in the only lane."""
-    stiff = w.stiff
+    stiff, order = w.stiff, task.stiff.elimination
     n, lane, h = w.x.shape[0], lanes[0], lanes[0].step
     if lane.jacobian_at != lane.t:
         _jacobian(rhs, point, along, task, lanes, w)
         if (lane.stiff + 1) % TRIAL == 0:  # when the methods are compared
             w.rate[0] = _spectral_radius(task, w)
-    only_entries = lu.factorise(task.stiff, 1.0 / (h * rodas5p.GAMMA), stiff)
+    only_entries = lu.factorise(order, 1.0 / (h * rodas5p.GAMMA), stiff)
     for s in range(rodas5p.STAGES):
         w.t[0] = lane.t + rodas5p.NODES[s] * h
         if s == 0:
@@ -231,7 +215,7 @@ def stiff_attempt(rhs, point, along, task, lanes, w):
             g, m = w.events.g_inside[rodas5p.KEPT[s]], w.memories.m_inside[rodas5p.KEPT[s]]
             evaluate(rhs, task, lanes, w, w.x_stage, w.ahead.dx, g, m)
         rodas5p.right_side(s, h, w.ahead.dx_flat, stiff.f_t, stiff.U)
-        lu.solve(task.stiff, only_entries, stiff, stiff.U[s])
+        lu.solve(order, only_entries, stiff, stiff.U[s])
     for i in range(n):
         w.x_new[i, 0] = w.x_stage[i, 0] + stiff.U[7, i]
     w.t[0] = lane.t + h

@@ -70,19 +70,16 @@ OTHER_METHOD = with_table(
 
 def new_terms(orders: int, rows: int, inputs: int, lanes: int) -> TaylorArrays:
     """Return the arrays for so many orders and rows of coefficients."""
-    counted = np.zeros(lanes, dtype=np.int64)
     return with_table(
-        TaylorArrays, terms=zeros((orders, rows, lanes)), expanded=counted,
+        TaylorArrays, terms=zeros((orders, rows, lanes)), expanded=np.zeros(lanes, dtype=np.int64),
         u_rate=np.zeros((inputs, lanes)), largest=np.zeros((4, lanes)),
     )  # fmt: skip
 
 
 @numba.njit(**INNER)
 def expand(task, lanes, w):
-    """Fill the coefficients of lanes that have gone on, and propose the steps that these allow.
-
-    A step that is tried again with another length has its coefficients already.
-    """
+    """Fill the coefficients of lanes that have gone on, and propose the steps that these allow."""
+    # A step that is tried again with another length has its coefficients already.
     taylor = w.taylor
     stale, series = False, task.taylor.functions
     for j in range(lanes.size):
@@ -127,11 +124,9 @@ def _lacks_terms(task, w, j):
 
 @numba.njit(**INNER)
 def _begins_at_jump(task, lane, terms, j):
-    """Whether something compared is equal where the step begins, and is not right behind.
-
-    The right-hand side may have another value there than on the side on which the solution goes
-    on, and with it the first coefficients: a step that leaves the place is tried first, once.
-    """
+    """Whether something compared is equal where the step begins, and is not right behind."""
+    # The right-hand side may have another value there than on the side on which the solution goes
+    # on, and with it the first coefficients: a step that leaves the place is tried first, once.
     if lane.accepted and lane.last <= _shortest(task):
         return False
     for i in range(task.taylor.sides.shape[0]):
@@ -182,11 +177,9 @@ def taylor_attempt(rhs, task, lanes, w):
 
 @numba.njit(**INNER)
 def _look_inside(rhs, task, lanes, w):
-    """Look at what is on another side in steps, and at the defect in those that end at an event.
-
-    There it is right before the event, and at places ever closer to it: the end lies behind, and
-    at an event a defect may vanish that is large before, of friction near rest for instance.
-    """
+    """Look at what is on another side in steps, and at the defect in those that end at an event."""
+    # There it is right before the event, and at places ever closer to it: the end lies behind, and
+    # at an event a defect may vanish that is large before, of friction near rest for instance.
     inside = w.inside
     wanted = False
     for j in range(lanes.size):
@@ -207,10 +200,8 @@ def _look_inside(rhs, task, lanes, w):
 
 @numba.njit(**INNER)
 def _aim(task, lanes, w):
-    """Shorten steps to right behind the first event that polynomials of the lanes foresee.
-
-    That is where `locate` would end after some attempts.
-    """
+    """Shorten steps to right behind the first event that polynomials of the lanes foresee."""
+    # That is where `locate` would end after some attempts.
     for j in range(lanes.size):
         w.inside.part[j] = 1.0
     events_at(task, lanes, w, w.ahead.g)
@@ -230,11 +221,9 @@ def _aim(task, lanes, w):
 
 @numba.njit(**INNER)
 def _farthest(task, w, i, h, j):
-    """Return the part of a step h at which it is farthest behind the event that it begins with.
-
-    It goes back through that event in the step, which is none of its own from so near to it; 1 if
-    it is behind nowhere.
-    """
+    """Return the part of a step h at which it is farthest behind the event that it begins with."""
+    # It goes back through that event in the step, which is none of its own from so near to it; 1 if
+    # it is behind nowhere.
     p, row, start = task.taylor.highest - 1, w.x.shape[0] + i, w.events.g_start[i, j]
     part, most = 1.0, abs(start) + SMALL_KINK * task.atol
     for n in range(1, _LOOKS):
@@ -300,12 +289,10 @@ def events_at(task, lanes, w, g):
 
 @numba.njit(**INNER)
 def _error(task, w, j):
-    """Return the error of a lane's step over its tolerance; not finite if a state is not.
-
-    What the polynomial lacks is e h^(p+1), and its defect (p + 1) e h^p.  Where the last term does
-    not foresee a defect of that size, the solution is not smooth, and the defect counts in full.
-    In a step with an event the right-hand side has changed before the end: the last term counts.
-    """
+    """Return the error of a lane's step over its tolerance; not finite if a state is not."""
+    # What the polynomial lacks is e h^(p+1), and its defect (p + 1) e h^p. Where the last term does
+    # not foresee a defect of that size, the solution is not smooth, and the defect counts in full.
+    # In a step with an event the right-hand side has changed before the end: the last term counts.
     defect, term = w.taylor.largest[0, j], w.taylor.largest[1, j]
     if w.inside.looked[j] != 0.0:  # on another side inside: a shorter step is to be tried
         return (0.9 / min(w.inside.foreseen[j], 0.8)) ** task.pair.order + 0.0 * (defect + term)
@@ -318,18 +305,13 @@ def _error(task, w, j):
 
 @numba.njit(**INNER)
 def _compare(task, lane, w, j):
-    """Look whether something compared is on another side inside of a lane's step.
-
-    ``foreseen`` becomes the first part of the step at which it is, and ``looked`` where it is
-    farthest there, 0 if nothing is; below 0 if that is more than one comparison.  Before an event,
-    if there is one: it is located by itself.
-
-    What changes so fast that its polynomial says little asks for a shorter step as well.
-
-    Polynomials are looked at in `_LOOKS` places, unless their terms together are less than the
-    first.  A shorter step is not asked for without end: what begins so near to a kink that rounding
-    cannot tell may go through it.
-    """
+    """Look whether something compared is on another side inside of a lane's step."""
+    # ``foreseen`` becomes the first part of the step at which it is, and ``looked`` where it is
+    # farthest there, 0 if nothing is; below 0 if that is more than one comparison. Before an event,
+    # if there is one: it is located by itself. What changes so fast that its polynomial says little
+    # asks for a shorter step as well. Polynomials are looked at in `_LOOKS` places, unless their
+    # terms together are less than the first. A shorter step is not asked for without end: what
+    # begins so near to a kink that rounding cannot tell may go through it.
     events, inside, taylor = w.events, w.inside, w.taylor
     inside.looked[j], inside.foreseen[j] = 0.0, 1.0
     if not taylor.largest[2, j] > 0.0:
@@ -391,12 +373,6 @@ def _is_followed(highest, h, terms, row, j):
 
 
 @numba.njit(**INNER)
-def _last_terms(p, h, terms, row, j):
-    """Return what a polynomial may be wrong by at h: its last two terms."""
-    return h ** (p - 1.0) * (abs(terms[p - 1, row, j]) + abs(h * terms[p, row, j]))
-
-
-@numba.njit(**INNER)
 def _turning(p, h, terms, row, ends, slopes, j):
     """Return about where a polynomial's slope is 0, between two places where its signs differ."""
     (low, high), (first, last), least = ends, slopes, 0.0
@@ -429,7 +405,8 @@ def _crossing(p, h, terms, row, side, until, j):
         if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
             least = _turning(p, h, terms, row, (before, part), (steep, slope), j)
             under = _value_and_slope(p, least * h, terms, row, j)[0] * side
-            lacks = _last_terms(p, least * h, terms, row, j)
+            at = least * h  # what it may be wrong by there are its last two terms
+            lacks = at ** (p - 1.0) * (abs(terms[p - 1, row, j]) + abs(at * terms[p, row, j]))
             if under < (lacks if lacks > _ROUNDED * extent * h else 0.0) and least < until:
                 first, farthest, most = min(first, least), least, max(most, -under)
         fell, steep = slope * side < 0.0, slope
@@ -452,11 +429,9 @@ def _value_and_slope(highest, h, terms, row, j):
 
 @numba.njit(**INNER)
 def _look_across(rhs, task, lanes, w):
-    """Forget what is on another side where the right-hand side is what it would be on this one.
-
-    That is the case of a comparison whose result does not matter there, or not yet.  Where a step
-    ends behind an event, look at the defect right before the event instead.
-    """
+    """Forget what is on another side where the right-hand side is what it would be on this one."""
+    # That is the case of a comparison whose result does not matter there, or not yet. Where a step
+    # ends behind an event, look at the defect right before the event instead.
     inside = w.inside
     dx, p = w.x_stage, task.taylor.highest
     for j in range(lanes.size):

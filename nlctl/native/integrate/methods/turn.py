@@ -12,10 +12,8 @@ MEASURED = 50  # the last explicit steps before that
 
 @numba.njit(**INNER)
 def is_to_change(task, lane):
-    """Whether a run of the method "auto" is to go on by Taylor's method, or not any more.
-
-    Both are measured in turn, see `nlctl.native.taylor.turns`.
-    """
+    """Whether a run of the method "auto" is to go on by Taylor's method, or not any more."""
+    # Both are measured in turn, see `nlctl.native.taylor.turns`.
     if task.taylor.compared == 0:
         return False
     if lane.stiff:
