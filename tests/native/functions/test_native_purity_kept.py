@@ -11,6 +11,7 @@ from nlctl.errors import CompileError
 
 COUNT = [0]
 GAIN = 2.0
+TALKS = False
 
 
 class Counting:
@@ -161,6 +162,22 @@ def test_a_constant_of_a_class_is_looked_at_again(monkeypatch):
     monkeypatch.setitem(globals(), "GAIN", 3.0)
     with pytest.raises(nlctl.errors.UsageError, match="compile again"):
         nlctl.input_output_response(compiled, [0.0, 1.0], 0.0, [1.0, 2.0])
+
+
+def prints_where_told(t, x, u, p):
+    if TALKS:
+        print(x)
+    return -GAIN * x
+
+
+def test_a_branch_that_is_off_is_looked_at_again(monkeypatch):
+    compiled = nlctl.compile(block(prints_where_told))
+    np.testing.assert_array_equal(compiled.dynamics(0.0, [1.0, 2.0], [0.0]), [-2.0, -4.0])
+    monkeypatch.setitem(globals(), "TALKS", True)
+    with pytest.raises(nlctl.errors.UsageError, match="compile again"):
+        nlctl.input_output_response(compiled, [0.0, 1.0], 0.0, [1.0, 2.0])
+    with pytest.raises(CompileError, match=r"print\(\)"):
+        nlctl.compile(block(prints_where_told))
 
 
 def cache_of_what_changes(t, x, u, p):
