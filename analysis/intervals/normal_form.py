@@ -8,6 +8,7 @@ a symbol, or a function of a sum such as sin(2 x1).
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -41,6 +42,10 @@ class Atom:
         inner = (atom for terms in self.arguments for atom in _atoms(terms))
         return {self.name} if not self.arguments else {n for atom in inner for n in atom.names}
 
+    def __repr__(self) -> str:
+        given = ", ".join(str(_in_order(terms)) for terms in self.arguments)
+        return f"{self.name}({given}){self.data or ''}" if given else self.name
+
     def on(self, values: Mapping[str, Any]) -> Any:
         """Return the value where symbols have these values."""
         if not self.arguments:
@@ -66,11 +71,19 @@ def _atoms(terms: Monomials) -> Iterator[Atom]:
     return (atom for product, _ in terms for atom, _ in product)
 
 
+@functools.lru_cache(4096)
+def _in_order(terms: Monomials) -> list[tuple[list[tuple[Atom, int]], Fraction]]:
+    """Return terms in an order that is the same in every process: sums of balls depend on it."""
+    return sorted(
+        [(sorted(product, key=str), coefficient) for product, coefficient in terms], key=str
+    )
+
+
 def _value(terms: Monomials, values: Mapping[str, Any]) -> Any:
     total: Any = Ball(arb(0))
-    for product, coefficient in terms:
+    for factors, coefficient in _in_order(terms):
         term: Any = Ball(arb(fmpq(coefficient.numerator, coefficient.denominator)))
-        for atom, n in product:
+        for atom, n in factors:
             term = term * atom.on(values) ** n
         total = total + term
     return total

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import nlctl
+from nlctl.native.integrate.delays import POINTS, POWERS
 
 ENGINES = ("native", "python-control")
 
@@ -315,3 +316,11 @@ def test_discrete_time_is_refused():
     for engine in ENGINES:
         with pytest.raises(nlctl.errors.DiagramError, match="continuous time"):
             nlctl.input_output_response(nlctl.sampled(wire, 0.1), [0, 1], 0, engine=engine)
+
+
+def test_a_polynomial_of_degree_five_is_kept_as_it_is_on_every_machine():
+    """Coefficients follow exactly from nodes of 12 decimals: no cosine's or BLAS's last bit counts."""
+    z = 2 * POINTS - 1
+    np.testing.assert_allclose(POWERS @ z[:, None] ** np.arange(6), np.eye(6), atol=1e-14)
+    np.testing.assert_allclose(z, -np.cos(pi * (np.arange(6) + 0.5) / 6), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(np.round(z, 12), np.round(z, 15))

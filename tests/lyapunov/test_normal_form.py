@@ -1,5 +1,8 @@
 """Sums of products: equal to the equation wherever it is evaluated, and 0 where it is 0."""
 
+import os
+import subprocess
+import sys
 from fractions import Fraction
 
 import numpy as np
@@ -125,3 +128,25 @@ def test_blocks_compute_with_it():
     ]
     by_v = next(iter(indeterminate("v").terms))
     assert rate.coefficient(by_v) == Fraction(3)
+
+
+def test_an_enclosure_is_the_same_in_every_process():
+    """Terms are sets, and sets of texts have another order where texts have other hashes."""
+    program = (
+        "import numpy as np\n"
+        "from flint import arb\n"
+        "from nlctl.analysis.intervals.arithmetic import as_ball\n"
+        "from nlctl.analysis.intervals.normal_form import indeterminate\n"
+        "a, b, c, d = map(indeterminate, 'abcd')\n"
+        "sum_of = np.sin(a * b + c - 0.3 * d) * (a + b * c + np.tanh(d - b)) + a * c * d + b\n"
+        "balls = {n: as_ball(arb(k, 0.1)) for k, n in enumerate('abcd', 1)}\n"
+        "print(sum_of.on(balls).value.str(40, more=True))\n"
+    )
+    texts = {
+        subprocess.run(
+            [sys.executable, "-c", program], env=os.environ | {"PYTHONHASHSEED": seed},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for seed in ("1", "2", "3")
+    }  # fmt: skip
+    assert len(texts) == 1

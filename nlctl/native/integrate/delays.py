@@ -15,6 +15,8 @@ Arrays have the member ("lane") as their last index, as everywhere here.
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numba
 import numpy as np
 
@@ -26,9 +28,24 @@ from .methods import explicit
 from .state import INNER, RUNNING
 
 SMOOTH = 6  # level that a method of order 5 takes for smooth
-POINTS = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
-# values at the nodes -> coefficients of powers of z = 2 theta - 1
-POWERS = np.ascontiguousarray(np.linalg.inv(np.vander(2 * POINTS - 1, increasing=True)))
+# rounded, and what follows from them is exact: last bits of cosines and inverses differ by machine
+_NODES = np.round(np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1)), 12)
+POINTS = 0.5 - 0.5 * _NODES
+
+
+def _powers_at(nodes: list[Fraction]) -> np.ndarray:
+    """Return what makes of values at nodes z the coefficients of 1, z, z^2, ... that take them."""
+    columns = []
+    for node in nodes:
+        column = [Fraction(1)]
+        for other in (z for z in nodes if z != node):
+            shifted = zip([0, *column], [*column, 0], strict=True)
+            column = [(low - other * high) / (node - other) for low, high in shifted]
+        columns.append(column)
+    return np.ascontiguousarray(np.array(columns, dtype=float).T)
+
+
+POWERS = _powers_at([Fraction(float(z)) for z in 2 * POINTS - 1])  # z = 2 theta - 1
 IN_CHEBYSHEV = 2.0 ** (1 - DEGREE)  # of a power of z in the Chebyshev polynomial of the same degree
 JUMP = 1e-10  # of the time: a step so short that its signals still bend in has a jump inside
 ROUNDING = 1e-15  # of the time: two breaks so close are one
