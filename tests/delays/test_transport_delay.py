@@ -319,7 +319,7 @@ def test_discrete_time_is_refused():
 
 
 def test_a_polynomial_of_degree_five_is_kept_as_it_is_on_every_machine():
-    """Coefficients follow exactly from nodes of 12 decimals: no cosine's or BLAS's last bit counts."""
+    """Nodes have 12 decimals, and all follows exactly: last bits of cosine or BLAS do not count."""
     z = 2 * POINTS - 1
     np.testing.assert_allclose(POWERS @ z[:, None] ** np.arange(6), np.eye(6), atol=1e-14)
     np.testing.assert_allclose(z, -np.cos(pi * (np.arange(6) + 0.5) / 6), rtol=0, atol=1e-12)
