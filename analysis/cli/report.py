@@ -157,8 +157,8 @@ def report(
                 loop=str(what),
                 settings=set_ or [],
                 inputs=input_ or [],
-                until=until or USUAL_HORIZON,
-                step=step or USUAL_STEP,
+                until=USUAL_HORIZON if until is None else until,
+                step=USUAL_STEP if step is None else step,
             )
             written = _loop(run, require or [], options)
         else:

@@ -85,6 +85,14 @@ def test_each_is_one_sentence(folder):
     )
 
 
+@pytest.mark.parametrize("option", ["--until", "--step"])
+def test_nothing_is_not_taken_for_the_usual(folder, option):
+    """0 s is refused of a page as of a run."""
+    for command in ("simulate", "report"):
+        result = nlctl_here(command, "loops.py:make", option, "0", cwd=folder)
+        assert (result.returncode, "needs 0 < step < until" in result.stderr) == (2, True)
+
+
 @pytest.mark.parametrize("name", ["make", "rational", "discrete"])
 def test_paths_with_spaces_and_umlauts_and_every_kind_of_loop_run(folder, name):
     """A transfer function too, and a loop in discrete time at its own samples."""
