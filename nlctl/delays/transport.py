@@ -58,9 +58,9 @@ class TransportDelay:
     >>> wire = nlctl.block(nlctl.TransportDelay(inputs=("x",), outputs=("y",), delay=1.0), "wire")
     >>> plant = ct.ss(0, -1, 1, 0, inputs="y", outputs="x", name="plant")
     >>> loop = ct.interconnect([wire, plant], inputs=[], outputs=["x"], inplist=[])
-    >>> run = nlctl.input_output_response(loop, [0, 1, 2], 0, {"plant.x[0]": 1.0})
+    >>> run = nlctl.input_output_response(loop, [0, 1, 3], 0, {"plant.x[0]": 1.0})
     >>> [round(float(x), 6) for x in run.outputs[0]]  # x' = -x(t - 1), and 0 before t = 0
-    [1.0, 1.0, 0.0]
+    [1.0, 1.0, -0.5]
     """
 
     inputs: tuple[str, ...] = ("u",)
