@@ -13,7 +13,7 @@ import numpy as np
 from ..delays.variation import Variation
 from ..errors import ParameterError
 from .along import derivatives
-from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
+from .chattering.detection import WINDOW, asked, jump_of, new_paces, probe_of, snapshot
 from .compiled import Compiled
 from .diagram.program import instants_of
 from .discrete import simulate_discrete
@@ -71,12 +71,15 @@ def trajectory(
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
-            paces = new_paces(run.lanes)
+            paces, reported = new_paces(run.lanes), 0
             while run.lanes["status"][0] == RUNNING:
                 run = differentiated(compiled, watched(run, paces), p)
                 run = turned(compiled, run, p, settings)
-                if progress is not None:
-                    progress(float(run.lanes["t"][0]))
+                lane = run.lanes[0]
+                tried = lane["accepted"] + lane["rejected"] - reported
+                if progress is not None and (tried >= WINDOW or lane["status"] != RUNNING):
+                    reported += tried  # not after each turn to another method
+                    progress(float(lane["t"]))
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
         outputs = finish(run)

@@ -128,6 +128,17 @@ def costly(t, x, u, params):
     return [x[1], -x[0] + 0.0 * sum(np.sin(k * x[1]) for k in range(1, 201))]
 
 
+def test_progress_is_reported_by_steps_and_not_by_turns():
+    """A run that stands still is known by how far so many steps went; a turn cuts none short."""
+    compiled, seen = nlctl.compile(nlctl.paper.example_1()), []
+    response = nlctl.input_output_response(
+        compiled, [0, 60], rtol=1e-6, atol=1e-8, progress=seen.append
+    )
+    assert 1 < len(seen) <= 1 + tried(response) / 1800
+    assert seen == sorted(seen)
+    assert seen[-1] == 60.0
+
+
 def test_what_costs_more_turns_sooner():
     """The same motion in fewer than 600 steps, which cost a turn where rates cost much."""
     times = np.linspace(0, 24, 25)
