@@ -97,8 +97,9 @@ class Controllers(SphinxDirective):
 def overview(guide):
     """Return the cells of a controller in the table of all."""
     proof = f":doc:`{guide.proof} </explanation/certificates>`" if guide.proof else "–"
-    time = "–" if guide.time is None else f"{guide.time:g}"
-    return f"`{guide.name}`_", _text(guide.known), proof, str(guide.states), time
+    costs = guide.costs
+    time = "–" if costs.time is None else f"{costs.time:g}"
+    return f"`{guide.name}`_", _text(guide.known), proof, str(costs.states), time
 
 
 class Citation(SphinxDirective):
