@@ -272,10 +272,10 @@ class TestFaults:
 def test_ctrl_c_ends_the_examination_and_no_run_is_taken_for_a_whole_one():
     """Wherever it comes: in a run it was once the end of a response, and the report went on."""
     examine(example(1), 1.0, box=BOXES[1])  # compiled
-    timer = threading.Timer(0.5, _thread.interrupt_main)
+    timer = threading.Timer(0.2, _thread.interrupt_main)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        examine(example(1), 2_000.0, box=BOXES[1])
+        examine(example(1), 8_000.0, box=BOXES[1])
     timer.join()
 
 
