@@ -7,6 +7,7 @@ first, as the folder of a script does on ``sys.path``.
 
 from __future__ import annotations
 
+import filecmp
 import functools
 import sys
 import warnings
@@ -14,11 +15,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
-from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from .checkout import ANALYSIS, NLCTL_FOLDER
+from .checkout import ANALYSIS
 
 FORMER = "analysis"
 GONE_IN = "0.2"
@@ -69,8 +69,10 @@ def is_former(spec: ModuleSpec | None) -> bool:
     """Whether a module that is called ``analysis`` is nlctl's, and not one of a user."""
     if spec is None or spec.name == ANALYSIS:
         return spec is not None
-    ours = Path(NLCTL_FOLDER).parent / FORMER / "__init__.py"
-    return spec.origin is not None and Path(spec.origin).resolve() == ours.resolve()
+    ours = find_spec(ANALYSIS)  # of an editable install there is a copy elsewhere
+    if spec.origin is None or ours is None or ours.origin is None:
+        return False
+    return filecmp.cmp(spec.origin, ours.origin, shallow=False)
 
 
 def present_name(module: str) -> str:
