@@ -111,4 +111,4 @@ def test_steps_end_where_a_delay_or_a_history_has_a_kink(place):
             times < 0.5, 0.125 - (0.5 - times) ** 2 / 2, 0.125 + (times - 0.5) ** 2 / 2
         )
         exact = np.where(times < 1, before, -0.7 * 0.25 + ramp)
-        np.testing.assert_allclose(run.outputs[0], exact, rtol=0, atol=2e-7)  # stepped over: 1e-3
+        np.testing.assert_allclose(run.outputs[0], exact, rtol=0, atol=2e-7)
