@@ -176,7 +176,7 @@ def inequality(
     )  # fmt: skip
 
 
-def equality(equation: str, statement: str, *sides: Any) -> Margin:
+def equality(equation: str, statement: str, *sides: Any, **options: float) -> Margin:
     """Return the margin -|one - other| of one = other; arguments as for `inequality`."""
-    one_way = inequality(equation, statement, *sides)
+    one_way = inequality(equation, statement, *sides, **options)
     return dataclasses.replace(one_way, kind="equality", margin=-np.abs(one_way.margin))
