@@ -184,7 +184,7 @@ def _check_loop_options(is_loop: bool, *options: object) -> None:
 def _loop(run: AskedRun, required: Sequence[str], options: PageOptions) -> WrittenPage:
     """Report a loop of the user's."""
     folder = options.out or page_folder(run.loop)
-    check_report_options(folder, pdf=options.pdf, force=options.force)
+    check_report_options(folder, options)
     from ..report.render import write_report
 
     composed = stamped(compose_page(run, options.live, required), options)
@@ -197,7 +197,7 @@ def _paper(name: str, out: Path, options: PageOptions, *, far: bool) -> WrittenP
     """Reproduce a paper."""
     with _other_process() as beside:
         beside.submit(_import_ahead, name)  # first of all: imports there and here take seconds
-        check_report_options(out, pdf=options.pdf, force=options.force)
+        check_report_options(out, options)
         from ..papers import named_paper
         from ..report.render import write_report
         from ..reproductions.page import compose_paper
@@ -265,7 +265,7 @@ def _study(study: Path, options: PageOptions) -> WrittenPage:
     elif study.is_file():
         check_run_path(study)
     kept = run_folder(study) if is_file else study
-    check_report_options(options.out or kept, pdf=options.pdf, force=options.force)
+    check_report_options(options.out or kept, options)
     page, result = report_study(study, options)
     if is_file and not result.complete:
         error_line("nlctl: incomplete; the same command resumes")
@@ -306,7 +306,7 @@ def compare_command(
 def _check_page_options(out: Path | None, *, pdf: bool, open_: bool, force: bool) -> None:
     """Refuse what is set of a page where none is made, or where it could not be written."""
     if out is not None:
-        check_report_options(out, pdf=pdf, force=force)
+        check_report_options(out, PageOptions(pdf=pdf, force=force))
     elif pdf or open_ or force:
         raise UsageError("--pdf, --open and --force are of a page: say where, with --out DIR")
 

@@ -59,7 +59,7 @@ def _tuned(study: Path, options: PageOptions, *, open_: bool) -> int:
     _check_asks(study)
     from .study_report import report_study
 
-    check_report_options(options.out or run_folder(study), pdf=options.pdf, force=options.force)
+    check_report_options(options.out or run_folder(study), options)
     page, result = report_study(study, options)
     say(result.verdict)
     for finding in result.findings:

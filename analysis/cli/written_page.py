@@ -46,15 +46,15 @@ def stamped(report: Report, options: PageOptions) -> Report:
     return replace(report, command=command, **options.stamp)
 
 
-def check_report_options(out: Path, *, pdf: bool, force: bool = False) -> None:
+def check_report_options(folder: Path, options: PageOptions) -> None:
     """Refuse, before anything is computed, what could not be written afterwards."""
     from ..report.page import check_report_folder
     from .terminal import check_writable
 
-    check_writable(out)
-    if not force:
-        check_report_folder(out)
-    if pdf:
+    check_writable(folder)
+    if not options.force:
+        check_report_folder(folder)
+    if options.pdf:
         from ..report.browser import find_browser
 
         find_browser()

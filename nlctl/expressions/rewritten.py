@@ -96,9 +96,9 @@ class _Rewriter(ast.NodeTransformer):
         self.generic_visit(node)
         keys = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         names = any(isinstance(k, ast.Name | ast.Call | ast.BinOp | ast.Subscript) for k in keys)
-        return call_instead("item", node.value, _key(node.slice)) if names and isinstance(
-            node.ctx, ast.Load
-        ) else node  # fmt: skip
+        if not (names and isinstance(node.ctx, ast.Load)):
+            return node
+        return call_instead("item", node.value, _key(node.slice))
 
     def visit_Call(self, node: ast.Call) -> Any:
         self.generic_visit(node)
@@ -228,9 +228,9 @@ def _item(graph: Graph, whole: Any, key: Any) -> Any:
 
 
 def _is_float(value: Any) -> bool:
-    return (value.only.kind == "f" if not value.shape else False) if isinstance(
-        value, Tracer
-    ) else type(value) is float  # fmt: skip
+    if isinstance(value, Tracer):
+        return not value.shape and value.only.kind == "f"
+    return type(value) is float
 
 
 def _index(whole: Any, value: Any) -> Any:

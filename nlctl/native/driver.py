@@ -13,7 +13,7 @@ import numpy as np
 from ..delays.variation import Variation
 from ..errors import ParameterError
 from .along import derivatives
-from .chattering.detection import WINDOW, asked, jump_of, new_paces, probe_of, snapshot
+from .chattering.detection import asked, jump_of, new_paces, probe_of, snapshot
 from .compiled import Compiled
 from .diagram.program import instants_of
 from .discrete import simulate_discrete
@@ -71,15 +71,14 @@ def trajectory(
     with np.errstate(all="ignore"):  # without JIT, NumPy would warn of what the status says
         try:
             begin(run)
-            paces, reported = new_paces(run.lanes), 0
+            paces = new_paces(run.lanes)
             while run.lanes["status"][0] == RUNNING:
+                windows = paces["windows"][0]
                 run = differentiated(compiled, watched(run, paces), p)
                 run = turned(compiled, run, p, settings)
-                lane = run.lanes[0]
-                tried = lane["accepted"] + lane["rejected"] - reported
-                if progress is not None and (tried >= WINDOW or lane["status"] != RUNNING):
-                    reported += tried  # not after each turn to another method
-                    progress(float(lane["t"]))
+                is_over = run.lanes["status"][0] != RUNNING
+                if progress is not None and (is_over or paces["windows"][0] > windows):
+                    progress(float(run.lanes["t"][0]))  # not after each turn to another method
         except KeyboardInterrupt:
             run.lanes["status"] = Status.STOPPED
         outputs = finish(run)
@@ -137,8 +136,8 @@ def watched(run: Run, paces: np.ndarray) -> Run:
     run = go_on(run, ROUNDS - probe)
     if (run.lanes["status"] >= 0).all():  # all are over
         return run
-    lanes = asked(run.lanes, paces).nonzero()[0] if run.task.fixed == 0.0 else ()
-    if not len(lanes):
+    lanes = asked(run.lanes, paces).nonzero()[0]
+    if not len(lanes) or run.task.fixed != 0.0:
         return go_on(run, probe) if RUNNING in run.lanes["status"] else run
     return _examined(run, [int(j) for j in lanes], probe)
 

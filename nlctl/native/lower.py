@@ -77,7 +77,7 @@ class Lowered:
 
     @cached_property
     def operations(self) -> int:
-        """How many numbers a right-hand side computes."""
+        """How many numbers a right-hand side is made of, with those that `prepare` computes."""
         plan = self.functions["rhs"].plan
         return sum(node.size or 1 for node in plan.nodes if node.op not in ("leaf", "const"))
 

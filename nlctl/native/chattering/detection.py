@@ -64,12 +64,11 @@ def asked(lanes: np.ndarray, paces: np.ndarray) -> np.ndarray:
     # `_LONG` windows on: what usual runs take must not cost them anything. A window that a turn to
     # another method cuts short is one together with the next.
     before, longest, tried, windows, slow = (paces[name] for name in _PACES.names or ())
-    status = lanes["status"]
-    whole = lanes["accepted"] + lanes["rejected"] - tried >= WINDOW
-    whole &= (status == RUNNING) | (status == METHOD)
+    status, tried_now = lanes["status"], lanes["accepted"] + lanes["rejected"]
+    whole = (tried_now - tried >= WINDOW) & ((status == RUNNING) | (status == METHOD))
     gone = lanes["t"] - before
     before[whole] = lanes["t"][whole]
-    tried[whole] = (lanes["accepted"] + lanes["rejected"])[whole]
+    tried[whole] = tried_now[whole]
     np.maximum(longest, gone, out=longest, where=whole)
     windows += whole
     slow[whole] = (slow[whole] + 1) * (gone < _SLOW * longest)[whole]
