@@ -13,7 +13,7 @@ from rows import each_row
 from test_report_page import HOSTILE, Reader
 
 from nlctl.analysis.cli.report import compare_reports, write_gallery_of
-from nlctl.analysis.cli.written_page import check_report_options, finish_report
+from nlctl.analysis.cli.written_page import PageOptions, check_report_options, finish_report
 from nlctl.analysis.report import (
     Claim,
     Report,
@@ -194,9 +194,9 @@ def test_without_a_browser_a_pdf_is_refused_before_anything_is_computed(
 ):
     """The message says what to install; without --pdf nothing is asked for; the page stays."""
     monkeypatch.setenv("PATH", str(tmp_path))
-    check_report_options(tmp_path / "out", pdf=False)
+    check_report_options(tmp_path / "out", PageOptions())
     with pytest.raises(UsageError, match="apt-get install chromium"):
-        check_report_options(tmp_path / "out", pdf=True)
+        check_report_options(tmp_path / "out", PageOptions(pdf=True))
     page = write_report(small(), tmp_path / "out")
     with pytest.raises(UsageError, match="none is installed"):
         finish_report(page, pdf=True, open_=False)
