@@ -1,6 +1,7 @@
 """Numbers of a response: one function, one number, with unit and meaning."""
 
-from .breaks import breaks_of, sampled_between, with_breaks
+from nlctl.responses.breaks import breaks_of, sampled_between, with_breaks
+
 from .extremes import final, highest, lowest, peak, spread, ultimate_bound, vertex
 from .functionals import in_machine_code
 from .integrals import (

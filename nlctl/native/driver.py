@@ -119,12 +119,15 @@ def begin(run: Run) -> None:
 
 def go_on(run: Run, rounds: int = ROUNDS) -> Run:
     """Try up to `rounds` steps in every lane that is still running."""
-    work = with_log(run.task, with_room(run.task, run.work))
-    run = run if work is run.work else replace(run, work=work)
     rhs, _ = run.machine.entries
     point, along = (0, 0) if run.along is None else run.along.entries
-    integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
-    run.machine.check(run.task.p)
+    while rounds:  # what has no room waits until there is: lanes do not shorten others' windows
+        work = with_log(run.task, with_room(run.task, run.work))
+        run = run if work is run.work else replace(run, work=work)
+        run.lanes["untried"] = 0
+        integrators()["advance"](rhs, point, along, run.task, run.work, rounds)
+        run.machine.check(run.task.p)
+        rounds = int(run.lanes["untried"][0])
     return run
 
 

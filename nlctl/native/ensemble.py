@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 from threading import Event
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,15 @@ from ..arguments import number as checked_number
 from ..errors import ParameterError
 from ..names import unknown
 from ..params import checked_times, integer
-from ..responses.arguments import HOLDS, checked_params, held, input_array, with_aliases
+from ..responses.arguments import (
+    HOLDS,
+    checked_params,
+    held,
+    input_array,
+    interpolated,
+    with_aliases,
+)
+from ..responses.breaks import sampled_between, takes_breaks, unsampled
 from .ahead import compile_for
 from .audit import Audit, Trial
 from .audit import audit as compare
@@ -30,6 +39,7 @@ from .compiled import Compiled
 from .compiled import compile as compile_diagram
 from .driver import Course, begin, finish, prepared, trajectory, watched
 from .ensemble_result import Ensemble, MetricLike
+from .happened import happened
 from .integrate.methods.tableau import Tableau
 from .integrate.state import RUNNING, STIFF, Status
 from .machine.evaluations import ENSEMBLE_WIDTH, fitting
@@ -69,6 +79,10 @@ def ensemble_response(
     threads, in any order and in any company.  (A single run by `input_output_response` sums in
     another order and agrees to rounding.)  Metrics are taken as each member ends, and only the
     signals in `keep` are stored.  After Ctrl-C the members that are finished are returned.
+
+    A metric's function that takes ``breaks`` gets the times of the member's events.  A member with
+    no sample between two of its events is run once more, with samples there, so that its metrics
+    see a pulse between two of `timepts`.
 
     A diagram in discrete time goes from sample to sample; `rtol`, `atol`, `max_steps`, `max_step`
     and `method` then mean nothing.
@@ -193,6 +207,11 @@ class _Asked:
     course: Course
     metrics: Sequence[MetricLike]
 
+    @cached_property
+    def with_breaks(self) -> list[bool]:
+        """Of each metric whether its function takes breaks."""
+        return [takes_breaks(metric.function) for metric in self.metrics]
+
 
 def _runner(
     every: Members, asked: _Asked, kept: Mapping[str, np.ndarray], audit: Audit
@@ -211,10 +230,11 @@ def _runner(
         for number, run in zip(numbers, runs, strict=False):
             if number in audited:
                 _audit(every, number, run, audit)
-            run = run if asked.course.times is asked.times else _sampled_at(run, asked.times)
+            run, shown = _seen(every, number, run, asked)
+            at_samples = _sampled_at(run, asked.times)
             for signal, samples in kept.items():
-                samples[number, : run.time.size] = run.outputs[labels.index(signal)]
-            rows[number] = _row(run, labels, asked.metrics)
+                samples[number, : at_samples.time.size] = at_samples.outputs[labels.index(signal)]
+            rows[number] = _row(_sampled_at(run, shown), labels, asked)
         return rows
 
     return one
@@ -230,8 +250,24 @@ def _audit(every: Members, number: int, run: Trajectory, wanted: Audit) -> None:
     compare(every.compiled, trial, wanted)
 
 
+def _seen(
+    every: Members, number: int, run: Trajectory, asked: _Asked
+) -> tuple[Trajectory, np.ndarray]:
+    """Return a member with samples between all events, if metrics look, and the times of these."""
+    breaks, course = run.happened.time, asked.course
+    if not asked.metrics or not unsampled(asked.times, breaks).size:
+        return run, asked.times
+    shown = sampled_between(asked.times, breaks)
+    grid = np.union1d(course.times, shown)
+    inputs = interpolated(course.inputs, course.times, grid)
+    x0, p = every.batch(range(number, number + 1), 1)
+    return trajectory(replace(course, times=grid, inputs=inputs), x0[:, 0], p[:, 0]), shown
+
+
 def _sampled_at(run: Trajectory, times: np.ndarray) -> Trajectory:
     """Return a run at some of its times only."""
+    if np.array_equal(run.time, times):
+        return run
     shown = np.isin(run.time, times)
     return replace(
         run, time=run.time[shown], outputs=run.outputs[:, shown], states=run.states[:, shown],
@@ -262,7 +298,7 @@ def _group(every: Members, numbers: range, course: Course, stop: Event) -> Itera
         if run.lanes["status"][j] == STIFF:  # the stiff method is for single runs
             yield trajectory(course, x0[:, j], p[:, j])
         else:
-            yield made(run, outputs, j)
+            yield replace(made(run, outputs, j), happened=happened(compiled, run, j))
 
 
 def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Run, np.ndarray]:
@@ -276,8 +312,8 @@ def _ran(course: Course, x0: np.ndarray, p: np.ndarray, stop: Event) -> tuple[Ru
         return run, finish(run)
 
 
-def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) -> dict[str, Any]:
-    done = run.statistics
+def _row(run: Trajectory, labels: Sequence[str], asked: _Asked) -> dict[str, Any]:
+    done, metrics = run.statistics, asked.metrics
     row: dict[str, Any] = {
         "status": done.status.name,
         "time": done.time,
@@ -285,13 +321,15 @@ def _row(run: Trajectory, labels: Sequence[str], metrics: Sequence[MetricLike]) 
     }
     if done.status is not Status.OK:
         return row | {metric.key: np.nan for metric in metrics}
-    asked = {signal for metric in metrics for signal in metric.signals}
-    samples = {signal: run.outputs[labels.index(signal)].copy() for signal in asked}
-    for metric in metrics:
+    signals = {signal for metric in metrics for signal in metric.signals}
+    samples = {signal: run.outputs[labels.index(signal)].copy() for signal in signals}
+    breaks = np.unique(run.happened.time)
+    for metric, takes in zip(metrics, asked.with_breaks, strict=True):
         first = np.searchsorted(run.time, metric.start, "left")
         inside = slice(first, np.searchsorted(run.time, metric.end, "right"))
         given = (samples[signal][inside] for signal in metric.signals)
-        row[metric.key] = metric.function(run.time[inside], *given)
+        known = {"breaks": breaks} if takes else {}
+        row[metric.key] = metric.function(run.time[inside], *given, **known)
     return row
 
 

@@ -1,4 +1,4 @@
-"""What has happened in a single run of machine code: a table of its events."""
+"""What has happened in a run of machine code: a table of its events."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _WORDS = {
 
 
 def with_log(task: Any, work: Any) -> Any:
-    """Return a workspace with room for what happens next in a single run; what is noted stays."""
-    free = work.log.t.size - int(work.lanes["noted"][0])
+    """Return a workspace with room for what happens next; what is noted stays."""
+    free = work.log.t.shape[0] - int(work.lanes["noted"].max())
     least = log_room(task, work.events.g.shape[0])
     if not least or free >= least:
         return work
-    room = 2 * work.log.t.size + 2 * least
+    room = 2 * work.log.t.shape[0] + 2 * least
     return with_fields(work, log=grown(work.log, ("t", "row"), room))
 
 
@@ -61,14 +61,14 @@ def _labelled(compiled: Compiled, conditions: Any) -> list[tuple[str, str]]:
     return labels
 
 
-def happened(compiled: Compiled, run: Any) -> EventLog:
-    """Return what has happened in a single run."""
+def happened(compiled: Compiled, run: Any, j: int = 0) -> EventLog:
+    """Return what has happened in lane `j` of a run."""
     rows = row_labels(compiled, run.machine.lowered.conditions)
     labels = [(*row, direction) for row in rows for direction in ("falling", "rising")]
-    count = int(run.lanes["noted"][0])
-    coded = run.work.log.row[:count]
+    count = int(run.lanes["noted"][j])
+    coded = run.work.log.row[:count, j]
     return EventLog(
-        time=run.work.log.t[:count].copy(),
+        time=run.work.log.t[:count, j].copy(),
         label=np.where(coded // 2 == OF_TIME, len(labels), coded),
         labels=(*labels, ("", "condition of t", "")),
     )

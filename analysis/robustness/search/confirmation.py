@@ -16,8 +16,8 @@ from nlctl.attributes import described_record
 from nlctl.errors import DivergedError
 from nlctl.native import Status
 from nlctl.response import input_output_response
+from nlctl.responses.breaks import breaks_of, sampled_between, unsampled
 
-from ...metrics.breaks import breaks_of, sampled_between, unsampled
 from ..runs.experiment import Experiment, Prepared, evaluate, loop_of_row
 from ..stl.spec import margins, unfinished_margin
 from ..uncertainty.space import checked_row

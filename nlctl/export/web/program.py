@@ -185,7 +185,7 @@ def _laid_out(
     stiff = stiff_method(n, DIFFERENCES, task.stiff.c, WHOLE)
     task = with_fields(task, timed=timed, stiff=stiff)
     if work.log.t.size:
-        work = with_fields(work, log=arrays_alike(Log, (NOTED + work.log.t.size,)))
+        work = with_fields(work, log=arrays_alike(Log, (NOTED + work.log.t.size, 1)))
     size = sum(a.nbytes for a in (work.samples, work.y, task.p, task.inputs))
     if size > _MOST:
         raise CompileError(

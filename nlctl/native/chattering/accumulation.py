@@ -42,7 +42,7 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     places = 1 + np.flatnonzero(sides[1:, row] * sides[:-1, row] < 0)
     if not places.size:
         return None
-    switches = _noted(run, row, t[first][places])
+    switches = _noted(run, j, row, t[first][places])
     crowd = crowd_of(switches, row, run.task.times[-1], run.task.rtol, _MORE)
     if crowd is None or not _is_small(evaluated, points[places[-1]], rates[places[-1]], crowd):
         return None
@@ -52,9 +52,9 @@ def accumulating(evaluated: LaneEquations, attempts: list[Attempt]) -> Jump | No
     return Jump(times=(float(before), float(after)), before=x, after=x_2, inputs=u, crowd=crowd)
 
 
-def accumulated(run: Any, end: float) -> Crowd | None:
-    """Return how the switches of a single run have accumulated before the jump where it stays."""
-    rows, times = _log(run)
+def accumulated(run: Any, j: int, end: float) -> Crowd | None:
+    """Return how the switches of a lane have accumulated before the jump where it stays."""
+    rows, times = _log(run, j)
     if not rows.size:
         return None
     row = int(np.bincount(rows).argmax())
@@ -67,18 +67,18 @@ def accumulated(run: Any, end: float) -> Crowd | None:
     return crowd if crowd and abs(crowd.end - end) <= crowd.period else None
 
 
-def _log(run: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return which conditions were at 0, and when: of a single run they are all noted."""
-    log = slice(int(run.lanes["noted"][0]) if run.task.alone else 0)
-    rows, times = run.work.log.row[log] // 2, run.work.log.t[log]
+def _log(run: Any, j: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return which conditions of a lane were at 0, and when."""
+    log = slice(int(run.lanes["noted"][j]))
+    rows, times = run.work.log.row[log, j] // 2, run.work.log.t[log, j]
     return rows[rows >= 0], times[rows >= 0]
 
 
-def _noted(run: Any, row: int, times: np.ndarray) -> np.ndarray:
+def _noted(run: Any, j: int, row: int, times: np.ndarray) -> np.ndarray:
     """Return the last times at which a condition was at 0."""
-    if times.size >= AT_LEAST or not run.task.alone:
+    if times.size >= AT_LEAST:
         return times
-    rows, noted = _log(run)
+    rows, noted = _log(run, j)
     return noted[rows == row][-2 * AT_LEAST :]
 
 

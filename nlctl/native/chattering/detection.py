@@ -100,7 +100,7 @@ def jump_of(run: Any, attempts: list[Attempt], j: int) -> Jump | None:
     jump = _stayed_at(run, attempts[-PROBE:], j, c)
     if jump is None:
         return accumulating(LaneEquations(run=run, j=j, c=c), attempts)
-    return replace(jump, crowd=accumulated(run, jump.time))
+    return replace(jump, crowd=accumulated(run, j, jump.time))
 
 
 def _stayed_at(run: Any, attempts: list[Attempt], j: int, c: np.ndarray) -> Jump | None:

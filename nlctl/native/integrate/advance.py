@@ -245,12 +245,15 @@ def advance(rhs, point, along, task, w, rounds):
     lanes, rows = w.lanes, task.rows
     done, passed = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.bool_)
     sampled, found = np.zeros(lanes.size, np.bool_), np.zeros(lanes.size, np.int64)
-    for _ in range(rounds):
+    for tried in range(rounds):
         if task.taylor.highest:
             taylor.expand(task, lanes, w)
             if lanes[0].status == METHOD:
                 return
-        if not _chosen(task, lanes, w) or is_full(task, lanes, w) or log_is_full(task, lanes, w):
+        if not _chosen(task, lanes, w):
+            return
+        if is_full(task, lanes, w) or log_is_full(task, lanes, w):
+            lanes[0].untried = rounds - tried
             return
         if lanes[0].stiff and task.stiff.derivatives == UNKNOWN:
             lanes[0].status = DERIVATIVES

@@ -65,7 +65,8 @@ _FIELDS = [
     ("crowd", "i8"),  # resets in a row without progress of time
     ("culprit", "i8"),  # the guard that has fallen last, or has ended the run
     ("resumes", "i8"),  # whether a sample has been taken at the last time, see `Work.resume`
-    ("noted", "i8"),  # what has happened: entries of the log, which a single run has
+    ("noted", "i8"),  # what has happened: entries of the log
+    ("untried", "i8"),  # of the first lane: steps that a window has left, for want of room
     ("turns", "i8"),  # steps that ended where a memory turns or jumps, and nothing else happens
     ("jump", "i8"),  # which of their break points comes next
     ("traces", "i8"),  # whether what is being located is a condition

@@ -129,7 +129,7 @@ def new_work(
         stiff=new_stiff(n if lanes == 1 else 0, inputs),  # that method is for single runs
         taylor=new_terms(*terms, inputs, lanes),
         guards=arrays_alike(Guards, (guards, lanes), pace=(guards, lanes, PACE)),
-        log=arrays_alike(Log, (log,)),
+        log=arrays_alike(Log, (log, lanes)),
         past=new_past(times.size, outputs, lines, lanes),
     )
 

@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nlctl.errors import ParameterError
-from nlctl.upstream.systems import SystemResponse
+from ..errors import ParameterError
+from ..upstream.systems import SystemResponse
 
 _ENOUGH = 9  # samples between two breaks: a curve goes through so many
 _AT_ONCE = 1e-9  # of the time covered: breaks that are no further apart are one
@@ -145,13 +145,17 @@ def with_breaks(function: Callable[..., float], breaks: np.ndarray | None) -> Ca
     >>> round(with_breaks(peak, np.array([1.0]))(t, t % 1), 9), float(peak(t, t % 1))
     (1.0, 0.9)
     """
-    if breaks is None:
+    if breaks is None or not takes_breaks(function):
         return function
+    return functools.partial(function, breaks=breaks)
+
+
+def takes_breaks(function: Callable[..., float]) -> bool:
+    """Whether a function of times and samples has an argument `breaks`."""
     plain = getattr(function, "py_func", function)
     inner = plain.func if isinstance(plain, functools.partial) else plain
     inner = getattr(inner, "py_func", inner)
     try:
-        takes = "breaks" in inspect.signature(inner).parameters
+        return "breaks" in inspect.signature(inner).parameters
     except (TypeError, ValueError):
-        return function
-    return functools.partial(function, breaks=breaks) if takes else function
+        return False
