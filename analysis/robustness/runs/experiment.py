@@ -269,6 +269,21 @@ def simulate_rows(
     )
 
 
+def signals_of_rows(
+    prepared: Prepared, rows: pd.DataFrame, names: Sequence[str], threads: int | None = None
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Simulate rows of any diagrams; return signals of shape (rows, m), and how each run ended."""
+    study, rows = prepared.experiment, rows.reset_index(drop=True)
+    signals = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
+    status = np.full(len(rows), "", dtype=object)
+    for loop, same in by_diagram(prepared, rows):
+        runs = simulate_rows(study, loop, same, keep=names, threads=threads)
+        status[same.index] = runs.table["status"].to_numpy()
+        for name in names:
+            signals[name][same.index] = runs.signals[name]
+    return signals, status
+
+
 def _forward(progress: Callable[[int], object], before: int, count: int) -> None:
     progress(before + count)
 
