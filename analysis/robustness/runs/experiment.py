@@ -16,7 +16,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import ATOL, RTOL, a_function, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
 from nlctl.native.settings import Settings
@@ -159,8 +159,7 @@ def prepare(experiment: Experiment) -> Prepared:
         resolved(full, diagram)  # the full names must be known to every diagram
         for measure in (*experiment.spec.requirements, *experiment.metrics):
             for signal in measure.signals:
-                if signal not in diagram.output_labels:
-                    raise unknown("signal", signal, diagram.output_labels, f"for '{measure.key}'")
+                check_known("signal", signal, diagram.output_labels, f"for '{measure.key}'")
     loops = tuple((labels, compiled(diagram)) for labels, diagram in built)
     return Prepared(experiment=replace(experiment, space=full), loops=loops)
 
