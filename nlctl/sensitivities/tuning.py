@@ -250,7 +250,7 @@ def _between(problem: TuningProblem, best: np.ndarray, seen: Worth) -> Iterator[
     for key, margin, below in rows:
         if below < margin - _BETWEEN * (1.0 + abs(margin)):
             yield (
-                f"the margin of '{key}' is {below:.4g} with {finer.size} samples, not "
+                f"the margin of '{key}' is {below:.4g} with {counted(finer.size, 'sample')}, not "
                 f"{margin:.4g}: give more timepts than {times.size}"
             )
 
