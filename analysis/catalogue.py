@@ -41,11 +41,10 @@ def block_records() -> dict[str, type]:
 
 def named_block(name: str) -> type:
     """Return the block record of that name."""
-    from nlctl.names import unknown  # it imports python-control
+    from nlctl.names import check_known  # it imports python-control
 
     records = block_records()
-    if name not in records:
-        raise unknown("block", name, records)
+    check_known("block", name, records)
     return records[name]
 
 

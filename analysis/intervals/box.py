@@ -11,7 +11,7 @@ import numpy as np
 from nlctl.annotations import as_annotated, as_numbers
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted
 
 Cell = tuple[tuple[float, float], ...]
@@ -76,8 +76,7 @@ class Box:
                 raise ParameterError(f"Box needs low <= high on side {name}, got [{a:g}, {b:g}]")
 
     def __getitem__(self, name: str) -> tuple[float, float]:
-        if name not in self.names:
-            raise unknown("side", name, self.names, "of the box")
+        check_known("side", name, self.names, "of the box")
         i = self.names.index(name)
         return self.low[i], self.high[i]
 

@@ -15,7 +15,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number
 from nlctl.attributes import described_record
 from nlctl.errors import DivergedError, ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.plants import coordinate_names
 from nlctl.response import input_output_response
 from nlctl.wording import counted
@@ -146,8 +146,7 @@ def tighten(
     >>> print(found.u <= 20.0, sorted(found.gains)[0])
     True controller.law.beta
     """
-    if bound not in _BOUNDS:
-        raise unknown("bound", bound, _BOUNDS)
+    check_known("bound", bound, _BOUNDS)
     u_limit = number("tighten", "u_limit", u_limit, above=0)
     horizon = number("tighten", "horizon", horizon, above=0)
     evaluations = integer("tighten", "evaluations", evaluations, at_least=1)

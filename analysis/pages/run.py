@@ -9,7 +9,7 @@ import control as ct
 import numpy as np
 
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.plotting.signals import rows_figure
 from nlctl.responses.time_response import as_response
 
@@ -24,8 +24,7 @@ def run_section(
     """Return one run: its own parameters, its signals over time, and their ranges."""
     curves = outputs_of_run(response)
     for name in signals:
-        if name not in curves:
-            raise unknown("output", name, curves, f"of '{loop.name}'")
+        check_known("output", name, curves, f"of '{loop.name}'")
     t = np.asarray(response.time, dtype=float)
     shown, rows = as_response(response, loop).rows([*signals] or None)
     figure, _ = rows_figure(t, shown, rows)

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure as MatplotlibFigure
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.params import checked_times
 
 
@@ -133,8 +133,7 @@ class History:
                     f"its time {shape}"
                 )
         for name in (*self.shown, *self.bands):
-            if name not in self.signals:
-                raise unknown("signal", name, self.signals)
+            check_known("signal", name, self.signals)
 
 
 @described_record(eq=False)

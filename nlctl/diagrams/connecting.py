@@ -165,7 +165,7 @@ def _by_name(systems: Sequence[Any], inputs: Sequence[str]) -> Callable[..., Any
         for signal in outputs:
             if signal not in sources:
                 raise unknown("output signal", signal, sources)
-        return ct.interconnect(
+        return _connected(
             systems,
             inputs=inputs,
             inplist=[[f"{s.name}.{i}" for s in systems if i in s.input_labels] for i in inputs],
@@ -176,6 +176,25 @@ def _by_name(systems: Sequence[Any], inputs: Sequence[str]) -> Callable[..., Any
         )
 
     return connected
+
+
+def _connected(systems: Sequence[Any], *lists: Any, **more: Any) -> Any:
+    """Return what `control.interconnect` makes, of linear blocks alone without inputs, too."""
+    # Of these python-control makes a linear system, but takes a matrix with one row and no column
+    # for one without rows.  What it makes where one block is not linear is right.
+    are_linear = all(isinstance(s, ct.StateSpace | ct.TransferFunction) for s in systems)
+    if not are_linear or more["inputs"] or any(lists[1:2]):
+        return ct.interconnect(systems, *lists, **more)
+    first, *rest = systems
+    linear = first if isinstance(first, ct.StateSpace) else ct.ss(first, name=first.name)
+    stand_in = ct.nlsys(
+        lambda t, x, u, p: x, lambda t, x, u, p: u, inputs=first.input_labels,
+        outputs=first.output_labels, states=linear.state_labels, dt=first.dt, name=first.name,
+    )  # fmt: skip
+    diagram = ct.interconnect([stand_in, *rest], *lists, **more)
+    diagram.syslist[0] = linear
+    is_right = 1 not in (diagram.nstates, diagram.noutputs)
+    return ct.LinearICSystem(diagram, None) if is_right else diagram
 
 
 def _with_values(diagram: Any, params: Mapping[str, Any] | None) -> Any:
@@ -336,7 +355,7 @@ def connected_by_lists(
             names = [label if count[label] == 1 else f"{s.name}_{label}" for s, label in every]
             given, outputs = [(s.name, label) for s, label in every], names
         try:
-            diagram = ct.interconnect(
+            diagram = _connected(
                 systems, connections, inplist, given, inputs=inputs or None, outputs=outputs,
                 name=name, check_unused=False,
             )  # fmt: skip

@@ -4,7 +4,9 @@ The least of many margins has a kink at its highest point, where several are equ
 a method for smooth functions creeps there.  Each step is a linear program (HiGHS, by
 `scipy.optimize.linprog`) for all margins at once, within a reach that grows and shrinks with
 what steps have kept of what they promised (Madsen: An algorithm for minimax solution of
-overdetermined systems of non-linear equations, J. Inst. Maths Applics 16 (1975) 321-328).
+overdetermined systems of non-linear equations, J. Inst. Maths Applics 16 (1975) 321-328).  Of all
+steps with nine tenths of that promise the shortest is taken: a gain that brings next to nothing
+would else go to the end of the reach, where slopes say nothing any more.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ _REACH = 0.5  # of the first step, in widths of the box
 _SHORTEST = 2e-3  # of a reach
 _KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, more doubles it
 _REMEMBERED = 2  # choices of gains whose slopes count as well
-_EFFORTS = (0.03, 0.005)  # of a margin: what a step as wide as the box has to bring at least
+_SHARE = 0.9  # of the most that a step within reach promises: what the shortest step has to bring
 _ENOUGH = 5e-4  # of a margin, or of a cost: less is no progress
 _ROOM = 1e-3  # that a cost leaves to all margins, so that rounding violates none
 _PATIENCE = 8  # choices of gains without progress, after which SLSQP ends
@@ -31,17 +33,14 @@ WorthOf = Callable[[np.ndarray], Worth]
 
 def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
     """Go where the least margin is as high as it gets."""
-    at, here, reach, (effort, last_effort) = start, worth_of(start), _REACH, _EFFORTS
+    at, here, reach = start, worth_of(start), _REACH
     others: list[tuple[np.ndarray, Worth]] = []
     while reach > _SHORTEST:
-        step, promised = _step(at, here, others, reach, effort)
+        step, promised = _step(at, here, others, reach)
         if promised <= _ENOUGH * (1.0 + abs(here.least)):
-            if effort > last_effort:
-                effort = last_effort
-            elif others:
-                others, reach = [], 0.5 * reach
-            else:
+            if not others:
                 return
+            others, reach = [], 0.5 * reach
             continue
         there = np.clip(at + step, 0.0, 1.0)
         new, length = worth_of(there), float(np.abs(step).max())
@@ -59,24 +58,26 @@ def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
 
 
 def _step(
-    at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float, effort: float
+    at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float
 ) -> tuple[np.ndarray, float]:
-    """Return the best step within reach if margins were linear, and what it promises."""
+    """Return the shortest step with most of what is within reach if margins were linear."""
     # Slopes of other choices of gains count, too, as far as they do not say less of this one than
     # what is known of it.
     rows, limits, k = [], [], at.size
     for place, worth in [(at, here), *others]:
         rows.append(np.hstack([-worth.slopes, worth.slopes, np.ones((len(worth.slopes), 1))]))
         limits.append(np.maximum(worth.parts + worth.slopes @ (at - place), here.parts))
+    lines, room = np.vstack(rows), np.concatenate(limits)
+    bounds: list[tuple[float | None, float | None]]
     bounds = [(0.0, min(reach, max(1.0 - x, 0.0))) for x in at]
     bounds += [(0.0, min(reach, max(x, 0.0))) for x in at]
-    program = linprog(
-        [*np.full(2 * k, effort), -1.0], np.vstack(rows), np.concatenate(limits),
-        bounds=[*bounds, (None, None)],
-    )  # fmt: skip
-    if not program.success:
+    highest = linprog([*np.zeros(2 * k), -1.0], lines, room, bounds=[*bounds, (None, None)])
+    if not (highest.success and highest.x[-1] > here.least):
         return np.zeros(k), 0.0
-    return program.x[:k] - program.x[k : 2 * k], float(program.x[-1]) - here.least
+    least = here.least + _SHARE * (float(highest.x[-1]) - here.least)
+    shortest = linprog([*np.ones(2 * k), 0.0], lines, room, bounds=[*bounds, (least, None)])
+    taken = shortest.x if shortest.success else highest.x
+    return taken[:k] - taken[k : 2 * k], float(taken[-1]) - here.least
 
 
 class _SettledError(Exception):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
+import control as ct
 import numpy as np
 from scipy.stats import qmc
 
@@ -19,15 +21,17 @@ from ..native.diagram.checks import sized
 from ..native.ensemble import MetricLike
 from ..native.jacobians import float_parameters
 from ..params import as_numbers, checked_times, integer
-from ..responses.arguments import state_array
+from ..responses.arguments import input_array, state_array
 from ..wording import counted
 from .climbing import lower_cost, raise_least_margin
 from .names import declared_bounds
 from .tuned import Tuned
 from .worth import LOST_MARGIN, Runs, TuningProblem, Worth, checked_samples
 
-_SAMPLES = 1001  # of a run for which nobody asks when
+_SAMPLES = 4001  # of a run for which nobody asks when
+_FINER = 4  # times as many samples: whether margins are those of the run, or of where it is seen
 _SAME = 1e-3  # of a margin, or of a cost
+_BETWEEN = 1e-2  # of a margin: how much lower it may be between samples
 
 
 class QuantityLike(Protocol):
@@ -100,8 +104,10 @@ def tune(
         about what it takes (``benchmarks/tune.py``).  To put back what buys nothing, and to
         say what each gain has bought, takes 2 k + 2 runs of each sample or some more.
     timepts : array_like of shape (m,), optional
-        Times in s at which signals are sampled; by default 1001 from 0 to the end that
-        requirements look at.
+        Times in s at which signals are sampled; by default 4001 from 0 to the end that
+        requirements look at.  Peaks that lie between samples are not seen, so that few samples
+        make hills and valleys that the loop does not have; one run at the end, with four times as
+        many, says whether there are enough.
     inputs : array_like, list or float, optional
         Inputs over `timepts`.
     initial_state : mapping, optional
@@ -225,8 +231,28 @@ def _tuned(runs: Runs, first: np.ndarray, message: str) -> Tuned:
         put_back=np.array([worth.goal for worth in without]),
         cost=problem.cost.key if problem.cost else "", history=_history(runs),
         plain_runs=runs.plain, differentiated_runs=runs.differentiated,
-        counted_runs=runs.counted, notes=notes(runs, before, best), message=message,
+        counted_runs=runs.counted, message=message,
+        notes=(*notes(runs, before, best), *_between(problem, best, after)),
     )  # fmt: skip
+
+
+def _between(problem: TuningProblem, best: np.ndarray, seen: Worth) -> Iterator[str]:
+    """Yield which requirements have a lower margin between the samples."""
+    system, times = problem.diagram.system, problem.times
+    if ct.isdtime(system, strict=True) or not problem.margins:
+        return
+    parts = np.arange(_FINER * (times.size - 1) + 1) / _FINER
+    finer = np.interp(parts, np.arange(times.size), times)
+    inputs = [np.interp(finer, times, u) for u in input_array(system, problem.inputs, times)]
+    denser = replace(problem, times=finer, inputs=np.array(inputs) if inputs else 0.0)
+    lower = _by_key(problem, Runs(denser).at(best[None, :])[0])
+    rows = [(m.key, _by_key(problem, seen)[m.key], lower[m.key]) for m in problem.margins]
+    for key, margin, below in rows:
+        if below < margin - _BETWEEN * (1.0 + abs(margin)):
+            yield (
+                f"the margin of '{key}' is {below:.4g} with {counted(finer.size, 'sample')}, not "
+                f"{margin:.4g}: give more timepts than {times.size}"
+            )
 
 
 def _plainest(runs: Runs, start: np.ndarray) -> tuple[np.ndarray, list[Worth]]:

@@ -74,6 +74,53 @@ def test_cost_within_margins(band, expected):
     assert found.after["apart"] < found.before["apart"]
 
 
+@pytest.mark.parametrize(
+    ("points", "center", "square"),
+    [
+        ([(1, 0), (-1, 0), (0, 2)], (0, 0.75), 25 / 16),  # three distances are equal there
+        ([(1, 0), (-1, 0), (0, 0.5)], (0, 0), 1.0),  # two are, where nothing is flat but a ridge
+    ],
+)
+def test_smallest_circle_around_points(points, center, square):
+    """1 - (squared distance) / 4 of each point: the least is the largest at the center."""
+    far = np.array(points, dtype=float)
+    distances = ct.nlsys(
+        None, lambda t, x, u, p: [(p["a"] - a) ** 2 + (p["b"] - b) ** 2 for a, b in far],
+        inputs=0, outputs=["d0", "d1", "d2"], params={"a": 2.5, "b": -1.5}, name="plane",
+    )  # fmt: skip
+    near = [
+        Requirement(key=key, formula=in_band(key, upper=4.0), until=0.0)
+        for key in ("d0", "d1", "d2")
+    ]
+    found = nlctl.tune(
+        distances, {"plane.a": (-3.0, 3.0), "plane.b": (-3.0, 3.0)}, near,
+        timepts=np.linspace(0, 1, 3), starts=1,
+    )  # fmt: skip
+    assert abs(found.margin - (1 - square / 4)) < 2e-3
+    assert np.abs(found.values - center).max() < 0.05
+    assert found.counted_runs < 60
+
+
+def test_peak_between_samples():
+    """A peak of height a at 0.05 s is not seen every 0.1 s, and the note has its margin."""
+    plant = ct.nlsys(
+        None, lambda t, x, u, p: [p["a"] * np.exp(-(((t - 0.05) / 0.01) ** 2)), p["a"] + 0 * t],
+        inputs=0, outputs=["peak", "high"], params={"a": 1.0}, name="plant",
+    )  # fmt: skip
+    spec = [
+        Requirement(key="low", formula=always(in_band("peak", upper=2.0)), until=1.0),
+        Requirement(key="high", formula=in_band("high", lower=0.5), until=0.0),
+    ]
+    coarse = nlctl.tune(plant, {"plant.a": (0.1, 10.0)}, spec, timepts=np.linspace(0, 1, 11))
+    unseen = 1 - coarse["plant.a"] / 2
+    note = next(note for note in coarse.notes if "with 41 samples" in note)
+    assert f"the margin of 'low' is {unseen:.4g} with 41 samples" in note
+    fine = nlctl.tune(plant, {"plant.a": (0.1, 10.0)}, spec, timepts=np.linspace(0, 1, 201))
+    assert not any("samples" in note for note in fine.notes)
+    assert abs(fine["plant.a"] - 0.8) < 2e-3  # 1 - a / 2 = 2 a - 1
+    assert fine.margin > unseen
+
+
 def test_what_each_gain_has_bought():
     """b buys nothing; a alone buys everything, and without it nothing is bought."""
     found = tuned({"plant.a": (0.1, 10.0), "plant.b": (1.0, 3.0)}, [small(), slow()])

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 from nlctl.annotations import as_annotated
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 POINTWISE = 1e-9  # of a statement's size: rounding, and G near v = 0
 INTEGRATED = 1e-6  # of V: the integrator's error at its default tolerance
@@ -27,8 +27,7 @@ class Signals:
     values: Mapping[str, np.ndarray] = field(repr=False)  # Arrays of shape (m,) by output name.
 
     def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self.values:
-            raise unknown("output signal", name, list(self.values), "of the response")
+        check_known("output signal", name, self.values, "of the response")
         return self.values[name]
 
     def vector(self, name: str) -> np.ndarray:

@@ -15,7 +15,7 @@ from nlctl.native import Status
 
 from ... import metrics
 from ...figures import Limit
-from ...robustness.runs.experiment import Prepared, by_diagram, simulate_rows
+from ...robustness.runs.experiment import Prepared, signals_of_rows
 from ...robustness.search.evaluation import as_table, margins_of
 from ...robustness.uncertainty.space import nominal
 from ...studies.result import Result
@@ -68,7 +68,9 @@ def histories(
     options = first[[choice.name for choice in space.choices]].astype(str)
     both = as_table(space, [nominal(space), {name: worst[name] for name in space.names}])
     rows = pd.concat([both, first[space.names]], ignore_index=True)
-    signals, status = _kept(prepared, rows, threads)
+    requirements = prepared.experiment.spec.requirements
+    names = list(dict.fromkeys(s for r in requirements for s in r.signals))[:_MOST]
+    signals, status = signals_of_rows(prepared, rows, names, threads)
     return Histories(
         time=np.asarray(prepared.experiment.timepts, dtype=float),
         signals={name: samples[2:] for name, samples in signals.items()},
@@ -80,22 +82,6 @@ def histories(
         units={m.signals[0]: m.unit for m in prepared.experiment.metrics if m.function in IN_UNIT},
         groups=tuple(options.agg(", ".join, axis=1)) if space.choices else (),
     )
-
-
-def _kept(
-    prepared: Prepared, rows: pd.DataFrame, threads: int | None
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return signals and status of rows, which are numbered from 0."""
-    study = prepared.experiment
-    names = list(dict.fromkeys(s for r in study.spec.requirements for s in r.signals))[:_MOST]
-    kept = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
-    status = np.full(len(rows), "", dtype=object)
-    for loop, same in by_diagram(prepared, rows):
-        runs = simulate_rows(study, loop, same, keep=names, threads=threads)
-        status[same.index] = runs.table["status"].to_numpy()
-        for name in names:
-            kept[name][same.index] = runs.signals[name]
-    return kept, status
 
 
 def loop_again(

@@ -16,7 +16,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import ATOL, RTOL, a_function, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.native import Compiled, Ensemble, Status, ensemble_response
 from nlctl.native import compile as compiled
 from nlctl.native.settings import Settings
@@ -159,8 +159,7 @@ def prepare(experiment: Experiment) -> Prepared:
         resolved(full, diagram)  # the full names must be known to every diagram
         for measure in (*experiment.spec.requirements, *experiment.metrics):
             for signal in measure.signals:
-                if signal not in diagram.output_labels:
-                    raise unknown("signal", signal, diagram.output_labels, f"for '{measure.key}'")
+                check_known("signal", signal, diagram.output_labels, f"for '{measure.key}'")
     loops = tuple((labels, compiled(diagram)) for labels, diagram in built)
     return Prepared(experiment=replace(experiment, space=full), loops=loops)
 
@@ -267,6 +266,21 @@ def simulate_rows(
         method=experiment.method,
         progress=progress,
     )
+
+
+def signals_of_rows(
+    prepared: Prepared, rows: pd.DataFrame, names: Sequence[str], threads: int | None = None
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Simulate rows of any diagrams; return signals of shape (rows, m), and how each run ended."""
+    study, rows = prepared.experiment, rows.reset_index(drop=True)
+    signals = {name: np.full((len(rows), len(study.timepts)), np.nan) for name in names}
+    status = np.full(len(rows), "", dtype=object)
+    for loop, same in by_diagram(prepared, rows):
+        runs = simulate_rows(study, loop, same, keep=names, threads=threads)
+        status[same.index] = runs.table["status"].to_numpy()
+        for name in names:
+            signals[name][same.index] = runs.signals[name]
+    return signals, status
 
 
 def _forward(progress: Callable[[int], object], before: int, count: int) -> None:

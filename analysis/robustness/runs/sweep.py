@@ -20,7 +20,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 from ..uncertainty.design import Design
 from .executors import LostChunkError, chunk_table, computed_elsewhere, computed_here
@@ -36,8 +36,7 @@ _STEP = 64  # rows: a chunk keeps the SIMD lanes of several threads busy
 
 def _check_columns(names: Iterable[str], columns: list[str]) -> None:
     for name in names:
-        if name not in columns:
-            raise unknown("column", name, columns, "of the sweep")
+        check_known("column", name, columns, "of the sweep")
 
 
 @described_record(eq=False, made_by="sweep")
@@ -267,8 +266,7 @@ def _check(
         raise ParameterError("a sweep needs a folder to resume, got none")
     names, given = prepared.experiment.space.names, design.space.names
     for name in given:
-        if name not in names:
-            raise unknown("quantity", name, names, "in the design: take prepared.experiment.space")
+        check_known("quantity", name, names, "in the design: take prepared.experiment.space")
     if names != given:
         raise ParameterError(f"the experiment's space has {names}, the design's has {given}")
 

@@ -13,7 +13,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import integer, number, of_type
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 
 from ..uncertainty.design import affordable, with_row_numbers
 from ..uncertainty.space import Space, ends, from_unit_cube, nominal
@@ -137,13 +137,9 @@ def _given(space: Space, axes: tuple[str, str], at: Mapping[str, Any]) -> dict[s
     """Return the values of the row that the map goes through."""
     quantities = [quantity.name for quantity in space.quantities]
     for name in axes:
-        if name not in quantities:
-            raise unknown("quantity", name, quantities, "for an axis of a failure map")
+        check_known("quantity", name, quantities, "for an axis of a failure map")
     for name in at:
-        if name not in space.names:
-            raise unknown(
-                "quantity", name, space.names, "of the row that a failure map goes through"
-            )
+        check_known("quantity", name, space.names, "of the row that a failure map goes through")
     for name in (name for name in at if name in quantities):
         number("a failure map", f"'{name}'", at[name])
     if axes[0] == axes[1]:

@@ -13,7 +13,7 @@ from nlctl.annotations import as_annotated
 from nlctl.arguments import fraction, of_type, one_of
 from nlctl.attributes import described_record
 from nlctl.errors import ParameterError
-from nlctl.names import unknown
+from nlctl.names import check_known
 from nlctl.wording import counted, some_of
 
 from ..stl.spec import violates
@@ -184,8 +184,7 @@ def _paired(
     """Return each column by option, in the order of the samples."""
     crossed_rows = crossed(design, choice)
     for name in (*crossed_rows.columns, *columns):
-        if name not in table.columns:
-            raise unknown("column", name, table.columns, "of the table of results")
+        check_known("column", name, table.columns, "of the table of results")
     _check_rows(crossed_rows, table, choice.name)
     ordered, k = table.loc[crossed_rows.index], len(choice.options)
     return {

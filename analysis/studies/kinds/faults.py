@@ -23,7 +23,7 @@ from nlctl.wording import some_of
 from ... import figures as figures
 from ...report.document import Figure, Item, Paragraph, Table, captioned
 from ...robustness import Experiment, Prepared, Uncertain, from_table, nominal, prepare
-from ...robustness.runs.experiment import by_diagram, simulate_rows
+from ...robustness.runs.experiment import signals_of_rows
 from ...robustness.stl.spec import Requirement, violates
 from ...robustness.stl.text import parse_formula
 from ...robustness.stl.violation_time import ViolationTime, violation_time
@@ -188,16 +188,16 @@ def _times(
     keys = {r.key: ViolationTime(requirement=r).key for r in requirements}
     times = {key: table[key].to_numpy(dtype=float).copy() for key in keys.values()}
     signals = sorted({s for r in requirements for s in r.signals})
+    timepts = np.asarray(prepared.experiment.timepts, dtype=float)
     unfinished = np.flatnonzero(table["status"].astype(str).to_numpy() != Status.OK.name)
     for start in range(0, unfinished.size, TOGETHER):
         chosen = unfinished[start : start + TOGETHER]
         part = table.iloc[chosen].filter(prepared.experiment.space.names)
-        for loop, rows in by_diagram(prepared, part):
-            again = simulate_rows(prepared.experiment, loop, rows, keep=signals)
-            for i, row in enumerate(chosen):
-                samples = {s: again.signals[s][i] for s in signals}
-                for r in requirements:
-                    times[keys[r.key]][row] = violation_time(r, again.time, samples)
+        again, _ = signals_of_rows(prepared, part, signals)
+        for i, row in enumerate(chosen):
+            samples = {s: again[s][i] for s in signals}
+            for r in requirements:
+                times[keys[r.key]][row] = violation_time(r, timepts, samples)
     return pd.DataFrame(times)
 
 

@@ -31,7 +31,7 @@ from ...robustness import (
     resolved,
     violation_probability,
 )
-from ...robustness.runs.experiment import by_diagram, simulate_rows
+from ...robustness.runs.experiment import signals_of_rows
 from ...robustness.statistics.guarantee import rounded_up
 from ..file.asked import Asked, Confidence, Pair, Size, Whole
 from ..finding import Finding
@@ -242,11 +242,10 @@ def _signals(prepared: Prepared, tuned: Tuned) -> pd.DataFrame:
     gains = dict(zip(tuned.names, ends, strict=True))
     rows = pd.DataFrame([nominal(space)] * 2).assign(**gains)
     names = list(dict.fromkeys(s for r in experiment.spec.requirements for s in r.signals))
+    signals, _ = signals_of_rows(prepared, rows, names)
     columns = {"time": experiment.timepts}
-    for loop, part in by_diagram(prepared, rows):
-        kept = simulate_rows(experiment, loop, part, keep=names).signals
-        for name in names:
-            columns |= {f"{name}, {w}": kept[name][i] for i, w in enumerate(("before", "after"))}
+    for name in names:
+        columns |= {f"{name}, before": signals[name][0], f"{name}, after": signals[name][1]}
     return pd.DataFrame(columns)
 
 
