@@ -12,7 +12,7 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
-from .without_poles import as_fraction, times
+from .without_poles import as_fraction, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
@@ -158,8 +158,10 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     (p, q), (r, s) = as_fraction(graph, a), as_fraction(graph, b)
     if q is not None or s is not None:
         # sign(p / q - r / s) is that of (p s - r q) q s, in which there is no pole
-        compared = r if is_zero else graph.op("sub", times(graph, p, s), times(graph, r, q))
-        return times(graph, times(graph, compared, q), s)
+        compared = (
+            r if is_zero else graph.op("sub", multiplied(graph, p, s), multiplied(graph, r, q))
+        )
+        return multiplied(graph, multiplied(graph, compared, q), s)
     if is_zero:
         return b
     for rising, level, step in ((a, b, 1), (b, a, -1)):

@@ -35,17 +35,17 @@ def _of_parts(
     if expr.op == "mul":
         return graph.op("mul", p, r), _either(graph, q, s)
     if expr.op != "div":
-        both = graph.op(expr.op, times(graph, p, s), times(graph, r, q))
+        both = graph.op(expr.op, multiplied(graph, p, s), multiplied(graph, r, q))
         return both, _either(graph, q, s)
     if has_pole:
-        return times(graph, p, s), times(graph, r, q)
+        return multiplied(graph, p, s), multiplied(graph, r, q)
     return graph.op("div", p, graph.number(expr.args[1])), q
 
 
-def times(graph: Graph, factor: Expr, other: Expr | None) -> Expr:
+def multiplied(graph: Graph, factor: Expr, other: Expr | None) -> Expr:
     """Return a product, or the factor alone where there is no other."""
     return factor if other is None else graph.op("mul", factor, other)
 
 
 def _either(graph: Graph, q: Expr | None, s: Expr | None) -> Expr | None:
-    return s if q is None else times(graph, q, s)
+    return s if q is None else multiplied(graph, q, s)
