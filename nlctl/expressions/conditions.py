@@ -10,8 +10,9 @@ import math
 from collections.abc import Collection, Iterable
 from functools import reduce
 
-from .edges import domain_edges, have_edges, is_positive, is_square, poles
+from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
+from .without_poles import as_fraction, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
@@ -153,15 +154,16 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
     # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
     # a step could pass through a small circle unseen.
-    if a.op == "const" and a.data == 0.0:
+    is_zero = a.op == "const" and a.data == 0.0
+    (p, q), (r, s) = as_fraction(graph, a), as_fraction(graph, b)
+    if q is not None or s is not None:
+        # sign(p / q - r / s) is that of (p s - r q) q s, in which there is no pole
+        compared = (
+            r if is_zero else graph.op("sub", multiplied(graph, p, s), multiplied(graph, r, q))
+        )
+        return multiplied(graph, multiplied(graph, compared, q), s)
+    if is_zero:
         return b
-    for quotient, other in ((a, b), (b, a)):
-        # sign(p / q - c) is that of (p - c q) q, in which there is no pole
-        if quotient.op == "div" and quotient.args[1].varies and not is_positive(quotient.args[1]):
-            p, q = quotient.args
-            less = graph.op("sub", graph.number(p), graph.op("mul", other, graph.number(q)))
-            signed = graph.op("mul", less, graph.number(q))
-            return signed if quotient is a else graph.op("neg", signed)
     for rising, level, step in ((a, b, 1), (b, a, -1)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
         inverse = _inverse(rising.op, level)

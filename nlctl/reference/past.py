@@ -76,9 +76,14 @@ class Past:
         ahead = (s for s in later if s > t + TIME_ROUNDING * abs(t))
         found = min([stop, *(self._arrival(spec, t) for spec in self.specs), *ahead])
         found = stop if stop - found <= TIME_ROUNDING * abs(stop) else found
-        while found - t > _STEPS * min(self._read(t, found), default=math.inf):
+        least = self._rounding(found)  # pieces may be as short as that
+        while found - t > max(_STEPS * min(self._read(t, found), default=math.inf), least):
             found = t + 0.5 * (found - t)  # short steps only where they are needed
         return found
+
+    def _rounding(self, t: float) -> float:
+        """Return what rounding alone may set two times apart by, at a time of the run (s)."""
+        return TIME_ROUNDING * max(abs(t), self.end - self.begin)
 
     def _arrival(self, spec: Any, s: float) -> float:
         """Return when leaves a delay what it is given at time s; inf behind the run."""
@@ -133,7 +138,7 @@ class Past:
         self, a: float, b: float, arriving: Callable[[float], list[np.ndarray]], halvings: int = 0
     ) -> None:
         """Keep what has arrived from a to b, at each delay: ``arriving(t)``."""
-        if not self.specs or b - a <= TIME_ROUNDING * abs(b):
+        if not self.specs or b - a <= self._rounding(b):
             return
         nodes = 0.5 * ((b - a) * _NODES + (a + b))
         nodes[0], nodes[-1] = a, b

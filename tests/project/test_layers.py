@@ -81,6 +81,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing", "edges"],
+        ["without_poles"],
         [
             "conditions",
             "continuity",

@@ -21,7 +21,7 @@ from .restart import restart
 from .state import DIVERGED, INNER, RUNNING, ZENO
 
 _MOST = 100  # jumps at one instant, or without progress of time
-_STILL = 1e-11  # of a time: less is no progress
+_STILL = 1e-13  # of a time: less is no progress
 _HOVERS = 1e-13  # of a run: a ball that lies on the ground hops as far as rounding lets it
 _AHEAD = 1e-9  # of a time: over which is seen whether a guard rises
 _jumps_end = numba.njit(**INNER)(jumps_end)

@@ -7,7 +7,7 @@ import numpy as np
 
 from .evaluate import evaluate
 from .events.functions import begin_next
-from .state import INNER
+from .state import INNER, opposite
 
 FAR = 1e6
 AHEAD = 1e-4  # part of a step over which the rate of a memory is taken
@@ -18,7 +18,7 @@ def memory_rates(rhs, task, lanes, w, x, dx):
     """Fill w.memories with the rates at which memories would be carried along."""
     # A difference over a small part of the step: its error moves the turning point by so little
     # that the turning value does not change. Where functions of t alone jump, it is taken
-    # backwards.
+    # backwards. Where a break point lies in between, it says nothing: a relay is about to jump.
     ahead, memories = w.ahead, w.memories
     for j in range(lanes.size):
         w.t[j] = ahead.begin[j] + AHEAD * max(lanes[j].h, 1e-12)
@@ -36,10 +36,19 @@ def memory_rates(rhs, task, lanes, w, x, dx):
             if w.h[j] < 0.0:
                 change = -change
             noise = 1e-15 * max(abs(memories.m[i, j]), abs(ahead.m[i, j]))
-            known = change == 0.0 or abs(change) > noise
+            known = change == 0.0 or (abs(change) > noise and not _is_between(task, w, j))
             memories.rate[i, j] = change if known else memories.rate_start[i, j]
             if lanes[j].quiet > 0:
                 memories.rate[i, j] = 0.0  # memories are committed step by step for a while
+
+
+@numba.njit(**INNER)
+def _is_between(task, w, j):
+    """Whether a break point that a block declares lies between a state and the look ahead of it."""
+    for i in range(task.rows.bending):  # noqa: SIM110 (no generators in machine code)
+        if opposite(w.events.g[i, j], w.ahead.g[i, j]):
+            return True
+    return False
 
 
 @numba.njit(**INNER)

@@ -31,6 +31,7 @@ from ...expressions.functions import FUNCTIONS
 from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, needed
 from ...expressions.linear_systems import solution
 from ...expressions.stage import Stage
+from ...expressions.without_poles import as_fraction, multiplied
 from ...wording import counted
 from ..codegen.plan import Store
 
@@ -386,7 +387,9 @@ class _Reader:
             return graph.op(node.op, *(self.side(a) for a in node.args))
         if node.op not in COMPARISONS:
             raise NoSeriesError(f"it is not known on which side '{node.op}' continues")
-        return graph.op(node.op, self._side_of(graph.op("sub", *node.args)), zero)
+        # with a pole no polynomial follows it: the sign of p / q is that of p q
+        dividend, divisor = as_fraction(graph, graph.op("sub", *node.args))
+        return graph.op(node.op, self._side_of(multiplied(graph, dividend, divisor)), zero)
 
     def _side_of(self, distance: Expr) -> Expr:
         """Return the first coefficient of what is compared with 0 that is not 0 itself."""
