@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from ...native.codegen.ir.functions import LN2, applied, polynomial
+from ...native.codegen.ir.functions import LN2, applied, estrin
 from ...native.codegen.ir.text import Body, Module, Value
 
 _FUSED = re.compile(r"^declare .* @llvm\.(fma|fmuladd)\.(?:v(\d+))?f64\(.*\n?", re.MULTILINE)
@@ -74,7 +74,7 @@ def _log(b: Body, x: Value) -> tuple[Value]:
     n = b.integer("ashr", b.integer("sub", bits, _ROOT_HALF), 52)
     m = b.real(b.logic("sub", bits, b.integer("shl", n, 52)))
     s = b.op("fdiv", b.sub(m, 1.0), b.add(m, 1.0))
-    rest = b.mul(b.mul(s, 2.0), polynomial(b, _LOG, b.mul(s, s)))
+    rest = b.mul(b.mul(s, 2.0), estrin(b, _LOG, b.mul(s, s)))
     log = b.add(b.mul(b.new(f"sitofp {n} to double"), LN2[0]), rest)
     return (b.add(log, b.sub(x, x)),)  # NaN stays
 
