@@ -14,7 +14,6 @@ study, a ledger or a certificate whose record is of other equations, parameters 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import control as ct
@@ -30,7 +29,7 @@ from .loop_record import difference_text, fact_differences, loop_facts
 from .lyapunov.ledger import Ledger
 from .lyapunov.proofs.result import Certificate
 from .pages.diagram import diagram_sections
-from .pages.live import live_item, live_numbers, live_program
+from .pages.live import behind_figures, live_item, live_numbers, live_program
 from .pages.proof import certificate_section, ledger_section, ledger_text
 from .pages.run import outputs_of_run, run_section
 from .pages.study.claims import claims as study_claims
@@ -38,7 +37,7 @@ from .pages.study.histories import Histories, loop_again, rows_again
 from .pages.study.methods import limits as study_limits
 from .pages.study.methods import methods
 from .pages.study.report import numbers, study_sections
-from .report.document import Claim, Figure, Live, Paragraph, Report, Section, versions
+from .report.document import Claim, Paragraph, Report, Section, versions
 from .response_of_loop import check_response, own_parameters
 from .robustness.stl.spec import Requirement
 from .studies.origin import diagram_differences
@@ -119,7 +118,7 @@ def loop_report(
             moved, response, () if isinstance(live, bool) else live, signals=signals,
             requirements=requirements, histories=kept, command=repeat, base=given,
         )  # fmt: skip
-        parts = [_with_live(part, item) for part in parts]
+        parts = [behind_figures(part, item) if part.key == "run" else part for part in parts]
     described, sources = ([], []) if study is None else methods(study)
     return Report(
         title=title,
@@ -166,15 +165,6 @@ def _moved(
     if response is None:
         raise ParameterError("a page that runs begins with a run: give response=")
     return live_program(loop, as_response(response, loop), params)
-
-
-def _with_live(section: Section, item: Live) -> Section:
-    """Put what runs behind the figure of the run."""
-    if section.key != "run":
-        return section
-    items = [*section.items]
-    place = next(i for i, item_of_run in enumerate(items) if isinstance(item_of_run, Figure))
-    return replace(section, items=[*items[: place + 1], item, *items[place + 1 :]])
 
 
 def _runs_again(result: Result) -> tuple[Sequence[Requirement], Histories | None, list[str]]:

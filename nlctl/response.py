@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -205,7 +203,7 @@ def input_output_response(
         raise ParameterError(f"squeeze needs True, False or None, got {squeeze!r}")
     named = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
     named |= {"evaluation_times": evaluation_times, "return_states": return_states}
-    named = with_aliases(named, aliases, _defaults())
+    named = with_aliases(named, aliases, input_output_response)
     one_of("input_output_response", "hold", hold, HOLDS)
     form = {"squeeze": squeeze, "transpose": transpose, "return_states": named["return_states"]}
     run = RunArguments(
@@ -242,13 +240,6 @@ def _held(run: RunArguments) -> RunArguments:
     evaluation = run.evaluation_times
     evaluation = run.times if isinstance(evaluation, str) and evaluation == "T" else evaluation
     return replace(run, times=times, inputs=inputs, evaluation_times=evaluation)
-
-
-@functools.cache
-def _defaults() -> dict[str, Any]:
-    """Return the arguments of `input_output_response` with their defaults."""
-    parameters = inspect.signature(input_output_response).parameters
-    return {name: parameter.default for name, parameter in parameters.items()}
 
 
 def _computed(run: RunArguments, engine: str) -> Response:

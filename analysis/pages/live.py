@@ -19,7 +19,7 @@ from nlctl.plotting.bands import quantile, upper_envelope
 from nlctl.responses.arguments import state_array
 from nlctl.responses.time_response import as_response
 
-from ..report.document import Live
+from ..report.document import Figure, Live, Section
 from ..robustness.stl.formula import And, Band, Formula, Not, Temporal
 from ..robustness.stl.spec import Requirement, limits_of_requirements
 from .study.histories import Histories
@@ -121,6 +121,13 @@ def _packed(modules: Sequence[bytes]) -> dict[str, Any]:
         "piece": _PIECE,
         "place": 0,
     }
+
+
+def behind_figures(section: Section, item: Live) -> Section:
+    """Put what runs behind the last figure of a section."""
+    items = [*section.items]
+    last = max(k for k, shown in enumerate(items) if isinstance(shown, Figure))
+    return replace(section, items=[*items[: last + 1], item, *items[last + 1 :]])
 
 
 def live_numbers(program: WebProgram) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from nlctl.errors import UsageError
 from nlctl.export.web import WebProgram, check_linker
 from nlctl.response import input_output_response
 
-from ..pages.live import live_item, live_numbers, live_program, modules_together
-from ..report.document import Figure, Live, Report, Section
+from ..pages.live import behind_figures, live_item, live_numbers, live_program, modules_together
+from ..report.document import Live, Report
 from ..robustness.stl.spec import Requirement
 from ..robustness.stl.text import parse_formula
 from .paper import MovedLoop, Paper
@@ -36,7 +36,7 @@ def with_parts_live(paper: Paper, report: Report) -> Report:
     return replace(
         report,
         sections=[
-            _behind_figures(section, behind[section.key]) if section.key in behind else section
+            behind_figures(section, behind[section.key]) if section.key in behind else section
             for section in report.sections
         ],
         numbers={**report.numbers, **numbers},
@@ -61,10 +61,3 @@ def _requirements(moved: MovedLoop) -> Sequence[Requirement]:
         Requirement(key=f"R{k}", formula=parse_formula(text), meaning=meaning, until=moved.until)
         for k, (text, meaning) in enumerate(moved.requirements, start=1)
     ]
-
-
-def _behind_figures(section: Section, item: Live) -> Section:
-    """Put what runs behind the last figure of a section."""
-    items = [*section.items]
-    last = max(k for k, shown in enumerate(items) if isinstance(shown, Figure))
-    return replace(section, items=[*items[: last + 1], item, *items[last + 1 :]])

@@ -7,7 +7,6 @@ sides serves for it as it is.
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,8 +19,6 @@ from .jacobians import along
 from .lower import Lowered, lower_along
 from .machine.routine import entry, lowered_code
 from .reading import Reading
-
-_ONCE = threading.Lock()  # of several threads that need it one compiles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +45,7 @@ def derivatives(reading: Reading, p: np.ndarray) -> Along | None:
     """Return the derivatives for a parameter vector, made when they are first needed."""
     # None if there are none: an equation was differentiated for an integer parameter that has
     # another value now.  Opaque functions have differences in them.
-    with _ONCE:
-        made = reading.cache.found(Along, lambda each: True, lambda: _made(reading))
+    made = reading.cache.found(Along, lambda each: True, lambda: _made(reading))
     if not made.lowered.holds_for(p):
         return None
     c = np.zeros((made.lowered.size, DIRECTIONS))

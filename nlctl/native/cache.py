@@ -6,6 +6,7 @@ code, lies in a field of its own, by kinds of things; whoever makes a kind looks
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ class Cache:
 
     def __init__(self) -> None:
         self._kept: dict[type, list[Any]] = {}
+        self._once = threading.RLock()  # of several threads that need it one makes it
 
     def of(self, kind: type[_T]) -> list[_T]:
         """Return all things of a class; what is appended to the list is kept."""
@@ -24,9 +26,10 @@ class Cache:
 
     def found(self, kind: type[_T], fits: Callable[[_T], bool], make: Callable[[], _T]) -> _T:
         """Return the first thing of a class that fits; it is made if there is none."""
-        known = self.of(kind)
-        for each in known:
-            if fits(each):
-                return each
-        known.append(make())
-        return known[-1]
+        with self._once:
+            known = self.of(kind)
+            for each in known:
+                if fits(each):
+                    return each
+            known.append(make())
+            return known[-1]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
@@ -156,7 +154,7 @@ def ensemble_response(
     [1. 2. 3.] ['OK', 'OK', 'OK']
     """
     given = {"timepts": timepts, "inputs": inputs, "initial_state": initial_state}
-    given = with_aliases(given, aliases, _defaults(), "ensemble_response")
+    given = with_aliases(given, aliases, ensemble_response)
     times = checked_times(given["timepts"])
     if not isinstance(compiled, Compiled):
         compiled = compile_diagram(compiled)
@@ -176,13 +174,6 @@ def ensemble_response(
     kept = {signal: np.full((every.size, times.size), np.nan) for signal in keep}
     rows = _run(_runner(every, asked, kept, audit), every.size, threads or cores(), progress)
     return Ensemble(table=_table(every, rows), time=times, signals=kept)
-
-
-@functools.cache
-def _defaults() -> dict[str, Any]:
-    """Return the arguments of `ensemble_response` with their defaults."""
-    parameters = inspect.signature(ensemble_response).parameters
-    return {name: parameter.default for name, parameter in parameters.items()}
 
 
 def _check_signals(compiled: Compiled, keep: Sequence[str], metrics: Sequence[MetricLike]) -> None:

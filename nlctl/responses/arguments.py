@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -56,20 +57,19 @@ def checked_params(params: Any) -> Mapping[str, Any] | None:
 
 
 def with_aliases(
-    given: Mapping[str, Any],
-    aliases: Mapping[str, Any],
-    defaults: Mapping[str, Any],
-    who: str = "input_output_response",
+    given: Mapping[str, Any], aliases: Mapping[str, Any], function: Callable[..., Any]
 ) -> dict[str, Any]:
-    """Return arguments by their full names."""
+    """Return arguments of a function by their full names."""
     found = dict(given)
+    parameters = inspect.signature(function).parameters if aliases else {}
     for name, value in aliases.items():
         full = ALIASES.get(name)
         if full is None or full not in given:
             short = [alias for alias, full in ALIASES.items() if full in given]
-            names = [*(k for k in defaults if k != "aliases"), *short]
-            raise unknown("argument", name, names, f"of {who}", UnknownKeywordError)
-        if given[full] is not defaults[full]:
+            names = [*(k for k in parameters if k != "aliases"), *short]
+            whose = f"of {function.__name__}"
+            raise unknown("argument", name, names, whose, UnknownKeywordError)
+        if given[full] is not parameters[full].default:
             raise ParameterError(f"'{full}' is given twice, as {full}= and as {name}=")
         found[full] = value
     if found["timepts"] is None:

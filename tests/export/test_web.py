@@ -1,5 +1,6 @@
 """A loop that runs in WebAssembly: the same numbers as here, to the bit; what it refuses."""
 
+import ctypes
 import json
 import math
 import re
@@ -18,6 +19,8 @@ import nlctl
 from nlctl import actuators, sources
 from nlctl.errors import CompileError, DivergedError, ParameterError, UsageError
 from nlctl.export.web import handles, web_program
+from nlctl.export.web.rounding import integrators_alike
+from nlctl.native.machine.finish import finished
 
 HERE = Path(__file__).parent
 ENGINE = HERE.parents[1] / "analysis" / "report" / "templates" / "live_engine.js"
@@ -83,6 +86,27 @@ def ball():
 def faulty():
     fault = nlctl.Fault("actuator.v", "gain", 0.4, at=nlctl.faults.NEVER)
     return nlctl.with_faults(nlctl.paper.example_1(), fault)
+
+
+def test_powers_of_step_control_are_those_of_python_to_rounding():
+    """x^y with a relative error of few ulp of 1 + |y ln x|; 0 and NaN as they should."""
+    text = """
+declare double @llvm.pow.f64(double, double)
+define double @power(double %x, double %y) {
+  %r = call double @llvm.pow.f64(double %x, double %y)
+  ret double %r
+}
+"""
+    code = finished(integrators_alike(text), ("power",))
+    double = ctypes.c_double
+    power = ctypes.CFUNCTYPE(double, double, double)(code.addresses["power"])
+    for x in np.logspace(-12, 12, 301).tolist():
+        for y in (-0.2, 0.04, 1 / 7, 0.7, 2.0):
+            room = 4 * np.finfo(float).eps * (1 + abs(y * math.log(x)))
+            assert abs(power(x, y) / x**y - 1) <= room, (x, y)
+    assert (power(0.0, 0.2), power(0.0, -0.2)) == (0.0, math.inf)
+    assert math.isnan(power(math.nan, 0.2))
+    assert math.isnan(power(0.5, math.nan))
 
 
 @pytest.mark.ci

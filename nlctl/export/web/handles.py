@@ -198,11 +198,10 @@ class _Reader:
         rule, value = self.rules.get(base), float(self.p[place])
         low, high = given or _within(_around(value), rule)
         self._check_moves(name, base, slot, place, (low, high))
-        if rule is None:
-            return Handle(name=name, kind="p", place=place, value=value, low=low, high=high)
         return Handle(
             name=name, kind="p", place=place, value=value, low=low, high=high,
-            unit="" if rule.unit == "1" else rule.unit, meaning=rule.meaning,
+            unit="" if rule is None or rule.unit == "1" else rule.unit,
+            meaning="" if rule is None else rule.meaning,
         )  # fmt: skip
 
     def _place(self, name: str) -> tuple[int, Slot]:

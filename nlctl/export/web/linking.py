@@ -72,12 +72,12 @@ def linked(texts: Mapping[str, str], exports: Sequence[str], what: str) -> bytes
         return zig(arguments, folder, "page.wasm", f"'{what}' cannot be linked for a page")
 
 
-def wasm_objects(texts: Mapping[str, str], folder: Path, what: str, speed: int = 2) -> list[Path]:
+def wasm_objects(texts: Mapping[str, str], folder: Path, what: str) -> list[Path]:
     """Write object code of modules of IR; LLVM works in a child process, which it may end."""
     paths = [folder / f"{name}.ll" for name in texts]
     for path, text in zip(paths, texts.values(), strict=True):
         path.write_text(text, encoding="utf-8")
-    command = [sys.executable, str(_SCRIPT), str(speed), *map(str, paths)]
+    command = [sys.executable, str(_SCRIPT), *map(str, paths)]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     if run.returncode:
         raise CompileError(f"LLVM makes no WebAssembly of '{what}': {_last(run.stderr)}")

@@ -9,132 +9,79 @@ control are written out: those of two C libraries differ in the last place.
 from __future__ import annotations
 
 import re
-import struct
+from collections.abc import Callable
 
-_FUSED = re.compile(r"^declare (<\d+ x double>|double) @llvm\.(fma|fmuladd)\.(\w+)\(.*\n?", re.M)
-_SCALE = "0x41A0000002000000"  # 2^27 + 1
+from ...native.codegen.ir.functions import LN2, applied, estrin
+from ...native.codegen.ir.text import Body, Module, Value
+
+_FUSED = re.compile(r"^declare .* @llvm\.(fma|fmuladd)\.(?:v(\d+))?f64\(.*\n?", re.MULTILINE)
+_SPLIT = 2.0**27 + 1.0
+_ROOT_HALF = 4604544271217802189  # bits of sqrt(1 / 2)
+_LOG = [1.0 / (2 * k + 1) for k in range(12)]  # artanh(s) / s in s^2
 
 
 def rounding_alike(text: str) -> str:
     """Return the IR of a program, with every product and every sum rounded."""
     text = text.replace("preserve_allcc ", "")  # x86 alone has it
     text = re.sub(r"\bcontract ", "", text)
-    fused = [match.groups() for match in _FUSED.finditer(text)]
-    text = _FUSED.sub("", text)
-    for _, name, suffix in fused:
-        text = text.replace(f"@llvm.{name}.{suffix}(", f"@page.{name}.{suffix}(")
-    return text + "".join(_written(*operands) for operands in fused)
-
-
-def _written(kind: str, name: str, suffix: str) -> str:
-    """Return a product and a sum as a function."""
-    arguments = f"{kind} %a, {kind} %b, {kind} %c"
-    head = f"\ndefine internal {kind} @page.{name}.{suffix}({arguments}) alwaysinline nounwind {{\n"
-    if name == "fmuladd":
-        return f"{head}  %p = fmul {kind} %a, %b\n  %r = fadd {kind} %p, %c\n  ret {kind} %r\n}}\n"
-    scale = f"double {_SCALE}"
-    factor = scale.split()[1] if kind == "double" else f"splat ({scale})"
-    return f"""{head}  %s = fmul {kind} %b, {factor}
-  %d = fsub {kind} %s, %b
-  %high = fsub {kind} %s, %d
-  %low = fsub {kind} %b, %high
-  %first = fmul {kind} %a, %high
-  %sum = fadd {kind} %c, %first
-  %second = fmul {kind} %a, %low
-  %r = fadd {kind} %sum, %second
-  ret {kind} %r
-}}
-"""
+    module = Module(inlined=True)
+    for name, width in _FUSED.findall(text):
+        make = _in_two_parts if name == "fma" else _product_and_sum
+        _enter(module, name, make, 3, int(width or 0))
+    return _with_functions(_FUSED.sub("", text), "fma|fmuladd", module)
 
 
 def integrators_alike(text: str) -> str:
     """Return the IR of the integrators with functions of their own for step control."""
-    for name in ("exp", "log", "pow"):
-        text = text.replace(f"@llvm.{name}.f64(", f"@page.{name}(")
-    text = re.sub(r"^declare .*@page\.(exp|log|pow)\(.*\n", "", text, flags=re.MULTILINE)
-    return text + _POWERS
+    text = re.sub(r"^declare .*@llvm\.(exp|log|pow)\.f64\(.*\n", "", text, flags=re.MULTILINE)
+    module = Module(inlined=False)
+    _enter(module, "pow", _pow, 2)  # with exp and log
+    return rounding_alike(_with_functions(text, "exp|log|pow", module))
 
 
-def _horner(terms: list[float], x: str) -> str:
-    """Return the lines of a polynomial, from its last coefficient on."""
-    lines, value = [], repr(terms[-1])
-    for k, term in enumerate(reversed(terms[:-1])):
-        lines += [f"  %m{k} = fmul double {value}, {x}", f"  %n{k} = fadd double %m{k}, {term!r}"]
-        value = f"%n{k}"
-    return "\n".join([*lines, f"  %sum = fadd double {value}, 0.0"])
+def _enter(
+    module: Module, name: str, make: Callable[..., tuple[Value]], count: int, width: int = 0
+) -> None:
+    """Write a function of so many arguments, with what it calls."""
+    arguments = [Value(f"%x{i}", width) for i in range(count)]
+    Body(module, portable=True).called(name, make, arguments, 1)
 
 
-def _number(value: float) -> str:
-    """Return a number as LLVM reads it exactly."""
-    return "0x" + struct.pack(">d", value).hex().upper()
+def _with_functions(text: str, names: str, module: Module) -> str:
+    """Return IR that calls the functions of a module instead of LLVM's own."""
+    text = re.sub(
+        rf"@llvm\.({names})\.(?:v(\d+))?f64\(",
+        lambda m: f"@nlctl.{m[1]}.{m[2] or 1}.portable(",
+        text,
+    )
+    return "\n".join([text, *module.declared, *module.functions.values()])
 
 
-def _exact(text: str) -> str:
-    """Return IR with decimal numbers bit by bit."""
-    return re.sub(r"(?<=[ ,])-?\d+\.\d+(?:e-?\d+)?\b", lambda m: _number(float(m[0])), text)
+def _product_and_sum(b: Body, x: Value, y: Value, z: Value) -> tuple[Value]:
+    return (b.add(b.mul(x, y), z),)
 
 
-def _factorials(count: int) -> list[float]:
-    terms, value = [], 1.0
-    for k in range(count):
-        terms.append(value)
-        value /= k + 1
-    return terms
+def _in_two_parts(b: Body, x: Value, y: Value, z: Value) -> tuple[Value]:
+    """Return x y + z, with y in two parts (T. J. Dekker, Numerische Mathematik 18:224, 1971)."""
+    scaled = b.mul(y, _SPLIT)
+    high = b.sub(scaled, b.sub(scaled, y))
+    return (b.add(b.add(z, b.mul(x, high)), b.mul(x, b.sub(y, high))),)
 
 
-_POWERS = _exact(f"""
-declare double @llvm.rint.f64(double)
-declare i64 @llvm.fptosi.sat.i64.f64(double)
+def _log(b: Body, x: Value) -> tuple[Value]:
+    """Return ln x = n ln 2 + 2 artanh((m - 1) / (m + 1)), of what is finite and not too small."""
+    bits = b.bits(x)
+    n = b.integer("ashr", b.integer("sub", bits, _ROOT_HALF), 52)
+    m = b.real(b.logic("sub", bits, b.integer("shl", n, 52)))
+    s = b.op("fdiv", b.sub(m, 1.0), b.add(m, 1.0))
+    rest = b.mul(b.mul(s, 2.0), estrin(b, _LOG, b.mul(s, s)))
+    log = b.add(b.mul(b.new(f"sitofp {n} to double"), LN2[0]), rest)
+    return (b.add(log, b.sub(x, x)),)  # NaN stays
 
-; of numbers that are finite and not too small: what step control takes
-define internal double @page.log(double %x) nounwind {{
-  %bits = bitcast double %x to i64
-  %shifted = sub i64 %bits, 4604544271217802189
-  %n = ashr i64 %shifted, 52
-  %moved = shl i64 %n, 52
-  %rest = sub i64 %bits, %moved
-  %m = bitcast i64 %rest to double
-  %up = fadd double %m, 1.0
-  %down = fsub double %m, 1.0
-  %s = fdiv double %down, %up
-  %z = fmul double %s, %s
-{_horner([1.0 / (2 * k + 1) for k in range(12)], "%z")}
-  %two = fmul double %s, 2.0
-  %of.m = fmul double %two, %sum
-  %e = sitofp i64 %n to double
-  %of.e = fmul double %e, 0.6931471805599453
-  %q = fadd double %of.e, %of.m
-  %gone = fsub double %x, %x
-  %r = fadd double %q, %gone
-  ret double %r
-}}
 
-define internal double @page.exp(double %x) nounwind {{
-  %turns = fmul double %x, 1.4426950408889634
-  %e = call double @llvm.rint.f64(double %turns)
-  %back = fmul double %e, 0.6931471805599453
-  %rest = fsub double %x, %back
-{_horner(_factorials(15), "%rest")}
-  %n = call i64 @llvm.fptosi.sat.i64.f64(double %e)
-  %low = icmp slt i64 %n, -1000
-  %not.low = select i1 %low, i64 -1000, i64 %n
-  %high = icmp sgt i64 %not.low, 1000
-  %some = select i1 %high, i64 1000, i64 %not.low
-  %biased = add i64 %some, 1023
-  %bits = shl i64 %biased, 52
-  %power = bitcast i64 %bits to double
-  %r = fmul double %sum, %power
-  ret double %r
-}}
-
-define internal double @page.pow(double %x, double %y) nounwind {{
-  %log = call double @page.log(double %x)
-  %both = fmul double %log, %y
-  %r = call double @page.exp(double %both)
-  %none = fcmp oeq double %x, 0.0
-  %sign = fcmp olt double %y, 0.0
-  %ends = select i1 %sign, double 0x7FF0000000000000, double 0.0
-  %s = select i1 %none, double %ends, double %r
-  ret double %s
-}}
-""")
+def _pow(b: Body, x: Value, y: Value) -> tuple[Value]:
+    """Return x^y of x >= 0."""
+    (log,) = b.called("log", _log, [x], 1)
+    power = applied(b, "exp", b.mul(log, y))
+    at_zero = b.select(b.compare("olt", y, 0.0), float("inf"), 0.0)
+    return (b.select(b.compare("oeq", x, 0.0), at_zero, power),)

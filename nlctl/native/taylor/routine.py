@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +28,6 @@ _FOLLOWING = ("t", "x", "u", "c", "v", "w", "o", "b", "a", "q", "k")
 _LAST = ("w", "b", "k")
 _STEP_FUNCTIONS = ("taylor", "growth", "step", "judge", "values")
 _SETTINGS = ("order", "rtol", "atol")
-_ONCE = threading.Lock()  # of several threads that need it one compiles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,12 +53,11 @@ class Series:
 
 def series(reading: Reading, p: np.ndarray, width: int) -> Series:
     """Return the coefficients of `width` members' solutions, made when they are first needed."""
-    with _ONCE:
-        return reading.cache.found(
-            Series,
-            lambda kept: kept.lowered.lanes == width and kept.lowered.holds_for(p),
-            lambda: _made(reading, p, width),
-        )
+    return reading.cache.found(
+        Series,
+        lambda kept: kept.lowered.lanes == width and kept.lowered.holds_for(p),
+        lambda: _made(reading, p, width),
+    )
 
 
 def _check(reading: Reading) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from ..codegen.ir.functions import applied
 from ..codegen.ir.text import Body, Module, Turns, Value, constant
 from ..integrate.methods.taylor import FOLLOWED
 from .folds import WIDE, SeriesLayout
@@ -135,8 +136,7 @@ class _Function:
 
     def larger(self, a: Value, b: Value) -> Value:
         """Return the larger of two values; NaN is larger than all."""
-        first = self.b.logic("or", self.b.compare("ogt", a, b), self.b.compare("uno", a, a))
-        return self.b.select(first, a, b)
+        return applied(self.b, "maximum", a, b)
 
     def over_lanes(self, value: Value) -> Value:
         """Return the largest of a single member's rows; those of several are apart already."""

@@ -90,24 +90,16 @@ class Tube:
 
 
 def tube_from(
-    code: SeriesCode,
-    box: np.ndarray,
-    duration: float,
-    limits: np.ndarray,
-    *,
-    cells: int,
-    order: int = FIRST_ORDER,
-    degree: int = SET_DEGREE,
-    tolerance: float = TOLERANCE,
+    code: SeriesCode, box: np.ndarray, duration: float, limits: np.ndarray, *, cells: int
 ) -> Tube:
     """Enclose all solutions from a box of shape (n, 2) over a time; see `Tube`."""
     n, box = code.order, np.array(box, dtype=float)
-    table = monomials(n, degree)
+    table = monomials(n, SET_DEGREE)
     low, high = np.full((cells, n), np.inf), np.full((cells, n), -np.inf)
     end, weight = np.empty((n, 2)), np.zeros(n)
     status, time, steps = integrated(
         code.addresses, code.places, code.folds, table.arrays, box, float(duration),
-        np.array(limits, dtype=float), order, tolerance, LANES, low, high, end, weight,
+        np.array(limits, dtype=float), FIRST_ORDER, TOLERANCE, LANES, low, high, end, weight,
     )  # fmt: skip
     return Tube(status=status, time=time, low=low, high=high, end=end, weight=weight, steps=steps)
 

@@ -90,7 +90,7 @@ def _call(b: Body, name: str, make: Callable[..., Results], *args: Value) -> Res
     return b.called(name, make, b.same(*args), 2 if make is _sin_and_cos else 1)
 
 
-def _polynomial(b: Body, coefficients: Sequence[float], x: Value) -> Value:
+def estrin(b: Body, coefficients: Sequence[float], x: Value) -> Value:
     """Evaluate a polynomial by Estrin's scheme: pairs, pairs of pairs, ..."""
     terms: list[Value | float] = list(coefficients)
     while True:
@@ -131,7 +131,7 @@ def _exp(b: Body, x: Value) -> Results:
     """e^x = 2 e^r 2^(n-1): overflows to infinity, underflows gradually to 0."""
     x = _clamped(b, x, -746.0, 710.0)
     r, m = _reduced(b, x, 1022)
-    tail = _polynomial(b, [2 * c for c in EXP], r)
+    tail = estrin(b, [2 * c for c in EXP], r)
     y = b.muladd(tail, b.mul(r, r), b.muladd(r, 2.0, 2.0))
     return (_scaled(b, y, m, b.compare("olt", x, _SMALLEST)),)
 
@@ -140,7 +140,7 @@ def _exp2(b: Body, x: Value) -> Results:
     x = _clamped(b, x, -1077.0, 1024.5)
     m = b.add(x, ROUND + 1022, exact=True)
     r = b.sub(x, b.sub(m, ROUND + 1022, exact=True), exact=True)
-    y = b.muladd(_polynomial(b, [2 * c for c in EXP2], r), r, 2.0)
+    y = b.muladd(estrin(b, [2 * c for c in EXP2], r), r, 2.0)
     return (_scaled(b, y, m, b.compare("olt", x, _SMALLEST * _LOG2_E)),)
 
 
@@ -149,7 +149,7 @@ def _tanh(b: Body, x: Value) -> Results:
     y = b.intrinsic("fabs", x)
     y = b.select(b.compare("ogt", y, 22.0), 22.0, y)
     r, m = _reduced(b, b.add(y, y), 1023)
-    e = b.muladd(_polynomial(b, EXP, r), b.mul(r, r), r)
+    e = b.muladd(estrin(b, EXP, r), b.mul(r, r), r)
     scale = b.real(b.integer("shl", b.bits(m), 52))
     e = b.muladd(scale, e, b.sub(scale, 1.0))
     return (b.intrinsic("copysign", b.op("fdiv", e, b.add(e, 2.0)), x),)
@@ -170,8 +170,8 @@ def _sin_and_cos(b: Body, x: Value) -> Results:
     m = b.fma(x, TWO_OVER_PI, ROUND)
     r = _less(b, x, b.sub(m, ROUND, exact=True), HALF_PI)
     z = b.mul(r, r)
-    sine = b.muladd(b.mul(r, z), _polynomial(b, SIN, z), r)
-    cosine = b.muladd(b.mul(z, z), _polynomial(b, COS, z), b.muladd(z, -0.5, 1.0))
+    sine = b.muladd(b.mul(r, z), estrin(b, SIN, z), r)
+    cosine = b.muladd(b.mul(z, z), estrin(b, COS, z), b.muladd(z, -0.5, 1.0))
     bits = b.bits(m)
     odd = b.is_negative(b.integer("shl", bits, 63))
     sign = -(2**63)
@@ -201,7 +201,7 @@ def _half_turn(b: Body, x: Value, m: Value, shift: float, sign: Value) -> Value:
     n = b.add(n, shift, exact=True) if shift else n
     r = _less(b, x, n, PI)
     z = b.mul(r, r)
-    y = b.muladd(b.mul(r, z), _polynomial(b, SIN_WIDE, z), r)
+    y = b.muladd(b.mul(r, z), estrin(b, SIN_WIDE, z), r)
     return b.real(b.logic("xor", b.bits(y), b.integer("shl", sign, 63)))
 
 
