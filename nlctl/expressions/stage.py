@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import contextlib
 import dataclasses
 import enum
 import functools
@@ -25,14 +26,14 @@ from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
-from .library.python import Builtins, of_math
+from .library.python import NUMBERS, Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
-from .source import codes_in
+from .source import codes_in, is_dispatcher
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
@@ -167,6 +168,8 @@ class Stage:
     def _instead_of_object(self, value: object) -> Any:
         if isinstance(value, functools.partial | MethodType):
             return self.called_object(value)
+        if is_dispatcher(value):
+            return functools.partial(self._dispatched, value)
         if isinstance(value, CPUDispatcher | FunctionType):
             if value is dataclasses.dataclass:  # it looks at types and defaults alone
                 return value
@@ -192,6 +195,20 @@ class Stage:
         if value.signature is not None or value.excluded or value.cache:
             raise Untraceable("np.vectorize with other arguments")
         return WRITTEN[np.vectorize](self.graph, self.instead(value.pyfunc), value.otypes)
+
+    def _dispatched(self, function: Any, first: Any, *rest: Any, **options: Any) -> Any:
+        """Return what a function returns that the type of its first argument chooses."""
+        functions = set(map(function.dispatch, self._kinds(first)))
+        if len(functions) > 1:
+            raise Untraceable("a choice by the type of a number")
+        return self.copied(functions.pop())(first, *rest, **options)
+
+    def _kinds(self, value: Any) -> list[type]:
+        """Return the types that a value may have."""
+        if isinstance(value, Tracer):
+            return [np.ndarray] if value.shape else [type(v) for v in NUMBERS[value.only.kind]]
+        cls = type(staged.settled(value))
+        return [next((real for real, copied in self.classes.items() if copied is cls), cls)]
 
     def parent(self, thing: Any, cls: type) -> Any:
         """Return what ``super()`` is in a method of somebody's object."""
@@ -313,6 +330,8 @@ class Stage:
             return NumberType(np.float64, self._float64)
         if cls is np.errstate:
             return _errstate
+        if cls is contextlib.suppress:
+            return _suppress
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -364,6 +383,11 @@ def _errstate(**how: Any) -> Any:
     if not {"ignore", "warn", None}.issuperset(how.values()):
         raise Untraceable("NumPy's errors as errors of Python's")
     return np.errstate(**how)
+
+
+def _suppress(*_: Any) -> Any:
+    """Refuse what the words of a function do not show."""
+    raise Untraceable("contextlib.suppress that is no global")
 
 
 def _is_column(value: object) -> bool:

@@ -268,6 +268,7 @@ class Expressions(ast.NodeVisitor):
         return SLICE
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
+        self.walk.unbound += ["text"]  # numba writes numbers in other digits than Python
         for part in ast.walk(node):
             if isinstance(part, ast.FormattedValue):
                 self.visit(part.value)
