@@ -233,6 +233,8 @@ class Graph:
 
     def _operation(self, name: str, *args: Expr) -> Expr:
         kinds = {a.kind for a in args}
+        if kinds == {"i", "b"} and name in ("add", "sub", "mul"):  # as in sum([x > 0, y > 0])
+            args, kinds = tuple(map(self.integer, args)), {"i"}
         if kinds == {"i"} and name in INTEGER:
             return self._of_integers(name, *args)
         if kinds == {"b"} and name in BOOLEAN:

@@ -117,6 +117,8 @@ def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType
         body = ast.parse(text, file).body
         codes: set[CodeType] = set()
         for place, statement in enumerate(body):
+            if isinstance(statement, ast.ImportFrom) and statement.module == "__future__":
+                continue
             if _first_line(statement) <= line <= (statement.end_lineno or line):
                 for neighbours in _runs(body[:place], body[place + 1 :]):
                     cell = ast.Module([*neighbours, statement], type_ignores=[])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import collections
 import contextlib
 import dataclasses
 import enum
@@ -39,6 +40,7 @@ _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, sl
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
+_OF_TUPLES = vars(collections.namedtuple("_Tuple", ()))  # what Python makes of a named tuple
 _LARGE = 65536  # elements of an array that stays as it is
 
 
@@ -177,7 +179,8 @@ class Stage:
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            return type(value)._make(map(self.instead, value))  # pyright: ignore[reportAttributeAccessIssue]
+            cls: Any = self._copied_tuple(type(value))
+            return cls._make(map(self.instead, value))
         if type(value).__module__ in _OPERATORS:
             return value  # itemgetter and its kind
         if staged.is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
@@ -341,9 +344,20 @@ class Stage:
                                                 "itertools", "operator", "_operator", "numbers",
                                                 "control", "nlctl"):  # fmt: skip
             return cls
-        if issubclass(cls, tuple) or not any(map(_has_code, vars(cls).values())):
+        if issubclass(cls, tuple):
+            return self._copied_tuple(cls)
+        return self.copied_class(cls) if any(map(_has_code, vars(cls).values())) else cls
+
+    def _copied_tuple(self, cls: type) -> type:
+        """Return a named tuple's class with methods that lead to the stage."""
+        of_users = {k: v for k, v in vars(cls).items() if _has_code(v) and k not in _OF_TUPLES}
+        if not of_users or not hasattr(cls, "_fields"):
             return cls
-        return self.copied_class(cls)
+        if cls not in self.classes:
+            self.classes[cls] = copied = type(cls.__name__, (cls,), {"__slots__": ()})
+            for name, value in of_users.items():
+                setattr(copied, name, self._member(value))
+        return self.classes[cls]
 
     def _float64(self, value: Any = 0.0) -> Any:
         """Return a number as one of NumPy's."""

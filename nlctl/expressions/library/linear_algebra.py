@@ -212,6 +212,14 @@ def det(graph: Graph, a: Any) -> Any:
     return _determinant(graph, rows)
 
 
+@of(np.linalg.slogdet)
+def slogdet(graph: Graph, a: Any) -> Any:
+    """Return the sign of a determinant and the logarithm of its size."""
+    value = det(graph, a)
+    size = elementwise(graph, "log", elementwise(graph, "absolute", value))
+    return type(np.linalg.slogdet(np.eye(1)))(elementwise(graph, "sign", value), size)
+
+
 def _determinant(graph: Graph, rows: _Rows) -> Any:
     np_ = Facade(graph)
     _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
