@@ -14,7 +14,9 @@ import dataclasses
 import enum
 import functools
 import inspect
+import logging
 import math
+import warnings
 from collections.abc import Callable
 from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -124,6 +126,8 @@ class Stage:
             return self.fresh(value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
             return value
+        if isinstance(value, logging.Logger) or value is warnings.warn:
+            return staged.Messages(value)
         if isinstance(value, type):
             return self._type(value)
         if type(value) in (list, tuple):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
-from ..graph import Graph, Namespace, Untraceable
+from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, is_of_arrays
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
@@ -80,7 +80,7 @@ class Builtins:
     def namespace(self, import_: Callable[..., Any]) -> dict[str, Any]:
         """Return all of them by name."""
         names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
-        names.update(__import__=import_, super=self._super)
+        names.update(__import__=import_, super=self._super, print=self._print)
         for name in ("len", "round", "isinstance", "getattr", "hasattr", "type"):
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
@@ -161,6 +161,9 @@ class Builtins:
         if len(answers) > 1:
             raise Untraceable("a question for the type of a number")
         return answers.pop()
+
+    def _print(self, *_: object, **__: object) -> None:
+        raise MessageWritten("a message is written")
 
     def _getattr(self, thing: object, *rest: Any) -> Any:
         return getattr(thing, *rest)

@@ -32,6 +32,7 @@ from .values import (
     KnownValue,
     ListOf,
     Local,
+    Message,
     OneOf,
     Parent,
     Pure,
@@ -191,7 +192,7 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
     if isinstance(owner, logging.Logger) and _says_nothing(walk, owner, thing.__name__):
         return FRESH
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
-        raise Impure(f"writes messages with {thing.__name__}()", OUTPUT)
+        raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
         if thing.__name__ not in _OF_TABLES:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
@@ -376,7 +377,9 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     if name in _PLAIN:
         walk.unbound += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
-    advice = OUTPUT if name in ("print", "input", "open") else "do without it"
+    if name == "print":
+        raise Message("calls print()", OUTPUT)
+    advice = OUTPUT if name in ("input", "open") else "do without it"
     raise Impure(f"calls {name}()", advice)
 
 
