@@ -29,7 +29,7 @@ from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
-from .library.python import NUMBERS, Builtins, of_math
+from .library.python import NUMBER_SAMPLES, Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
@@ -42,7 +42,7 @@ _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, sl
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
-_OF_TUPLES = vars(collections.namedtuple("_Tuple", ()))  # what Python makes of a named tuple
+_OF_TUPLES = frozenset(vars(collections.namedtuple("_Tuple", ())))  # what Python makes of one
 _LARGE = 65536  # elements of an array that stays as it is
 
 
@@ -213,7 +213,9 @@ class Stage:
     def _kinds(self, value: Any) -> list[type]:
         """Return the types that a value may have."""
         if isinstance(value, Tracer):
-            return [np.ndarray] if value.shape else [type(v) for v in NUMBERS[value.only.kind]]
+            return (
+                [np.ndarray] if value.shape else [type(v) for v in NUMBER_SAMPLES[value.only.kind]]
+            )
         cls = type(staged.settled(value))
         return [next((real for real, copied in self.classes.items() if copied is cls), cls)]
 
@@ -405,7 +407,7 @@ def _errstate(**how: Any) -> Any:
 
 def _suppress(*_: Any) -> Any:
     """Refuse what the words of a function do not show."""
-    raise Untraceable("contextlib.suppress that is no global")
+    raise Untraceable("contextlib.suppress under a name that is not global")
 
 
 def _is_column(value: object) -> bool:

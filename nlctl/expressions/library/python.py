@@ -23,7 +23,7 @@ _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
 # of a kind of numbers: those of Python and of NumPy
-NUMBERS = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
+NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
 # these ask their arguments, as they do of arrays
 
 
@@ -157,7 +157,7 @@ class Builtins:
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
         if thing.shape:
             return isinstance(np.empty(0), kinds)
-        answers = {isinstance(v, kinds) for v in NUMBERS[thing.only.kind]}
+        answers = {isinstance(v, kinds) for v in NUMBER_SAMPLES[thing.only.kind]}
         if len(answers) > 1:
             raise Untraceable("a question for the type of a number")
         return answers.pop()

@@ -41,7 +41,7 @@ def check_functions(path: str, system: System) -> FunctionReading:
         try:
             readings.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:
-            raise refusal(path, what, error) from None
+            raise refused_block(path, what, error) from None
     messages = [message for reading in readings for message in reading.messages]
     if not messages and not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
@@ -52,7 +52,7 @@ def check_functions(path: str, system: System) -> FunctionReading:
     )
 
 
-def refusal(path: str, what: str, error: Impure) -> CompileError:
+def refused_block(path: str, what: str, error: Impure) -> CompileError:
     """Return the error that says why a block's function is neither compiled nor called."""
     place = f" ({error.place})" if error.place else ""
     return CompileError(

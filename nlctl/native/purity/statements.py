@@ -200,7 +200,7 @@ class CallWalker(Expressions):
         before = list(self.walk.unbound)
         if node.exc is not None:
             self.visit(node.exc)
-        if "text" not in before:  # what an error says is no number
+        if "text" not in before:  # nobody computes with what an error says
             self.walk.unbound = [name for name in self.walk.unbound if name != "text"]
 
     def visit_Try(self, node: ast.Try) -> None:
