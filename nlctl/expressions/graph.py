@@ -99,6 +99,10 @@ class Namespace(dict[str, Any]):
     """Builtins of the copies of functions that are traced, known by it from other code."""
 
 
+class MessageWritten(Untraceable):
+    """A way through a function writes a message."""
+
+
 class OpenCondition(BaseException):  # (what is traced may catch exceptions)
     """A function asks whether a condition holds that is not known when it is traced."""
 
@@ -111,6 +115,7 @@ class Graph:
 
     def __init__(self, lengths: Mapping[str, int] | None = None) -> None:
         self.nodes: list[Expr] = []
+        self.settles = False  # whether conditions of parameters that are integers are decided
         self.limit = UNLIMITED  # largest number of expressions for now
         # sizes of the arrays that are read, as far as known: nothing is read beyond
         self.lengths = dict(lengths or {})
@@ -137,6 +142,11 @@ class Graph:
         if condition in self.implied:
             return self.implied[condition]
         if condition not in self.decisions:
+            values = [a.data if a.op == "const" else a.value for a in condition.args]
+            if self.settles and values and None not in values:
+                for integer in condition.args:
+                    self.assumed(integer)
+                return bool(numpy_function(condition.op)(*values))
             raise OpenCondition(condition)
         return self.decisions[condition]
 
@@ -233,6 +243,8 @@ class Graph:
 
     def _operation(self, name: str, *args: Expr) -> Expr:
         kinds = {a.kind for a in args}
+        if kinds == {"i", "b"} and name in ("add", "sub", "mul"):  # as in sum([x > 0, y > 0])
+            args, kinds = tuple(map(self.integer, args)), {"i"}
         if kinds == {"i"} and name in INTEGER:
             return self._of_integers(name, *args)
         if kinds == {"b"} and name in BOOLEAN:

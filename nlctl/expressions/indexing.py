@@ -172,9 +172,9 @@ def _assign_at(self: Tracer, key: Any, value: Tracer) -> None:
         raise Untraceable("assignment to places in a part of a long array")
     cells = self.elements()
     cells[key] = value.elements() if value.shape else value.only
-    if self.axis is not None:
-        if self.ndim > 1:
-            raise Untraceable("assignment to a part of a large matrix")
+    if self.axis is not None and self.ndim > 1:
+        self.values, self.axis, self.length, self.version = cells, None, 1, self.version + 1
+    elif self.axis is not None:
         joined = self.graph.joined([(e, 1) for e in cells])
         self.values, self.version = as_array(joined), self.version + 1
 

@@ -140,6 +140,8 @@ def _one(statement: ast.stmt) -> _Values | None:
         return {ast.unparse(t): (t, ast.IfExp(statement.test, a, b)) for t, a, b in parts}
     if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
         target, value = statement.targets[0], statement.value
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):  # a, b = c, d
+            return _at_once(target.elts, value.elts)
     elif isinstance(statement, ast.AugAssign):
         target = statement.target
         value = ast.BinOp(_as_read(target), statement.op, statement.value)
@@ -147,6 +149,14 @@ def _one(statement: ast.stmt) -> _Values | None:
         return None
     plain = isinstance(target, ast.Name | ast.Subscript)
     return {ast.unparse(target): (target, value)} if plain else None
+
+
+def _at_once(targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> _Values | None:
+    """Return what is assigned to several names at once; None if there is more than that."""
+    names = [ast.unparse(t) for t in targets if isinstance(t, ast.Name)]
+    if len(set(names)) != len(targets) or len(values) != len(targets):
+        return None
+    return dict(zip(names, zip(targets, values, strict=True), strict=True))
 
 
 def _as_read(target: Any) -> ast.expr:

@@ -145,7 +145,7 @@ def product(a: Tracer, b: Tracer) -> Tracer:
     if b.ndim == 1 and b.axis is None and b.size > SMALL and a.axis == a.ndim - 1:
         b = b.as_long()
     if b.ndim == 2:
-        a = a[..., None]
+        a = (a.short() if b.axis == 1 else a)[..., None]  # rows that are long stay in one piece
         return total(elementwise(a.graph, "mul", a, b), -2)
     return total(elementwise(a.graph, "mul", a, b), -1)
 

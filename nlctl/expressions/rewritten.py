@@ -9,10 +9,11 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import dis
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -29,7 +30,7 @@ _LEAVING = ast.Return | ast.Break | ast.Continue
 _PYTHONS = IndexError | KeyError | StopIteration | ZeroDivisionError | UnboundLocalError
 _KEYS = (int, float, bool)
 _WORDS = (ast.Try, ast.Raise, ast.Assert, ast.While, ast.Dict, ast.Subscript,
-          ast.Attribute)  # fmt: skip
+          ast.Attribute, ast.With, ast.JoinedStr)  # fmt: skip
 
 
 def followable_code(function: FunctionType, merging: bool) -> CodeType:
@@ -47,7 +48,7 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
         if ast.Try in kinds:
             raise Untraceable("try in a method that calls super()")
         return function.__code__
-    body = _Rewriter().visit(copy.deepcopy(tree))
+    body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
     body = Merger().visit(body) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
@@ -71,6 +72,37 @@ def _inside(code: CodeType, name: str) -> CodeType:
 
 
 class _Rewriter(ast.NodeTransformer):
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        self.names = names
+
+    def visit_With(self, node: ast.With) -> Any:
+        """Write ``try`` for ``with suppress(...)``."""
+        call = node.items[0].context_expr
+        if len(node.items) > 1 or not isinstance(call, ast.Call) or not self._suppresses(call.func):
+            self.generic_visit(node)
+            return node
+        caught = ast.ExceptHandler(ast.Tuple(call.args, ast.Load()), None, [ast.Pass()])
+        return self.visit(ast.copy_location(ast.Try(node.body, [caught], [], []), node))
+
+    def _suppresses(self, node: ast.expr) -> bool:
+        """Whether a name is that of `contextlib.suppress`."""
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            of_module = self.names.get(node.value.id) is contextlib
+            return of_module and node.attr == "suppress"
+        return isinstance(node, ast.Name) and self.names.get(node.id) is contextlib.suppress
+
+    def visit_JoinedStr(self, node: ast.JoinedStr) -> Any:
+        """Write a text that may stay unwritten: of numbers that are only known when it runs."""
+        parts = [part for part in node.values if isinstance(part, ast.FormattedValue)]
+        formats = [part.format_spec or ast.Constant("") for part in parts]
+        inside = [n for part in parts for n in ast.walk(part)]
+        if not parts or any(isinstance(n, ast.NamedExpr | ast.Yield) for n in inside):
+            return node
+        pairs = [ast.Tuple([self.visit(copy.deepcopy(part.value)), form], ast.Load())
+                 for part, form in zip(parts, formats, strict=True)]  # fmt: skip
+        nothing = ast.arguments([], [], None, [], [], None, [])
+        return call_instead("text", ast.Lambda(nothing, node), *pairs)
+
     def visit_Try(self, node: ast.Try) -> Any:
         self.generic_visit(node)
         if any(isinstance(n, _LEAVING) for part in node.finalbody for n in ast.walk(part)):
@@ -175,8 +207,36 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
         INSTEAD_NAME.format("item"): functools.partial(_item, graph),
         INSTEAD_NAME.format("slice"): slice,
+        INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
     }
+
+
+def _text(write: Callable[[], str], *parts: tuple[Any, str]) -> Any:
+    """Return a text, one that says nothing where numbers in it are only known when it runs."""
+    varying = [(v, form) for v, form in parts if isinstance(v, Tracer | _Unwritten)]
+    if not varying:
+        return write()
+    for value, form in varying:
+        if form and (not isinstance(value, Tracer) or value.shape or value.only.kind != "f"):
+            raise Untraceable("a text of what is only known when it runs")
+        format(0.5 if form else "", form)
+    return _Unwritten()
+
+
+class _Unwritten:
+    """A text that may be handed on and thrown away; nothing can be asked of it."""
+
+    @property
+    def __class__(self) -> Any:
+        return str
+
+    def _asked(self, *_: Any) -> Any:
+        raise Untraceable("a text of what is only known when it runs")
+
+    __getattr__ = __str__ = __format__ = __hash__ = __eq__ = __len__ = __bool__ = _asked
+    __iter__ = __add__ = __radd__ = __mod__ = __lt__ = __gt__ = __contains__ = _asked
+    __getitem__ = __repr__ = __mul__ = __rmul__ = __le__ = __ge__ = __ne__ = _asked
 
 
 class _Attempt:

@@ -73,6 +73,14 @@ def source_file(function: FunctionType) -> str:
     return _file_and_text(function)[0]
 
 
+def is_dispatcher(thing: object) -> bool:
+    """Whether a function is one of `functools.singledispatch`."""
+    return isinstance(thing, FunctionType) and thing.__code__ is _DISPATCHER
+
+
+_DISPATCHER = functools.singledispatch(abs).__code__
+
+
 def _file_and_text(function: FunctionType) -> tuple[str, str]:
     """Return where a function stands, and what stands there: "" where nothing is found."""
     # Functions that cloudpickle has made again do not know their file; their globals do.
@@ -109,6 +117,8 @@ def _by_cells(text: str, file: str, flags: int, line: int) -> frozenset[CodeType
         body = ast.parse(text, file).body
         codes: set[CodeType] = set()
         for place, statement in enumerate(body):
+            if isinstance(statement, ast.ImportFrom) and statement.module == "__future__":
+                continue
             if _first_line(statement) <= line <= (statement.end_lineno or line):
                 for neighbours in _runs(body[:place], body[place + 1 :]):
                     cell = ast.Module([*neighbours, statement], type_ignores=[])

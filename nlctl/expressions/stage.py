@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import builtins
 import cmath
+import collections
+import contextlib
 import dataclasses
 import enum
 import functools
 import inspect
+import logging
 import math
+import warnings
 from collections.abc import Callable
 from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -25,19 +29,20 @@ from .arrays import Special, Tracer, python_number, scalar, traced
 from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
-from .library.python import Builtins, of_math
+from .library.python import NUMBER_SAMPLES, Builtins, of_math
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
 from .library.table import ARRAY_MAKERS, UFUNC_OPERATIONS, WRITTEN, NumberType, unwrapped
 from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
-from .source import codes_in
+from .source import codes_in, is_dispatcher
 
 _RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
+_OF_TUPLES = frozenset(vars(collections.namedtuple("_Tuple", ())))  # what Python makes of one
 _LARGE = 65536  # elements of an array that stays as it is
 
 
@@ -121,6 +126,8 @@ class Stage:
             return self.fresh(value)
         if type(value) in _RAW or isinstance(value, np.generic | Tracer | Special | enum.Enum):
             return value
+        if isinstance(value, logging.Logger) or value is warnings.warn:
+            return staged.Messages(value)
         if isinstance(value, type):
             return self._type(value)
         if type(value) in (list, tuple):
@@ -167,6 +174,8 @@ class Stage:
     def _instead_of_object(self, value: object) -> Any:
         if isinstance(value, functools.partial | MethodType):
             return self.called_object(value)
+        if is_dispatcher(value):
+            return functools.partial(self._dispatched, value)
         if isinstance(value, CPUDispatcher | FunctionType):
             if value is dataclasses.dataclass:  # it looks at types and defaults alone
                 return value
@@ -174,7 +183,8 @@ class Stage:
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
-            return type(value)._make(map(self.instead, value))  # pyright: ignore[reportAttributeAccessIssue]
+            cls: Any = self._copied_tuple(type(value))
+            return cls._make(map(self.instead, value))
         if type(value).__module__ in _OPERATORS:
             return value  # itemgetter and its kind
         if staged.is_of_a_library(value) and callable(value) and hasattr(value, "__wrapped__"):
@@ -192,6 +202,22 @@ class Stage:
         if value.signature is not None or value.excluded or value.cache:
             raise Untraceable("np.vectorize with other arguments")
         return WRITTEN[np.vectorize](self.graph, self.instead(value.pyfunc), value.otypes)
+
+    def _dispatched(self, function: Any, first: Any, *rest: Any, **options: Any) -> Any:
+        """Return what a function returns that the type of its first argument chooses."""
+        functions = set(map(function.dispatch, self._kinds(first)))
+        if len(functions) > 1:
+            raise Untraceable("a choice by the type of a number")
+        return self.copied(functions.pop())(first, *rest, **options)
+
+    def _kinds(self, value: Any) -> list[type]:
+        """Return the types that a value may have."""
+        if isinstance(value, Tracer):
+            return (
+                [np.ndarray] if value.shape else [type(v) for v in NUMBER_SAMPLES[value.only.kind]]
+            )
+        cls = type(staged.settled(value))
+        return [next((real for real, copied in self.classes.items() if copied is cls), cls)]
 
     def parent(self, thing: Any, cls: type) -> Any:
         """Return what ``super()`` is in a method of somebody's object."""
@@ -313,6 +339,8 @@ class Stage:
             return NumberType(np.float64, self._float64)
         if cls is np.errstate:
             return _errstate
+        if cls is contextlib.suppress:
+            return _suppress
         raw = (BaseException, enum.Enum, np.generic, np.ndarray, np.ufunc)
         if cls is type or issubclass(cls, raw) or cls.__module__ in ("builtins", "abc", "typing"):
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
@@ -322,9 +350,20 @@ class Stage:
                                                 "itertools", "operator", "_operator", "numbers",
                                                 "control", "nlctl"):  # fmt: skip
             return cls
-        if issubclass(cls, tuple) or not any(map(_has_code, vars(cls).values())):
+        if issubclass(cls, tuple):
+            return self._copied_tuple(cls)
+        return self.copied_class(cls) if any(map(_has_code, vars(cls).values())) else cls
+
+    def _copied_tuple(self, cls: type) -> type:
+        """Return a named tuple's class with methods that lead to the stage."""
+        of_users = {k: v for k, v in vars(cls).items() if _has_code(v) and k not in _OF_TUPLES}
+        if not of_users or not hasattr(cls, "_fields"):
             return cls
-        return self.copied_class(cls)
+        if cls not in self.classes:
+            self.classes[cls] = copied = type(cls.__name__, (cls,), {"__slots__": ()})
+            for name, value in of_users.items():
+                setattr(copied, name, self._member(value))
+        return self.classes[cls]
 
     def _float64(self, value: Any = 0.0) -> Any:
         """Return a number as one of NumPy's."""
@@ -364,6 +403,11 @@ def _errstate(**how: Any) -> Any:
     if not {"ignore", "warn", None}.issuperset(how.values()):
         raise Untraceable("NumPy's errors as errors of Python's")
     return np.errstate(**how)
+
+
+def _suppress(*_: Any) -> Any:
+    """Refuse what the words of a function do not show."""
+    raise Untraceable("contextlib.suppress under a name that is not global")
 
 
 def _is_column(value: object) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import itertools
+import logging
 from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any, Protocol
@@ -12,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .arrays import Special, Tracer, traced
-from .graph import Graph, Untraceable
+from .graph import Graph, MessageWritten, Untraceable
 from .library.rotations import enter_rotations
 from .library.table import (
     UFUNC_OPERATIONS,
@@ -85,6 +86,21 @@ class StagedModule:
             real is not np.r_ and real is not np.c_
         )
         return real if unwrapped else self._function(name, real)
+
+
+class Messages:
+    """What writes messages: a trace that reaches one ends, unless its level is off."""
+
+    def __init__(self, real: Any) -> None:
+        self._real = real
+
+    def __call__(self, *_: object, **__: object) -> None:
+        raise MessageWritten("a message is written")
+
+    def __getattr__(self, name: str) -> Any:
+        level = logging.getLevelName(name.upper())
+        is_off = isinstance(level, int) and not self._real.isEnabledFor(level)
+        return (lambda *_, **__: None) if is_off else self
 
 
 class StagedType:

@@ -25,6 +25,7 @@ from .graph import (
     Ambiguous,
     Expr,
     Graph,
+    MessageWritten,
     Namespace,
     OpenCondition,
     Untraceable,
@@ -40,6 +41,20 @@ _FEW, _DEEP = 6, 8  # paths, and decisions on one, up to which no branch becomes
 
 def trace(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
     """Run a function on tracers and return its result in one dimension."""
+    try:
+        return _in_few_ways(graph, function, arguments)
+    except Untraceable as error:
+        if not isinstance(error.__cause__, MessageWritten):
+            raise
+    graph.settles = True  # ``if params["verbose"]``: traced again where that is another value
+    try:
+        return _in_few_ways(graph, function, arguments)
+    finally:
+        graph.settles = False
+
+
+def _in_few_ways(graph: Graph, function: Any, arguments: Callable[[], tuple[Any, ...]]) -> Tracer:
+    """Follow every way, or choices of numbers where there are too many."""
     # A condition that depends on tracers is followed both ways: the function runs again for every
     # way through it, and the results are combined by ``select``, which takes the branch that Python
     # takes, also for NaN.

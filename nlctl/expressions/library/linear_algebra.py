@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Tracer, as_array, scalar, traced
-from ..elimination import eliminated, substituted
+from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
@@ -51,11 +52,21 @@ def solved(graph: Graph, matrix: Any, b: Any) -> Tracer:
     if len(rows) > _SMALL:
         return _solved_as_one(graph, rows, right)
     columns = [[v] for v in right] if right.ndim == 1 else _rows(graph, right)
-    rows = [[*row, *more] for row, more in zip(rows, columns, strict=True)]
-    triangular, pivots = eliminated(Facade(graph), rows)
+    augmented = [[*row, *more] for row, more in zip(rows, columns, strict=True)]
+    triangular, pivots = eliminated(Facade(graph), augmented)
     _guard(graph, pivots)
-    x = substituted(triangular)
-    return traced(graph, [v for (v,) in x] if right.ndim == 1 else x)
+    x = traced(graph, substituted(triangular))
+    x = x + [_skipped(graph, rows, side) for side in zip(*columns, strict=True)]
+    return x[:, 0] if right.ndim == 1 else x
+
+
+def _skipped(graph: Graph, rows: _Rows, side: Sequence[Any] = ()) -> Any:
+    """Return -0.0, or NaN where LAPACK multiplies the zeros of a matrix by what is not finite."""
+    entries = list(itertools.chain(*rows))
+    if not any(map(is_zero, entries)):
+        return -0.0  # nothing was skipped: what is not finite is in the result
+    varying = {v.only: v for v in (*entries, *side) if v.only.op != "const"}
+    return functools.reduce(lambda total, v: total - 0.0 * v, varying.values(), -0.0)
 
 
 def _factors(graph: Graph, rows: _Rows) -> Expr:
@@ -201,6 +212,14 @@ def det(graph: Graph, a: Any) -> Any:
     return _determinant(graph, rows)
 
 
+@of(np.linalg.slogdet)
+def slogdet(graph: Graph, a: Any) -> Any:
+    """Return the sign of a determinant and the logarithm of its size."""
+    value = det(graph, a)
+    size = elementwise(graph, "log", elementwise(graph, "absolute", value))
+    return type(np.linalg.slogdet(np.eye(1)))(elementwise(graph, "sign", value), size)
+
+
 def _determinant(graph: Graph, rows: _Rows) -> Any:
     np_ = Facade(graph)
     _, pivots = eliminated(np_, [list(row) for row in rows], exchanges := [])
@@ -210,7 +229,7 @@ def _determinant(graph: Graph, rows: _Rows) -> Any:
     for exchanged in exchanges:
         product = np_.where(exchanged, -product, product)
     singular = _any_is_zero(np_, pivots)
-    return np_.where(singular, 0.0, product)
+    return np_.where(singular, 0.0, product + _skipped(graph, rows))
 
 
 def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Tracer, python_number, scalar, traced
-from ..graph import Graph, Namespace, Untraceable
+from ..graph import Graph, MessageWritten, Namespace, Untraceable
 from ..masked import Masked, MaskedPlaces
 from ..operators import elementwise, is_of_arrays
 from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
@@ -22,6 +22,8 @@ from .table import WRITTEN, NumberType, is_traced, of, unwrapped, written_out
 _SAFE = ("abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "iter",
          "list", "map", "next", "pow", "range", "reversed", "set", "slice", "sorted", "sum",
          "tuple", "zip", "object", "property", "staticmethod", "classmethod")  # fmt: skip
+# of a kind of numbers: those of Python and of NumPy
+NUMBER_SAMPLES = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
 # these ask their arguments, as they do of arrays
 
 
@@ -78,7 +80,7 @@ class Builtins:
     def namespace(self, import_: Callable[..., Any]) -> dict[str, Any]:
         """Return all of them by name."""
         names = Namespace((name, self._builtin(name, v)) for name, v in vars(builtins).items())
-        names.update(__import__=import_, super=self._super)
+        names.update(__import__=import_, super=self._super, print=self._print)
         for name in ("len", "round", "isinstance", "getattr", "hasattr", "type"):
             names[name] = getattr(self, f"_{name}")
         makers = {float: self._float, int: self._int, complex: self._complex}
@@ -155,11 +157,13 @@ class Builtins:
     def _is_number(self, thing: Tracer, kinds: Any) -> bool:
         if thing.shape:
             return isinstance(np.empty(0), kinds)
-        both = {"f": (0.0, np.float64(0)), "i": (0, np.int64(0)), "b": (True, np.True_)}
-        answers = {isinstance(v, kinds) for v in both[thing.only.kind]}
+        answers = {isinstance(v, kinds) for v in NUMBER_SAMPLES[thing.only.kind]}
         if len(answers) > 1:
             raise Untraceable("a question for the type of a number")
         return answers.pop()
+
+    def _print(self, *_: object, **__: object) -> None:
+        raise MessageWritten("a message is written")
 
     def _getattr(self, thing: object, *rest: Any) -> Any:
         return getattr(thing, *rest)

@@ -22,7 +22,7 @@ _MOVING = (
     np.hsplit, np.vsplit, np.dsplit, np.transpose, np.swapaxes,
     np.moveaxis, np.rollaxis, np.squeeze, np.expand_dims, np.atleast_2d, np.atleast_3d, np.flip,
     np.fliplr, np.flipud, np.rot90, np.diagonal, np.diag, np.diagflat, np.broadcast_to,
-    np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.block, np.tile,
+    np.broadcast_arrays, np.stack, np.vstack, np.column_stack, np.dstack, np.tile,
     np.repeat, np.take, np.insert, np.delete, np.tril, np.triu, np.resize,
     np.meshgrid, np.take_along_axis, np.choose, np.compress, np.ix_, np.matrix_transpose,
 )  # fmt: skip
@@ -85,6 +85,19 @@ for _function in _MOVING:
     enter([_function], by_moving(_function), makes=_function in (np.diag, np.tile, np.diagflat))
 for _function in _COMPUTING:
     enter([_function], by_numpy(_function))
+
+
+@of(np.block)
+def _block(graph: Graph, parts: Any) -> Tracer:
+    """Return arrays and numbers, next to each other and in rows."""
+
+    def as_arrays(part: Any) -> Any:
+        if isinstance(part, list):
+            return list(map(as_arrays, part))
+        array = traced(graph, part)
+        return array if array.shape else array.reshape(1)
+
+    return by_moving(np.block)(graph, as_arrays(parts))
 
 
 @of(np.concatenate)

@@ -41,16 +41,23 @@ def check_functions(path: str, system: System) -> FunctionReading:
         try:
             readings.append(check_pure(function, [FRESH, VECTOR, VECTOR, captured(values)]))
         except Impure as error:
-            place = f" ({error.place})" if error.place else ""
-            raise CompileError(
-                f"block '{path}' cannot be compiled: its {what} function {error.reason}"
-                f"{place}: {error.advice}; the diagram still runs in python-control"
-            ) from None
-    if not is_block and isinstance(system, ct.NonlinearIOSystem):
+            raise refused_block(path, what, error) from None
+    messages = [message for reading in readings for message in reading.messages]
+    if not messages and not is_block and isinstance(system, ct.NonlinearIOSystem):
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
     return FunctionReading(
         captured=tuple(note for reading in readings for note in reading.captured),
         unbound=tuple(name for reading in readings for name in reading.unbound),
+        messages=tuple(messages),
+    )
+
+
+def refused_block(path: str, what: str, error: Impure) -> CompileError:
+    """Return the error that says why a block's function is neither compiled nor called."""
+    place = f" ({error.place})" if error.place else ""
+    return CompileError(
+        f"block '{path}' cannot be compiled: its {what} function {error.reason}"
+        f"{place}: {error.advice}; the diagram still runs in python-control"
     )
 
 

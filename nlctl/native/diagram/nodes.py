@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...sampling.system import Sampled
+from ..purity.values import Message
 from .wiring import Combination
 
 
@@ -24,6 +25,7 @@ class Node:
     direct: np.ndarray
     # names in its functions that have no value on one of the ways: only traced are these right
     unbound: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()  # that its functions write: they are traced or refused
     # what samples the block, whose states are the first ones of this
     sampled: Sampled | None = None
 

@@ -103,6 +103,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
             inputs=tuple(wiring.inputs(place)),
             direct=feedthrough(one) & (one is place.system),
             unbound=reading.unbound,
+            messages=reading.messages,
             sampled=None if one is place.system else place.system,
         )
         for place, one, reading in zip(wiring.blocks, blocks, readings, strict=True)

@@ -25,6 +25,7 @@ from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...upstream.systems import System
 from ...wording import counted
+from ..diagram.checks import refused_block
 from ..diagram.parameters import Slot, current_values
 from ..purity import dicts
 from ..purity.dicts import (
@@ -94,6 +95,8 @@ def call_of(
     count: int, reason: str,
 ) -> Call:  # fmt: skip
     """Return a call of a block's functions."""
+    for message in node.messages:  # nobody knows how often machine code calls it
+        raise refused_block(node.path, kind, message)
     size = sum(s.size for s in slots.values())
     stands = _AsItStands(
         path=node.path,

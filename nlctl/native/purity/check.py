@@ -32,6 +32,7 @@ from .values import (
     KnownValue,
     ListOf,
     Local,
+    Message,
     OneOf,
     Pure,
     Unknown,
@@ -56,6 +57,8 @@ class FunctionReading:
     # names that it reads and that have no value on one of the ways there: Python raises an error
     # then, numba takes 0
     unbound: tuple[str, ...]
+    # where it writes messages: it may be computed from its expressions alone, which reach none
+    messages: tuple[Message, ...]
 
 
 def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReading:
@@ -68,8 +71,9 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReadin
     walk = FunctionWalk()
     walk.call(captured(function), Given(tuple(arguments)))
     return FunctionReading(
-        captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound))
-    )
+        captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound)),
+        messages=tuple(walk.messages),
+    )  # fmt: skip
 
 
 class FunctionWalk(Walk):

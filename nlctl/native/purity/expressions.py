@@ -28,6 +28,7 @@ from .values import (
     KnownValue,
     ListOf,
     Local,
+    Message,
     OneOf,
     Parent,
     Pure,
@@ -268,6 +269,7 @@ class Expressions(ast.NodeVisitor):
         return SLICE
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
+        self.walk.unbound += ["text"]  # numba writes numbers in other digits than Python
         for part in ast.walk(node):
             if isinstance(part, ast.FormattedValue):
                 self.visit(part.value)
@@ -361,7 +363,12 @@ class Expressions(ast.NodeVisitor):
             return self.parent_class()
         if function.known is getattr and isinstance(places[1].known, str):
             return self.attribute(places[0], places[1].known)
-        result = self.made_once(node, self.walk.call(function, given))
+        try:
+            result = self.made_once(node, self.walk.call(function, given))
+        except Message as message:
+            message.place = f"{source_file(self.frame.function)}, line {node.lineno}"
+            self.walk.messages.append(message)
+            result = FRESH
         for value in given.every:  # a list may have been given something to keep
             self.kept(value, given.every)
         return result

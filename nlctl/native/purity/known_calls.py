@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...expressions.source import cells_of, is_dispatcher
 from . import made
 from .values import (
     FRESH,
@@ -31,6 +32,7 @@ from .values import (
     KnownValue,
     ListOf,
     Local,
+    Message,
     OneOf,
     Parent,
     Pure,
@@ -137,6 +139,8 @@ def call(walk: Walk, thing: object, given: Given) -> KnownValue:
 def _of_python(walk: Walk, thing: object, given: Given) -> KnownValue | None:
     """Return what is known of the result of functions of Python's own that make others."""
     places = given.places
+    if is_dispatcher(thing) and places:
+        return _dispatched(walk, thing, given)
     if thing is functools.partial:
         return KnownValue(True, True, known=Bound(places[0], Given(places[1:], given.names)))
     if thing is functools.wraps:
@@ -185,8 +189,10 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         if thing.__name__ in _OF_LAWS and type(owner).__module__.startswith("scipy.stats"):
             raise Impure(f"calls {thing.__name__}() of a law of probability", "write its formula")
         raise Impure(f"draws random numbers with {thing.__name__}()", DRAW)
+    if isinstance(owner, logging.Logger) and _says_nothing(walk, owner, thing.__name__):
+        return FRESH
     if isinstance(owner, logging.Logger) or thing is warnings.warn:
-        raise Impure(f"writes messages with {thing.__name__}()", OUTPUT)
+        raise Message(f"writes messages with {thing.__name__}()", OUTPUT)
     if isinstance(thing, MethodType) and (library(type(owner)) or "").startswith("pandas"):
         if thing.__name__ not in _OF_TABLES:
             raise Impure(f"calls {thing.__name__}() of pandas", "make an array of it before")
@@ -209,6 +215,35 @@ def _called(walk: Walk, thing: Any, owner: Any, given: Given) -> KnownValue:
         walk.captured(type(thing), "__call__", function)
     first = captured(owner if owner is not None else thing)
     return walk.function(function, Given((first,)) + given)
+
+
+def _says_nothing(walk: Walk, logger: logging.Logger, name: str) -> bool:
+    """Whether messages of a level go nowhere: each run makes sure that this is still so."""
+    level = logging.getLevelName(name.upper())
+    if type(logger) is not logging.Logger or not isinstance(level, int):
+        return False
+    walk.captured(logger.manager, "disable", logger.manager.disable)
+    around: logging.Logger | None = logger
+    while around is not None:
+        for attribute in ("level", "disabled", "parent"):
+            walk.captured(around, attribute, getattr(around, attribute))
+        around = around.parent
+    return not logger.isEnabledFor(level)
+
+
+def _dispatched(walk: Walk, thing: Any, given: Given) -> KnownValue:
+    """Return what is known of a function that the type of its first argument chooses."""
+    cell = cells_of(thing.register)["registry"]
+    walk.captured(cell, "registry", cell.cell_contents)
+    first, results = given.places[0], []
+    for value in first.known.choices if isinstance(first.known, OneOf) else (first,):
+        known, now = value.known, Given((value, *given.places[1:]), given.names)
+        cls = known.cls if isinstance(known, Instance) else type(known)
+        functions = [thing.dispatch(cls)]
+        if isinstance(known, Unknown):
+            functions = list(thing.registry.values())
+        results += [walk.call(captured(function), now) for function in functions]
+    return least_upper_bound(results)
 
 
 def method(walk: Walk, base: KnownValue, name: str, given: Given) -> KnownValue | None:
@@ -315,6 +350,9 @@ def _is_builtin(thing: object) -> bool:
 
 def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
     name, places = thing.__name__, given.places
+    operator = made.operator_of(walk, places[0], _OPERATORS[name]) if name in _OPERATORS else None
+    if operator is not None:
+        return walk.function(operator, Given(places))
     for value in places if name not in ("isinstance", "issubclass", "callable", "type") else ():
         _check_parts(value, name)
     if name == "slice":
@@ -337,11 +375,15 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         _written(places[0], "next()")
         return element(places[0])
     if name in _PLAIN:
+        walk.unbound += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
-    advice = OUTPUT if name in ("print", "input", "open") else "do without it"
+    if name == "print":
+        raise Message("calls print()", OUTPUT)
+    advice = OUTPUT if name in ("input", "open") else "do without it"
     raise Impure(f"calls {name}()", advice)
 
 
+_OPERATORS = {"len": "__len__", "abs": "__abs__"}
 _MOVING = ("list", "tuple", "enumerate", "zip", "reversed", "map", "filter", "iter", "len")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import importlib
 from collections.abc import Sequence
 from typing import Any
@@ -196,8 +197,11 @@ class CallWalker(Expressions):
         self.visit(node.test)
 
     def visit_Raise(self, node: ast.Raise) -> None:
+        before = list(self.walk.unbound)
         if node.exc is not None:
             self.visit(node.exc)
+        if "text" not in before:  # nobody computes with what an error says
+            self.walk.unbound = [name for name in self.walk.unbound if name != "text"]
 
     def visit_Try(self, node: ast.Try) -> None:
         """Walk the ways through it; of errors in machine code nothing is caught."""
@@ -217,12 +221,19 @@ class CallWalker(Expressions):
         raise Impure("has try ... except*", "write an if for the case that fails")
 
     def visit_With(self, node: ast.With) -> None:
+        ends_early = False
         for item in node.items:
             call = item.context_expr
             entered = self.visit(call.func).known if isinstance(call, ast.Call) else UNKNOWN_VALUE
-            if entered is not np.errstate or item.optional_vars is not None:
+            plain = entered is np.errstate or entered is contextlib.suppress
+            if not plain or item.optional_vars is not None:
                 raise Impure("has a with statement", "do without it")
-        self.statements(node.body)
+            ends_early |= entered is contextlib.suppress
+        if ends_early:
+            self.walk.unbound += ["try"]  # numba has no such word
+            self.either([node.body, []])
+        else:
+            self.statements(node.body)
 
     def visit_Import(self, node: ast.Import) -> None:
         for alias in node.names:

@@ -35,6 +35,10 @@ class Impure(Exception):  # noqa: N818 (it is what a walk finds)
         self.place = ""  # file and line
 
 
+class Message(Impure):
+    """A call that writes a message: nothing is lost where no way of the expressions reaches it."""
+
+
 @dataclass(frozen=True)
 class Local:
     """A function that a walked function defines: its syntax tree, and the names around it."""

@@ -9,7 +9,7 @@ from types import FunctionType
 from typing import Any
 
 from .captured import Captured, noted
-from .values import Given, KnownValue, captured
+from .values import Given, KnownValue, Message, captured
 
 
 class Walk(ABC):
@@ -22,6 +22,7 @@ class Walk(ABC):
     def __init__(self) -> None:
         self.read: dict[tuple[int, str], Captured] = {}
         self.unbound: list[str] = []
+        self.messages: list[Message] = []
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 

@@ -1,0 +1,73 @@
+"""Messages and texts in functions: none is lost, and none is written in other digits."""
+
+import logging
+
+import control as ct
+import numpy as np
+import pytest
+
+import nlctl
+
+log = logging.getLogger("tests.native.messages")
+
+
+def loop(update, **params):
+    return ct.nlsys(
+        update, None, states=1, inputs=0, outputs=1, params=params, name=update.__name__
+    )
+
+
+def end(compiled, **params):
+    return nlctl.input_output_response(compiled, [0.0, 0.5, 1.0], 0.0, [0.5], params=params).states[
+        0, -1
+    ]
+
+
+def says_when_asked(t, x, u, params):
+    if params["verbose"]:
+        print(x)
+    return -x
+
+
+def says_where_it_is_large(t, x, u, params):
+    if x[0] > 100:
+        print(x)
+    return -x
+
+
+def logged(t, x, u, params):
+    log.info(f"{x[0]:.3f}")
+    return -x
+
+
+def sign_as_a_key(t, x, u, params):
+    return [-{"1.0": 1.0}.get(f"{np.sign(x[0])}", 3.0) * x[0]]
+
+
+def test_a_parameter_that_asks_for_messages_ends_in_an_error():
+    compiled = nlctl.compile(loop(says_when_asked, verbose=False))
+    assert end(compiled) == pytest.approx(0.5 * np.exp(-1.0))
+    with pytest.raises(nlctl.errors.CompileError, match=r"calls print\(\)"):
+        end(compiled, verbose=True)
+
+
+def test_a_message_that_a_state_decides_is_refused():
+    with pytest.raises(nlctl.errors.CompileError, match=r"calls print\(\)"):
+        nlctl.compile(loop(says_where_it_is_large))
+
+
+def test_each_run_makes_sure_that_a_level_is_still_off():
+    compiled = nlctl.compile(loop(logged))
+    assert end(compiled) == pytest.approx(0.5 * np.exp(-1.0))
+    log.setLevel(logging.INFO)
+    try:
+        with pytest.raises(nlctl.errors.UsageError, match="level"):
+            end(compiled)
+    finally:
+        log.setLevel(logging.NOTSET)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_texts_are_written_by_python():
+    """numba has other digits: the key of 1.0 was none of the dict's."""
+    assert end(nlctl.compile(loop(sign_as_a_key))) == pytest.approx(0.5 * np.exp(-1.0), rel=1e-5)
