@@ -39,7 +39,7 @@ def search_with_derivatives(
     pieces = _pieces(search.space)
     kinds = _KINDS if pieces else len(tests)
     _one_by_one(search, tests.iloc[:kinds])
-    # of a loop that is nearly linear the first order is right in the whole box: few runs tell
+    # of a loop that is nearly linear the first order is right in the whole box: few runs show it
     shortest = 1.0 if pieces else _SHORTEST
     radius = _descend(search, derivatives, reasons, 0, 1.0, shortest)
     while search.left:
