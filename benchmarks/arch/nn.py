@@ -20,7 +20,7 @@ import nlctl
 WEIGHTS = numbers("nn.json")
 LEAST_CURRENT, MOST_CURRENT = -1.0, 4.0  # A
 LOOK = 0.01  # s
-COUNT, PERIOD = 12, 40.0 / 12  # pieces of the reference, s
+COUNT, PERIOD = 20, 2.0  # pieces of the reference, s
 STATES = ("position_1", "current_1", "current_2")  # normalized, one and two samples ago
 
 
@@ -117,5 +117,5 @@ def levitation(beta: float = 0.03, **given: Any) -> Any:
 
 
 def plant(beta: float = 0.03) -> Any:
-    """Return the loop whose reference has twelve pieces."""
+    """Return the loop whose reference has twenty pieces."""
     return levitation(beta, reference=pieces("reference", COUNT, PERIOD, start=2.0))

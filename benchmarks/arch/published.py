@@ -145,7 +145,7 @@ ROWS = (
     Row(key="NN.03", build=nn.plant, signals=REFERENCE, formula=settles(), until=40.0,
         zlscheck=(50, 1.0), aristeo=(50, 62.8)),
     Row(key="NN.04", build=_WIDER, signals=REFERENCE, formula=settles(), until=40.0,
-        note="no published number"),
+        zlscheck=(50, 1.06)),
     *(Row(key=key, build=cc.plant, signals=DRIVER, formula=formula, until=100.0, zlscheck=one,
           aristeo=other, suspect=suspect) for key, formula, one, other, suspect in _CC),
     Row(key="SC", build=sc.plant, signals=STEAM, until=35.0, zlscheck=(50, 2.1), aristeo=(50, 1.0),

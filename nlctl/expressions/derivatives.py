@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -87,7 +87,11 @@ class _Reader:
         self.graph, self.seed, self.fixed_points = graph, seed, fixed_points
         self.known: dict[Expr, Expr | None] = dict(known or {})
         self._partials: dict[tuple[str, int], Any] = {}
-        self._stage = Stage(graph)
+
+    @cached_property
+    def _stage(self) -> Stage:
+        """Where formulas of derivatives are traced; most readers need none."""
+        return Stage(self.graph)
 
     def read(self, results: list[Expr]) -> list[Expr | None]:
         """Return the derivatives of results."""

@@ -131,9 +131,10 @@ class _Run:
             )
             if np.any((now == 0.0) & (then == 0.0))
         ]
-        change = self.differentiated.saltation.change
+        slopes = self.differentiated.sides.source.slopes
         for name, seed in zip(self.names, self.differentiated.saltation.seeds, strict=True):
-            moves = self._values([change(level, seed)[0] or zero for level, _ in met], later)
+            changes = slopes([level for level, _ in met], seed)
+            moves = self._values([change or zero for change in changes], later)
             parts = [
                 np.atleast_2d(zeros & (v != 0.0)).any(axis=0)
                 for v, (_, zeros) in zip(moves, met, strict=True)

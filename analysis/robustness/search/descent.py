@@ -17,11 +17,15 @@ from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 _DRAWS = 4  # corners, and uniform draws, of each round
 _CHANGES = (0, 1, 0, 2, 0, 1, 0, 2)  # of the simple signals of each round: they are constant apart
 _GENERATIONS = 2  # of CMA-ES in each round
-_STEPS = 10  # descents have at most so many steps
-_SMALLEST = 1 / 256  # shortest step of a descent, in units of the boxes
+_STEPS = 4  # descents have at most so many steps
+_SHORTEST = 1 / 256  # shortest step of a descent, in units of the boxes
 _SHORTER = 4  # by what a step is shortened that did not go down
-# the next step is twice as long where one gains this part of what the first order says
-_TRUSTED = 0.5
+# The next step, also that of the next descent, is twice as long where one gains this part of what
+# the first order says, and shorter where it gains less than the second one.
+_TRUSTED, _DOUBTED = 0.5, 0.25
+_SHORTEST_FIRST = 1 / 16  # descents begin with no shorter step
+_RESTARTS = 3  # times that simple signals are drawn in each round
+_KINDS = 3  # test signals before anything else, one of each kind: alternating, a step, constant
 _MOST_CONSTANT = 16  # test signals that are constant
 _PIECE = re.compile(r"(.*)\[(\d+)\]")
 
@@ -32,22 +36,32 @@ def search_with_derivatives(
     """Run rows until the budget is spent or the target met; return why derivatives ended."""
     reasons: dict[str, None] = {}
     tests = from_unit_cube(search.space, test_signals(search.space))
-    for k in range(len(tests)):  # few are needed, often
-        in_batches(search, "test signals", tests.iloc[[k]])
-    _descend(search, derivatives, reasons, 0)
     pieces = _pieces(search.space)
+    kinds = _KINDS if pieces else len(tests)
+    _one_by_one(search, tests.iloc[:kinds])
+    # of a loop that is nearly linear the first order is right in the whole box: few runs show it
+    shortest = 1.0 if pieces else _SHORTEST
+    radius = _descend(search, derivatives, reasons, 0, 1.0, shortest)
     while search.left:
-        first = search.margins.size
-        if pieces:
-            in_batches(search, "simple signals", _simple_signals(search.space, pieces, rng))
-            _descend(search, derivatives, reasons, first)
+        for _ in range(_RESTARTS if pieces else 0):
             first = search.margins.size
+            in_batches(search, "simple signals", _simple_signals(search.space, pieces, rng))
+            radius = _descend(search, derivatives, reasons, first, radius)
+        first = search.margins.size
+        _one_by_one(search, tests.iloc[kinds:])
+        kinds = len(tests)
         for searcher, draw in (("corners", some_corners), ("uniform", uniform)):
             in_batches(search, searcher, draw(search.space, min(_DRAWS, search.left), rng))
-        _descend(search, derivatives, reasons, first)
+        radius = _descend(search, derivatives, reasons, first, radius)
         if search.left >= GENERATION:
             evolve(search, rng, GENERATION, is_first=True, most=_GENERATIONS)
     return list(reasons)
+
+
+def _one_by_one(search: Search, tests: pd.DataFrame) -> None:
+    """Run test signals in turn: few are needed, often."""
+    for k in range(len(tests)):
+        in_batches(search, "test signals", tests.iloc[[k]])
 
 
 def test_signals(space: Space) -> np.ndarray:
@@ -101,32 +115,43 @@ def _simple_signals(
 
 
 def _descend(
-    search: Search, derivatives: FirstOrderOf, reasons: dict[str, None], first: int
-) -> None:
-    """Go down from the worst row since the first one, by linear programs in shrinking boxes."""
+    search: Search,
+    derivatives: FirstOrderOf,
+    reasons: dict[str, None],
+    first: int,
+    radius: float,
+    shortest: float = _SHORTEST,
+) -> float:
+    """Go down from the worst row since the first one; return the radius that was last trusted."""
     if not search.left or not np.isfinite(search.margins[first:]).any():
-        return
-    number, radius = first + int(np.argmin(search.margins[first:])), 1.0
+        return radius
+    number = first + int(np.argmin(search.margins[first:]))
     for _ in range(_STEPS):
-        if search.left < 2:
-            return
+        if search.left < 2 or radius < shortest:
+            break
         row = search.run_again("derivatives", number)
         model = derivatives(row)
         if model.reason:
             reasons[model.reason] = None
-        better = _step(search, model, row, search.margins[number], radius)
+        better = _step(search, model, row, search.margins[number], radius, shortest)
         if better is None:
-            return
+            break
         number, radius = better
+    return radius
 
 
 def _step(
-    search: Search, model: FirstOrder, row: Mapping[str, Any], margin: float, radius: float
+    search: Search,
+    model: FirstOrder,
+    row: Mapping[str, Any],
+    margin: float,
+    radius: float,
+    shortest: float,
 ) -> tuple[int, float] | None:
     """Run rows that the first order calls lower until one is; return it and the next radius."""
     space = search.space
     place = unit_places(space, pd.DataFrame([row]))[0]
-    while radius >= _SMALLEST and search.left:
+    while radius >= shortest and search.left:
         lower, predicted = lowest_nearby(model, place, radius)
         if not predicted < margin:
             return None
@@ -135,7 +160,13 @@ def _step(
         labels = {choice.name: row[choice.name] for choice in space.choices}
         (new,) = search.run("gradient", from_unit_cube(space, unit[None, :]).assign(**labels))
         if new < margin:
-            trusted = margin - new >= _TRUSTED * (margin - predicted)
-            return search.margins.size - 1, min(1.0, 2 * radius) if trusted else radius
+            return search.margins.size - 1, _next_radius(radius, margin - new, margin - predicted)
         radius /= _SHORTER
     return None
+
+
+def _next_radius(radius: float, gained: float, predicted: float) -> float:
+    """Return how far the first order is followed next, by what it has gained and predicted."""
+    if gained >= _TRUSTED * predicted:
+        return min(1.0, 2 * radius)
+    return radius if gained >= _DOUBTED * predicted else max(radius / _SHORTER, _SHORTEST_FIRST)

@@ -114,13 +114,15 @@ def worst_case(
     come to an end from a random point with twice the population (Auger, Hansen, CEC 2005);
     choices stand still within one such search.  What is left of the runs is uniform draws.
 
-    With `derivatives` the order is another one, for few runs: test signals (quantities ``name[0]``,
-    ``name[1]``, ... are the pieces of a signal: all alternate between their ends, all are constant
-    at an end, all step halfway), a descent from the worst of them, and then in turn signals drawn
-    with few changes, a descent from the worst of these, corners and uniform draws, a descent from
-    the worst of those, and CMA-ES.  A descent moves all signals of a
+    With `derivatives` the order is another one, for few runs: a test signal of each kind
+    (quantities ``name[0]``, ``name[1]``, ... are the pieces of a signal: all alternate between
+    their ends, all step halfway, all are constant at an end), a descent from the worst of them
+    that ends where the first order fails, and then in turn signals drawn with few changes, three
+    times with a descent from the worst of these, corners, uniform draws and at first the other
+    test signals, a descent from the worst of those, and CMA-ES.  A descent moves all signals of a
     row along their derivatives, and goes where their margin would be lowest, by linear programs in
-    a box that shrinks (`first_order.lowest_nearby`).  A run with derivatives counts as one run.
+    a box that shrinks (`first_order.lowest_nearby`); the next descent begins with the box that
+    could be trusted.  A run with derivatives counts as one run.
 
     Parameters
     ----------

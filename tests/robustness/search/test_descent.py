@@ -4,6 +4,7 @@ from functools import partial
 
 import control as ct
 import numpy as np
+import pandas as pd
 import pytest
 from arch_plants import inputs
 from hypothesis import given, settings
@@ -24,6 +25,7 @@ from nlctl.analysis.robustness import (
     prepare,
     worst_case,
 )
+from nlctl.analysis.robustness.search.descent import _next_radius
 from nlctl.analysis.robustness.search.descent import test_signals as signals_to_try
 from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
 
@@ -137,7 +139,7 @@ def test_a_falsifying_input_that_is_known_is_found_at_once():
     )  # fmt: skip
     assert found.is_violated
     assert found.found_by == "gradient"
-    assert found.first_violation == len(signals_to_try(ready.experiment.space)) + 1
+    assert found.first_violation == 4  # three test signals, one run with derivatives
     np.testing.assert_allclose(list(found.witness.values()), np.sign(gains), atol=1e-6)
     assert found.margin == pytest.approx(-0.001 * largest, abs=1e-5)
     assert found.without_derivative == ()
@@ -188,12 +190,70 @@ def test_simple_signals_change_seldom():
     def distance(table):
         return table.assign(spec=np.abs(table[names] - 0.7).max(axis=1) - 0.1)
 
-    def no_derivatives(row):
-        return FirstOrder(t=np.empty(0), signals={}, derivatives={}, requirements=(), reason="none")
-
     simple = worst_case(distance, space, 300, entropy=1, target=0.0, derivatives=no_derivatives)
     assert simple.found_by == "simple signals"
     rows = simple.design.table[simple.searchers == "simple signals"].to_numpy()
     changes = (np.diff(rows, axis=1) != 0).sum(axis=1)
     assert set(changes) == {0, 1, 2}
     assert worst_case(distance, space, 300, entropy=1, target=0.0).margin > 0
+
+
+def no_derivatives(row):
+    """A loop that has none."""
+    return FirstOrder(t=np.empty(0), signals={}, derivatives={}, requirements=(), reason="none")
+
+
+def test_every_test_signal_is_run_and_those_of_each_kind_are_first():
+    names = inputs.names("u", 6)
+    space = Space(quantities=tuple(Uncertain(name=name, bounds=(0.0, 1.0)) for name in names))
+    found = worst_case(
+        lambda table: table.assign(spec=1.0), space, 60, entropy=1, derivatives=no_derivatives
+    )
+    tests, rows = signals_to_try(space), found.design.table.to_numpy()
+    np.testing.assert_array_equal(rows[:3], [[1, 0, 1, 0, 1, 0], [0, 0, 0, 1, 1, 1], [1] * 6])
+    np.testing.assert_array_equal(rows[found.searchers == "test signals"], tests)
+    drawn = found.searchers[found.searchers != "derivatives"]
+    assert set(drawn[3:27]) == {"simple signals"}
+    assert set(drawn[27 : 24 + len(tests)]) == {"test signals"}
+
+
+def bent(weight, count=6):
+    """y(t_k) = u_k + weight sin(40 u_k) with its derivatives: weight 0 is linear."""
+    names = inputs.names("u", count)
+    space = Space(quantities=tuple(Uncertain(name=name, bounds=(0.0, 1.0)) for name in names))
+    low = Requirement(key="low", formula=always(in_band("y", lower=-9.0, scale=1.0)), until=5.0)
+
+    def value(table):
+        u = np.asarray(table[names], dtype=float)
+        return u + weight * np.sin(40 * u)
+
+    def derivatives(row):
+        u = np.array([row[name] for name in names])
+        return FirstOrder(
+            t=np.arange(count), signals={"y": value(pd.DataFrame([row]))[0]},
+            derivatives={"y": np.diag(1 + 40 * weight * np.cos(40 * u))}, requirements=(low,),
+        )  # fmt: skip
+
+    return space, lambda table: table.assign(spec=value(table).min(axis=1) + 9.0), derivatives
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.2])
+def test_the_first_descent_ends_where_the_first_order_fails(weight):
+    """Of a linear margin nothing is left to gain; of a bent one a single step of it is run."""
+    space, margin, derivatives = bent(weight)
+    found = worst_case(margin, space, 100, entropy=1, derivatives=derivatives)
+    start = int(np.argmax(found.searchers == "simple signals"))
+    assert list(found.searchers[3:start]).count("gradient") <= 1
+    u = np.linspace(0.0, 1.0, 100_001)
+    assert found.margin == pytest.approx(9.0 + np.min(u + weight * np.sin(40 * u)), abs=0.02)
+
+
+@given(st.floats(1 / 16, 1.0), st.floats(0.0, 2.0))
+def test_steps_become_longer_where_the_first_order_is_right(radius, part):
+    """By the part that is gained of what is predicted; never longer than the box, nor tiny."""
+    following = _next_radius(radius, part * 0.3, 0.3)
+    assert 1 / 16 <= following <= 1.0
+    if part > 0.51:
+        assert following == min(1.0, 2 * radius)
+    if part < 0.24:
+        assert following == max(radius / 4, 1 / 16)
