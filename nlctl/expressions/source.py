@@ -15,6 +15,7 @@ import linecache
 import warnings
 from collections.abc import Iterator
 from types import CellType, CodeType, FunctionType
+from typing import cast
 
 Definition = ast.FunctionDef | ast.Lambda
 Places = dict[tuple[str, int], list[Definition]]
@@ -78,7 +79,7 @@ def is_dispatcher(thing: object) -> bool:
     return isinstance(thing, FunctionType) and thing.__code__ is _DISPATCHER
 
 
-_DISPATCHER = functools.singledispatch(abs).__code__
+_DISPATCHER = cast(FunctionType, functools.singledispatch(abs)).__code__
 
 
 def _file_and_text(function: FunctionType) -> tuple[str, str]:

@@ -4,9 +4,9 @@ The least of many margins has a kink at its highest point, where several are equ
 a method for smooth functions creeps there.  Each step is a linear program (HiGHS, by
 `scipy.optimize.linprog`) for all margins at once, within a reach that grows and shrinks with
 what steps have kept of what they promised (Madsen: An algorithm for minimax solution of
-overdetermined systems of non-linear equations, J. Inst. Maths Applics 16 (1975) 321-328).  Of all
-steps with nine tenths of that promise the shortest is taken: a gain that brings next to nothing
-would else go to the end of the reach, where slopes say nothing any more.
+overdetermined systems of non-linear equations, J. Inst. Maths Applics 16 (1975) 321-328).  Only
+gains that matter move, those of the shortest step with nine tenths of that promise: one that brings
+next to nothing would else go to the end of the reach, where slopes say nothing any more.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _REACH = 0.5  # of the first step, in widths of the box
 _SHORTEST = 2e-3  # of a reach
 _KEPT = (0.25, 0.75)  # of what a step has promised: less shortens the reach, more doubles it
 _REMEMBERED = 2  # choices of gains whose slopes count as well
-_SHARE = 0.9  # of the most that a step within reach promises: what the shortest step has to bring
+_SHARE = 0.9  # of the most that a step within reach promises: what gains that matter bring
+_MOVED = 1e-9  # of the width of the box
 _ENOUGH = 5e-4  # of a margin, or of a cost: less is no progress
 _ROOM = 1e-3  # that a cost leaves to all margins, so that rounding violates none
 _PATIENCE = 8  # choices of gains without progress, after which SLSQP ends
@@ -60,7 +61,7 @@ def raise_least_margin(worth_of: WorthOf, start: np.ndarray) -> None:
 def _step(
     at: np.ndarray, here: Worth, others: list[tuple[np.ndarray, Worth]], reach: float
 ) -> tuple[np.ndarray, float]:
-    """Return the shortest step with most of what is within reach if margins were linear."""
+    """Return the best step within reach of the gains that matter, if margins were linear."""
     # Slopes of other choices of gains count, too, as far as they do not say less of this one than
     # what is known of it.
     rows, limits, k = [], [], at.size
@@ -68,16 +69,27 @@ def _step(
         rows.append(np.hstack([-worth.slopes, worth.slopes, np.ones((len(worth.slopes), 1))]))
         limits.append(np.maximum(worth.parts + worth.slopes @ (at - place), here.parts))
     lines, room = np.vstack(rows), np.concatenate(limits)
-    bounds: list[tuple[float | None, float | None]]
-    bounds = [(0.0, min(reach, max(1.0 - x, 0.0))) for x in at]
-    bounds += [(0.0, min(reach, max(x, 0.0))) for x in at]
-    highest = linprog([*np.zeros(2 * k), -1.0], lines, room, bounds=[*bounds, (None, None)])
-    if not (highest.success and highest.x[-1] > here.least):
+    bounds = [min(reach, max(1.0 - x, 0.0)) for x in at] + [min(reach, max(x, 0.0)) for x in at]
+    first = _shortest(lines, room, bounds, here.least, _SHARE)
+    if first is None:
         return np.zeros(k), 0.0
-    least = here.least + _SHARE * (float(highest.x[-1]) - here.least)
-    shortest = linprog([*np.ones(2 * k), 0.0], lines, room, bounds=[*bounds, (least, None)])
-    taken = shortest.x if shortest.success else highest.x
+    moved = np.where(first[:-1] > _MOVED, bounds, 0.0).tolist()
+    taken = _shortest(lines, room, moved, here.least, 1.0)
+    taken = first if taken is None else taken
     return taken[:k] - taken[k : 2 * k], float(taken[-1]) - here.least
+
+
+def _shortest(
+    lines: np.ndarray, room: np.ndarray, bounds: list[float], before: float, share: float
+) -> np.ndarray | None:
+    """Return the shortest step, up and down, with a share of the most, and its least margin."""
+    ways, count = [(0.0, most) for most in bounds], len(bounds)
+    highest = linprog([*np.zeros(count), -1.0], lines, room, bounds=[*ways, (None, None)])
+    if not (highest.success and highest.x[-1] > before):
+        return None
+    least = before + share * (float(highest.x[-1]) - before)
+    shortest = linprog([*np.ones(count), 0.0], lines, room, bounds=[*ways, (least, None)])
+    return shortest.x if shortest.success else highest.x
 
 
 class _SettledError(Exception):
