@@ -12,7 +12,7 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
-from .without_poles import as_fraction, multiplied
+from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
 _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
@@ -106,9 +106,9 @@ def switching_function(graph: Graph, condition: Expr) -> Expr:
     if op in _OF_DIFFERENCES:
         return _difference(graph, *args)
     if op in _OF_FIRSTS:
-        return args[0]
+        return _signed(graph, args[0])
     if op in _OF_SECONDS:
-        return args[1]
+        return _signed(graph, args[1])
     if (rooted := _rooted(condition)) is not None:
         return rooted
     return _at_integers(graph, _counted(graph, condition))
@@ -150,18 +150,23 @@ def _factors(function: Expr) -> tuple[Expr, ...]:
     return tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
 
 
+def _signed(graph: Graph, number: Expr) -> Expr:
+    """Return what has the sign of a number, as a difference what is compared."""
+    if number.op == "sub" and number.args[0].op != "const":
+        return _difference(graph, *number.args)
+    return _difference(graph, graph.const(0.0), number)
+
+
 def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
     # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
     # a step could pass through a small circle unseen.
     is_zero = a.op == "const" and a.data == 0.0
-    (p, q), (r, s) = as_fraction(graph, a), as_fraction(graph, b)
-    if q is not None or s is not None:
-        # sign(p / q - r / s) is that of (p s - r q) q s, in which there is no pole
-        compared = (
-            r if is_zero else graph.op("sub", multiplied(graph, p, s), multiplied(graph, r, q))
-        )
-        return multiplied(graph, multiplied(graph, compared, q), s)
+    first, second = as_fraction(graph, a), as_fraction(graph, b)
+    if not (first.is_whole and second.is_whole):
+        if is_zero:
+            return multiplied(graph, second.dividend, second.poles)
+        return compared(graph, first, second)
     if is_zero:
         return b
     for rising, level, step in ((a, b, 1), (b, a, -1)):

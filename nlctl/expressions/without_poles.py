@@ -1,51 +1,99 @@
-"""Expressions that have poles as quotients of two that have none."""
+"""Quotients, and sums and products of them, as one fraction.
+
+Next to a pole, or where a divisor makes a narrow bell of what is compared, no polynomial follows
+it, so that a step could pass over a change of its sign.  The dividend of the fraction has neither.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from .edges import is_positive
-from .graph import Expr, Graph
+from .graph import Expr, Graph, needed
+
+# a divisor above 0 with these alone is of the size of what is divided; exponentials overflow
+_OF_SIZE = ("add", "sub", "neg", "mul", "div", "sqrt", "hypot", "absolute", "sin", "cos")
 
 
-def as_fraction(graph: Graph, expr: Expr) -> tuple[Expr, Expr | None]:
-    """Return dividend and divisor of sums, products and quotients; None where there is no pole."""
+class Fraction(NamedTuple):
+    """A quotient: what is divided, by what has zeros, and by what is above 0."""
+
+    dividend: Expr
+    poles: Expr | None = None  # None where there are none
+    above: Expr | None = None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is divided."""
+        return self.poles is None and self.above is None
+
+
+def as_fraction(graph: Graph, expr: Expr) -> Fraction:
+    """Return sums, products and quotients as one fraction, whatever else as it is."""
     return _fraction(graph, expr, {})
 
 
-def _fraction(
-    graph: Graph, expr: Expr, known: dict[Expr, tuple[Expr, Expr | None]]
-) -> tuple[Expr, Expr | None]:
+def compared(graph: Graph, a: Fraction, b: Fraction) -> Expr:
+    """Return what has the sign of a - b, without poles."""
+    # sign(p / q - r / s) is that of (p s - r q) q s
+    difference = _sum(graph, "sub", a, b)
+    return multiplied(graph, difference.dividend, difference.poles)
+
+
+def multiplied(graph: Graph, factor: Expr, *others: Expr | None) -> Expr:
+    """Return a product with those of the others that there are."""
+    for other in others:
+        factor = factor if other is None else graph.op("mul", factor, other)
+    return factor
+
+
+def _fraction(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
     if expr not in known:
         known[expr] = _of_parts(graph, expr, known)
     return known[expr]
 
 
-def _of_parts(
-    graph: Graph, expr: Expr, known: dict[Expr, tuple[Expr, Expr | None]]
-) -> tuple[Expr, Expr | None]:
+def _of_parts(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
     if expr.op == "tan" and expr.varies:
-        return graph.op("sin", expr.args[0]), graph.op("cos", expr.args[0])
+        return Fraction(graph.op("sin", expr.args[0]), graph.op("cos", expr.args[0]))
     if expr.op not in ("neg", "add", "sub", "mul", "div") or not expr.varies:
-        return graph.number(expr), None
-    (p, q), (r, s) = (_fraction(graph, arg, known) for arg in (expr.args[0], expr.args[-1]))
-    has_pole = expr.op == "div" and expr.args[1].varies and not is_positive(expr.args[1])
-    if q is None and s is None and not has_pole:
-        return graph.number(expr), None
+        return Fraction(graph.number(expr))
+    a, b = (_fraction(graph, arg, known) for arg in (expr.args[0], expr.args[-1]))
+    divides = expr.op == "div" and expr.args[1].varies
+    is_above = divides and is_positive(expr.args[1])
+    stays = not divides or (is_above and not _is_of_size(expr.args[1]))
+    if a.is_whole and b.is_whole and stays:
+        return Fraction(graph.number(expr))
     if expr.op == "neg":
-        return graph.op("neg", p), q
+        return a._replace(dividend=graph.op("neg", a.dividend))
     if expr.op == "mul":
-        return graph.op("mul", p, r), _either(graph, q, s)
+        dividend = graph.op("mul", a.dividend, b.dividend)
+        return Fraction(dividend, _both(graph, a.poles, b.poles), _both(graph, a.above, b.above))
     if expr.op != "div":
-        both = graph.op(expr.op, multiplied(graph, p, s), multiplied(graph, r, q))
-        return both, _either(graph, q, s)
-    if has_pole:
-        return multiplied(graph, p, s), multiplied(graph, r, q)
-    return graph.op("div", p, graph.number(expr.args[1])), q
+        return _sum(graph, expr.op, a, b)
+    if stays:
+        return a._replace(dividend=graph.op("div", a.dividend, graph.number(expr.args[1])))
+    dividend = multiplied(graph, a.dividend, b.poles, b.above)
+    if is_above:  # and what is divided there: both or neither are below 0
+        return Fraction(dividend, a.poles, _both(graph, a.above, b.dividend))
+    return Fraction(dividend, _both(graph, a.poles, b.dividend), a.above)
 
 
-def multiplied(graph: Graph, factor: Expr, other: Expr | None) -> Expr:
-    """Return a product, or the factor alone where there is no other."""
-    return factor if other is None else graph.op("mul", factor, other)
+def _is_of_size(divisor: Expr) -> bool:
+    return all(
+        not node.varies or not node.args or node.op in _OF_SIZE for node in needed([divisor])
+    )
 
 
-def _either(graph: Graph, q: Expr | None, s: Expr | None) -> Expr | None:
-    return s if q is None else multiplied(graph, q, s)
+def _sum(graph: Graph, op: str, a: Fraction, b: Fraction) -> Fraction:
+    """Return a sum or difference over a divisor that both have."""
+    if (a.poles, a.above) == (b.poles, b.above):
+        return a._replace(dividend=graph.op(op, a.dividend, b.dividend))
+    parts = [multiplied(graph, x.dividend, y.poles, y.above) for x, y in ((a, b), (b, a))]
+    return Fraction(
+        graph.op(op, *parts), _both(graph, a.poles, b.poles), _both(graph, a.above, b.above)
+    )
+
+
+def _both(graph: Graph, one: Expr | None, other: Expr | None) -> Expr | None:
+    return other if one is None else multiplied(graph, one, other)

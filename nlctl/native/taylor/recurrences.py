@@ -388,8 +388,9 @@ class _Reader:
         if node.op not in COMPARISONS:
             raise NoSeriesError(f"it is not known on which side '{node.op}' continues")
         # with a pole no polynomial follows it: the sign of p / q is that of p q
-        dividend, divisor = as_fraction(graph, graph.op("sub", *node.args))
-        return graph.op(node.op, self._side_of(multiplied(graph, dividend, divisor)), zero)
+        distance = as_fraction(graph, graph.op("sub", *node.args))
+        product = multiplied(graph, distance.dividend, distance.poles)
+        return graph.op(node.op, self._side_of(product), zero)
 
     def _side_of(self, distance: Expr) -> Expr:
         """Return the first coefficient of what is compared with 0 that is not 0 itself."""

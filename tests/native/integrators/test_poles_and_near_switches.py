@@ -107,3 +107,40 @@ def test_fast_jumps_late_in_time_are_no_accumulation(how):
     run = nlctl.input_output_response(block, [1e5, 1e5 + 3.005e-4], 0, **how)
     assert len(run.events) == 300
     assert np.allclose(np.diff(run.events["time"]), 1e-6, rtol=0, atol=1e-9)
+
+
+def bell(t, x, u, params):
+    return [1.0, np.where(1 / (1 + 4000 * (x[0] - 1) ** 2) > 0.5, 1.0, 0.0)]
+
+
+def sign_of_bell(t, x, u, params):
+    return [1.0, 0.5 + 0.5 * np.sign(1 / (1 + 4000 * (x[0] - 1) ** 2) - 0.5)]
+
+
+def sign_of_gauss(t, x, u, params):
+    return [1.0, 0.5 + 0.5 * np.sign(np.exp(-4000 * (x[0] - 1) ** 2) - 0.5)]
+
+
+def by_a_root(t, x, u, params):
+    return [1.0, np.heaviside(0.5 / np.sqrt(1 + 4000 * (x[0] - 1) ** 2) - 0.25, 0.5)]
+
+
+def bell_less_bell(t, x, u, params):
+    q = 1 + 4000 * (x[0] - 1) ** 2
+    return [1.0, np.where(3 / q > 1 + 1 / q, 1.0, 0.0)]
+
+
+# half of the width of each window, in sqrt(4000) |x - 1|
+BELLS = {
+    bell: 1.0, sign_of_bell: 1.0, sign_of_gauss: np.sqrt(np.log(2)), by_a_root: np.sqrt(3),
+    bell_less_bell: 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", METHODS, ids=lambda how: "-".join(how.values()))
+@pytest.mark.parametrize("rates", BELLS, ids=lambda rates: rates.__name__)
+def test_a_narrow_window_of_a_bell_is_not_stepped_over(rates, how):
+    system = ct.nlsys(rates, None, states=2, inputs=0, outputs=2, name="s")
+    run = nlctl.input_output_response(system, [0.05, 5.0], 0, [0.05, 0.0], **how)
+    width = 2 * BELLS[rates] / np.sqrt(4000)
+    assert run.states[1, -1] == pytest.approx(width, abs=1e-6)
