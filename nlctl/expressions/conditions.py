@@ -140,14 +140,17 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     return tuple(part for product in (function, *edges) for part in _factors(product))
 
 
-def _factors(function: Expr) -> tuple[Expr, ...]:
+def _factors(function: Expr, known: dict[Expr, tuple[Expr, ...]] | None = None) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
+    known = {} if known is None else known  # parts that products have in common
     if function.op == "neg":
-        return _factors(function.args[0])
+        return _factors(function.args[0], known)
     if function.op != "mul" or is_square(function):
         return (function,)
-    parts = [part for arg in function.args if arg.varies for part in _factors(arg)]
-    return tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
+    if function not in known:
+        parts = [part for arg in function.args if arg.varies for part in _factors(arg, known)]
+        known[function] = tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
+    return known[function]
 
 
 def _signed(graph: Graph, number: Expr) -> Expr:

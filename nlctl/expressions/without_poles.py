@@ -11,6 +11,7 @@ from typing import NamedTuple
 from .edges import is_positive
 from .graph import Expr, Graph, needed
 
+_MOST = 4  # divisors of one fraction: with each the products become longer
 # a divisor above 0 with these alone is of the size of what is divided; exponentials overflow
 _OF_SIZE = ("add", "sub", "neg", "mul", "div", "sqrt", "hypot", "absolute", "sin", "cos")
 
@@ -21,6 +22,7 @@ class Fraction(NamedTuple):
     dividend: Expr
     poles: Expr | None = None  # None where there are none
     above: Expr | None = None
+    count: int = 0  # of divisors
 
     @property
     def is_whole(self) -> bool:
@@ -49,13 +51,14 @@ def multiplied(graph: Graph, factor: Expr, *others: Expr | None) -> Expr:
 
 def _fraction(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
     if expr not in known:
-        known[expr] = _of_parts(graph, expr, known)
+        fraction = _of_parts(graph, expr, known)
+        known[expr] = fraction if fraction.count <= _MOST else Fraction(graph.number(expr))
     return known[expr]
 
 
 def _of_parts(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
     if expr.op == "tan" and expr.varies:
-        return Fraction(graph.op("sin", expr.args[0]), graph.op("cos", expr.args[0]))
+        return Fraction(graph.op("sin", expr.args[0]), graph.op("cos", expr.args[0]), count=1)
     if expr.op not in ("neg", "add", "sub", "mul", "div") or not expr.varies:
         return Fraction(graph.number(expr))
     a, b = (_fraction(graph, arg, known) for arg in (expr.args[0], expr.args[-1]))
@@ -67,16 +70,15 @@ def _of_parts(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction
     if expr.op == "neg":
         return a._replace(dividend=graph.op("neg", a.dividend))
     if expr.op == "mul":
-        dividend = graph.op("mul", a.dividend, b.dividend)
-        return Fraction(dividend, _both(graph, a.poles, b.poles), _both(graph, a.above, b.above))
+        return _over_both(graph, graph.op("mul", a.dividend, b.dividend), a, b)
     if expr.op != "div":
         return _sum(graph, expr.op, a, b)
     if stays:
         return a._replace(dividend=graph.op("div", a.dividend, graph.number(expr.args[1])))
-    dividend = multiplied(graph, a.dividend, b.poles, b.above)
+    dividend, count = multiplied(graph, a.dividend, b.poles, b.above), a.count + b.count + 1
     if is_above:  # and what is divided there: both or neither are below 0
-        return Fraction(dividend, a.poles, _both(graph, a.above, b.dividend))
-    return Fraction(dividend, _both(graph, a.poles, b.dividend), a.above)
+        return Fraction(dividend, a.poles, _both(graph, a.above, b.dividend), count)
+    return Fraction(dividend, _both(graph, a.poles, b.dividend), a.above, count)
 
 
 def _is_of_size(divisor: Expr) -> bool:
@@ -90,9 +92,13 @@ def _sum(graph: Graph, op: str, a: Fraction, b: Fraction) -> Fraction:
     if (a.poles, a.above) == (b.poles, b.above):
         return a._replace(dividend=graph.op(op, a.dividend, b.dividend))
     parts = [multiplied(graph, x.dividend, y.poles, y.above) for x, y in ((a, b), (b, a))]
-    return Fraction(
-        graph.op(op, *parts), _both(graph, a.poles, b.poles), _both(graph, a.above, b.above)
-    )
+    return _over_both(graph, graph.op(op, *parts), a, b)
+
+
+def _over_both(graph: Graph, dividend: Expr, a: Fraction, b: Fraction) -> Fraction:
+    """Return a dividend over the divisors of two fractions."""
+    poles, above = _both(graph, a.poles, b.poles), _both(graph, a.above, b.above)
+    return Fraction(dividend, poles, above, a.count + b.count)
 
 
 def _both(graph: Graph, one: Expr | None, other: Expr | None) -> Expr | None:

@@ -177,7 +177,10 @@ def _made(walk: Walk, cls: type, given: Given) -> KnownValue:
     if holds:
         _call_functions(walk, parts)
         parts = tuple(v for v in parts if not isinstance(v.known, type))
-    if holds or (issubclass(cls, tuple) and hasattr(cls, "_fields")):
+    if issubclass(cls, tuple) and hasattr(cls, "_fields"):
+        made.walk_tuple(walk, cls)
+        holds = True
+    if holds:
         return KnownValue(True, all(v.own and v.inside for v in parts), True)
     return made.instance(walk, cls, given)
 

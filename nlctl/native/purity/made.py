@@ -6,6 +6,7 @@ What such an object does is what its class's functions do: these are walked like
 from __future__ import annotations
 
 import abc
+import collections
 import dataclasses
 import enum
 import inspect
@@ -85,6 +86,32 @@ def _of_fields(walk: Walk, new: Instance, given: Given) -> None:
         else:  # among *args or **kwargs, or an error where it runs
             value = named.get("**", OUTSIDE)
         new.learn(field.name, value)
+
+
+def walk_tuple(walk: Walk, cls: Any) -> None:
+    """Walk the properties and operators of a named tuple: it is a value like others later."""
+    if cls in walk.tuples:
+        return
+    walk.tuples.add(cls)
+    new = Instance(cls)
+    for name in cls._fields:
+        new.learn(name, OUTSIDE)
+    value = KnownValue(True, True, True, known=new)
+    for name in dir(cls):
+        member = inspect.getattr_static(cls, name)
+        function = getattr(member, "__func__", member)
+        if isinstance(member, property):
+            attribute(walk, value, name)
+        elif isinstance(function, FunctionType) and _is_operator(name, function):
+            walk.captured(cls, name, getattr(cls, name))
+            others = [OUTSIDE] * (function.__code__.co_argcount - 1)
+            walk.function(function, Given((value, *others)))
+
+
+def _is_operator(name: str, method: FunctionType) -> bool:
+    """Whether Python calls a method by itself, and it is not one that all named tuples have."""
+    module = method.__globals__
+    return name.startswith("__") and module is not vars(collections) and "_tuple_new" not in module
 
 
 def attribute(walk: Walk, base: KnownValue, name: str) -> KnownValue:

@@ -24,6 +24,7 @@ class Walk(ABC):
         self.unbound: list[str] = []
         self.messages: list[Message] = []
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
+        self.tuples: set[type] = set()  # named tuples whose properties and operators are walked
         self.made: dict[tuple[Any, Any], KnownValue] = {}  # objects, by where they are made
 
     def captured(self, holder: object, name: str, value: object) -> KnownValue:

@@ -144,3 +144,17 @@ def test_a_narrow_window_of_a_bell_is_not_stepped_over(rates, how):
     run = nlctl.input_output_response(system, [0.05, 5.0], 0, [0.05, 0.0], **how)
     width = 2 * BELLS[rates] / np.sqrt(4000)
     assert run.states[1, -1] == pytest.approx(width, abs=1e-6)
+
+
+def test_long_chains_of_quotients_and_products_stay_short():
+    """Each divisor that is cleared makes products longer: in a chain of 30 only the last few are."""
+
+    def chain(t, x, u, params):
+        y, z = x[0], x[0] + 1.0
+        for _ in range(30):
+            y, z = (1 / y + y) / (y + 2), y * z
+        return [np.where((y > 0.4) & (z * y * z > 0.0), -x[0], 0.0)]  # y tends to 0.618
+
+    system = ct.nlsys(chain, None, states=1, inputs=0, outputs=1, name="s")
+    run = nlctl.input_output_response(system, [0.0, 1.0], 0, [1.0], rtol=1e-9)
+    assert run.states[0, -1] == pytest.approx(np.exp(-1), abs=1e-8)
