@@ -147,7 +147,7 @@ def test_a_narrow_window_of_a_bell_is_not_stepped_over(rates, how):
 
 
 def test_long_chains_of_quotients_and_products_stay_short():
-    """Each divisor that is cleared makes products longer: in a chain of 30 only the last few are."""
+    """Each divisor that is cleared makes products longer: in a chain of 30 there are few."""
 
     def chain(t, x, u, params):
         y, z = x[0], x[0] + 1.0
