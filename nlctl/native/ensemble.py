@@ -252,7 +252,10 @@ def _seen(
     grid = np.union1d(course.times, shown)
     inputs = interpolated(course.inputs, course.times, grid)
     x0, p = every.batch(range(number, number + 1), 1)
-    return trajectory(replace(course, times=grid, inputs=inputs), x0[:, 0], p[:, 0]), shown
+    again = trajectory(replace(course, times=grid, inputs=inputs), x0[:, 0], p[:, 0])
+    if again.statistics.status is Status.OK:  # in another number of steps, by itself
+        again = replace(again, statistics=run.statistics)
+    return again, shown
 
 
 def _sampled_at(run: Trajectory, times: np.ndarray) -> Trajectory:
