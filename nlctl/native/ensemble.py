@@ -222,10 +222,11 @@ def _runner(
             if number in audited:
                 _audit(every, number, run, audit)
             run, shown = _seen(every, number, run, asked)
+            run = _sampled_at(run, shown)
             at_samples = _sampled_at(run, asked.times)
             for signal, samples in kept.items():
                 samples[number, : at_samples.time.size] = at_samples.outputs[labels.index(signal)]
-            rows[number] = _row(_sampled_at(run, shown), labels, asked)
+            rows[number] = _row(run, labels, asked)
         return rows
 
     return one
@@ -245,8 +246,8 @@ def _seen(
     every: Members, number: int, run: Trajectory, asked: _Asked
 ) -> tuple[Trajectory, np.ndarray]:
     """Return a member with samples between all events, if metrics look, and the times of these."""
-    breaks, course = run.happened.time, asked.course
-    if not asked.metrics or not unsampled(asked.times, breaks).size:
+    breaks, course, done = run.happened.time, asked.course, run.statistics.status is Status.OK
+    if not (asked.metrics and done and unsampled(asked.times, breaks).size):
         return run, asked.times
     shown = sampled_between(asked.times, breaks)
     grid = np.union1d(course.times, shown)

@@ -95,3 +95,26 @@ def test_a_function_without_breaks_is_called_as_before():
     assert (table["top"] == TIMES.size + 9).all()
     smooth = nlctl.ensemble_response(pulsed(3.25, 1.0), TIMES, metrics=[metric(size)]).table
     assert (smooth["top"] == TIMES.size).all()
+
+
+def test_a_member_that_fails_is_not_run_again():
+    """x' = x^2 escapes at 1/x(0): it has the status that it has without metrics, and no number."""
+    system = ct.nlsys(lambda t, x, u, params: [x[0] ** 2 + 0.0 * (3.33 <= t < 3.35)],
+                      lambda t, x, u, params: [x[0]], states=1, inputs=0, outputs=["y"],
+                      name="escaping")  # fmt: skip
+    sizes = []
+
+    def size(t, y):
+        sizes.append(t.size)
+        return float(t.size)
+
+    start = {"escaping.x[0]": np.array([0.2, 0.05])}  # until 5 s, and beyond the end
+    plain, asked = (
+        nlctl.ensemble_response(system, TIMES, 0, start, metrics=metrics, keep=["y"])
+        for metrics in ([], [metric(size)])
+    )
+    assert asked.table["status"][0] == plain.table["status"][0] != "OK"
+    assert asked.table["steps"].tolist() == plain.table["steps"].tolist()
+    np.testing.assert_array_equal(asked.signals["y"][0], plain.signals["y"][0])
+    assert np.isnan(asked.table["top"][0])
+    assert sizes == [TIMES.size + 9]

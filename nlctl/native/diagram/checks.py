@@ -47,7 +47,7 @@ def check_functions(path: str, system: System) -> FunctionReading:
         _check_counts(path, system)  # nlctl's blocks were checked when they were made
     return FunctionReading(
         captured=tuple(note for reading in readings for note in reading.captured),
-        unbound=tuple(name for reading in readings for name in reading.unbound),
+        numba_differs=tuple(name for reading in readings for name in reading.numba_differs),
         messages=tuple(messages),
     )
 

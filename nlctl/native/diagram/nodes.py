@@ -23,8 +23,8 @@ class Node:
     inputs: tuple[Combination, ...]
     # shape (noutputs, ninputs); which outputs depend on which inputs at the same instant
     direct: np.ndarray
-    # names in its functions that have no value on one of the ways: only traced are these right
-    unbound: tuple[str, ...] = ()
+    # why numba would compute its functions differently: they are traced, or called in Python
+    numba_differs: tuple[str, ...] = ()
     messages: tuple[Message, ...] = ()  # that its functions write: they are traced or refused
     # what samples the block, whose states are the first ones of this
     sampled: Sampled | None = None

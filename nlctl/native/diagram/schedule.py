@@ -102,7 +102,7 @@ def schedule(system: ct.InputOutputSystem, *, solve_loops: bool = False) -> Sche
             state_offset=place.state_offset,
             inputs=tuple(wiring.inputs(place)),
             direct=feedthrough(one) & (one is place.system),
-            unbound=reading.unbound,
+            numba_differs=reading.numba_differs,
             messages=reading.messages,
             sampled=None if one is place.system else place.system,
         )

@@ -108,7 +108,7 @@ def call_of(
         lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
     )
     # a name without a value is an error in Python, and 0 in numba's machine code
-    source = None if node.unbound else partial(_source, name, stands, node.system)
+    source = None if node.numba_differs else partial(_source, name, stands, node.system)
     return Call(
         name=name, block=node.path, kind=kind, lengths=stands.lengths, reason=reason,
         function=stands, source=source,

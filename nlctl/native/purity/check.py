@@ -54,9 +54,9 @@ class FunctionReading:
 
     # what it reads from around it: constants, as long as they stay what they are
     captured: tuple[Captured, ...]
-    # names that it reads and that have no value on one of the ways there: Python raises an error
-    # then, numba takes 0
-    unbound: tuple[str, ...]
+    # why numba would compute it differently: names that have no value on one of the ways there,
+    # which are an error in Python and 0 in numba, "try", and the "text" of numbers
+    numba_differs: tuple[str, ...]
     # where it writes messages: it may be computed from its expressions alone, which reach none
     messages: tuple[Message, ...]
 
@@ -71,7 +71,7 @@ def check_pure(function: Any, arguments: Sequence[KnownValue]) -> FunctionReadin
     walk = FunctionWalk()
     walk.call(captured(function), Given(tuple(arguments)))
     return FunctionReading(
-        captured=tuple(walk.read.values()), unbound=tuple(dict.fromkeys(walk.unbound)),
+        captured=tuple(walk.read.values()), numba_differs=tuple(dict.fromkeys(walk.numba_differs)),
         messages=tuple(walk.messages),
     )  # fmt: skip
 

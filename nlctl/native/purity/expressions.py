@@ -92,7 +92,7 @@ class Expressions(ast.NodeVisitor):
         frame: Frame | None = self.frame
         while frame is not None:
             if name in frame.names:
-                self.walk.unbound += [name] if name in frame.unbound else []
+                self.walk.numba_differs += [name] if name in frame.unbound else []
                 return frame.names[name]
             frame = frame.parent
         function = self.frame.function
@@ -269,7 +269,7 @@ class Expressions(ast.NodeVisitor):
         return SLICE
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> KnownValue:
-        self.walk.unbound += ["text"]  # numba writes numbers in other digits than Python
+        self.walk.numba_differs += ["text"]  # numba writes numbers in other digits than Python
         for part in ast.walk(node):
             if isinstance(part, ast.FormattedValue):
                 self.visit(part.value)

@@ -378,7 +378,7 @@ def _builtin(walk: Walk, thing: Any, given: Given) -> KnownValue:
         _written(places[0], "next()")
         return element(places[0])
     if name in _PLAIN:
-        walk.unbound += ["text"] if name in ("str", "repr", "format") else []
+        walk.numba_differs += ["text"] if name in ("str", "repr", "format") else []
         return FRESH
     if name == "print":
         raise Message("calls print()", OUTPUT)

@@ -197,17 +197,17 @@ class CallWalker(Expressions):
         self.visit(node.test)
 
     def visit_Raise(self, node: ast.Raise) -> None:
-        before = list(self.walk.unbound)
+        before = list(self.walk.numba_differs)
         if node.exc is not None:
             self.visit(node.exc)
         if "text" not in before:  # nobody computes with what an error says
-            self.walk.unbound = [name for name in self.walk.unbound if name != "text"]
+            self.walk.numba_differs = [name for name in self.walk.numba_differs if name != "text"]
 
     def visit_Try(self, node: ast.Try) -> None:
         """Walk the ways through it; of errors in machine code nothing is caught."""
         caught = [handler.type for handler in node.handlers]
         if not all(isinstance(c, ast.Name) and c.id == "KeyError" for c in caught):
-            self.walk.unbound += ["try"]  # numba knows other errors than Python
+            self.walk.numba_differs += ["try"]  # numba knows other errors than Python
         before = dict(self.frame.names)
         self.statements(node.body)
         self.frame.names = merged([before, self.frame.names])
@@ -230,7 +230,7 @@ class CallWalker(Expressions):
                 raise Impure("has a with statement", "do without it")
             ends_early |= entered is contextlib.suppress
         if ends_early:
-            self.walk.unbound += ["try"]  # numba has no such word
+            self.walk.numba_differs += ["try"]  # numba has no such word
             self.either([node.body, []])
         else:
             self.statements(node.body)

@@ -21,7 +21,7 @@ class Walk(ABC):
 
     def __init__(self) -> None:
         self.read: dict[tuple[int, str], Captured] = {}
-        self.unbound: list[str] = []
+        self.numba_differs: list[str] = []  # see `FunctionReading`
         self.messages: list[Message] = []
         self.classes: dict[ast.AST, type] = {}  # by where a function defines them
         self.tuples: set[type] = set()  # named tuples whose properties and operators are walked
