@@ -56,37 +56,47 @@ def _pieces(t, breaks):
 
 
 @equation
-def _window(first, last, k):
-    """Return the samples of a piece of five or more around sample `k` that a curve goes through."""
-    count = min(2 * _HALF + 1, max(last - first - 2, 4))
-    a = min(max(k - _HALF, first), last - count)
-    return a, a + count
+def _around(size, k):
+    """Return the samples [a, b) of a piece that say how far sample `k` may be believed."""
+    a = min(max(k - _HALF - 1, 0), max(size - 2 * _HALF - 3, 0))
+    return a, min(a + 2 * _HALF + 3, size)
 
 
 @equation
-def _defect(t, y, a, b, k):
-    """Return how far sample `k` is from where others of [a, b) say, or what rounding makes."""
-    defect, size = 0.0, abs(y[k])
-    for j in range(a, b):
-        size = max(size, abs(y[j]))
-        if j == k:
-            continue
-        weight = 1.0
-        for m in range(a, b):
-            if m not in (j, k):
-                weight *= (t[k] - t[m]) / (t[j] - t[m])
-        defect += weight * (y[j] - y[k])
-    return max(abs(defect), _ROUNDING * size)
+def _differences(t, y):
+    """Return the divided differences of a piece: f[t_i, ..., t_(i + m)] is `table[i, m]`."""
+    # As many as curves have coefficients that go through samples of a piece of five or more.
+    table = np.empty((t.size, min(2 * _HALF + 1, max(t.size - 2, 4))))
+    table[:, 0] = y
+    for m in range(1, table.shape[1]):
+        for i in range(t.size - m):
+            table[i, m] = (table[i + 1, m - 1] - table[i, m - 1]) / (t[i + m] - t[i])
+    return table
 
 
 @equation
-def _doubt(t, y, first, last, k):
-    """Return the largest defect of a sample among the neighbours of three windows."""
-    a, b = _window(first, last, k)
-    begin = max(min(a - 1, last - (b - a) - 2), first)
+def _window(table, k):
+    """Return at which sample the curve around sample `k` begins."""
+    size, count = table.shape
+    return min(max(k - _HALF, 0), size - count)
+
+
+@equation
+def _doubt(t, y, table, k):
+    """Return the largest defect of a sample by the samples of three windows, or rounding."""
+    # Within a window it is the last divided difference times the distances to the others.
+    size, count = table.shape
+    begin = max(min(_window(table, k) - 1, size - count - 2), 0)
     doubt = 0.0
-    for start in range(begin, min(begin + 3, last - (b - a) + 1)):
-        doubt = max(doubt, _defect(t, y, start, start + b - a, k))
+    for start in range(begin, min(begin + 3, size - count + 1)):
+        end, largest = start + count, abs(y[k])
+        defect = table[start, count - 1]
+        for m in range(start, end):
+            largest = max(largest, abs(y[m]))
+            defect *= t[k] - t[m] if m != k else 1.0
+        if not start <= k < end:  # next to an end of the piece
+            defect = _at(t[start:end], table[start], t[k])[0] - table[k, 0]
+        doubt = max(doubt, abs(defect), _ROUNDING * largest)
     return doubt
 
 
@@ -102,7 +112,7 @@ def _coefficients(s, y):
 
 @equation
 def _at(s, c, x):
-    """Return the polynomial of `_coefficients` with its first and second derivative."""
+    """Return the polynomial in Newton's form with its first and second derivative."""
     p, d, dd = c[-1], 0.0, 0.0
     for m in range(c.size - 2, -1, -1):
         dd = dd * (x - s[m]) + 2 * d
@@ -112,17 +122,20 @@ def _at(s, c, x):
 
 
 @equation
-def _turn(t, y, first, last, k, low, high):
+def _turn(t, y, k, low, high):
     """Return place and value of the extreme next to sample `k`, in [low, high], and if it is."""
-    # The sample is the largest or the smallest of its neighbours in the piece [first, last).
-    a, b = _window(first, last, k)
-    s, x = t[a:b] - t[k], 0.0
-    c = _coefficients(s, y[a:b] - y[k])
+    # The sample is the largest or the smallest of its neighbours in a piece.
+    begin, end = _around(t.size, k)
+    t, y, k = t[begin:end], y[begin:end], k - begin
+    s, x = t - t[k], 0.0
+    table = _differences(s, y - y[k])
+    a = _window(table, k)
+    c = table[a]
     for _ in range(5):  # Newton's method: quadratic from the sample
-        _, d, dd = _at(s, c, x)
+        _, d, dd = _at(s[a:], c, x)
         x = min(max(x - d / dd, low - t[k]), high - t[k]) if dd != 0.0 else 0.0
-    gain, d, dd = _at(s, c, x)
-    doubt = _doubt(t, y, first, last, k)
+    gain, d, dd = _at(s[a:], c, x)
+    doubt = _doubt(t, y, table, k)
     beyond = gain * (-1.0 if dd > 0.0 else 1.0)
     is_clear = beyond > _CLEAR * doubt  # NaN: not
     value = y[k] + np.sign(gain) * (abs(gain) - _GUARD * doubt) if is_clear else y[k]
@@ -155,17 +168,20 @@ def turning_points(t, y, breaks):
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
         if last - first < 5:
             continue
-        d = consecutive_differences(y[first:last])
-        up, down = np.ones(last - first), -np.ones(last - first)
+        own_t, own_y, size = t[first:last], y[first:last], last - first
+        d = consecutive_differences(own_y)
+        up, down = np.ones(size), -np.ones(size)
         up[1:], down[:-1] = d, d
         up[0], down[-1] = -d[0], -d[-1]
         turns = ((up > 0) & (down <= 0)) | ((up < 0) & (down >= 0))
-        for k in np.nonzero(turns)[0] + first:
-            low, high = t[k - 1] if k > first else start, t[k + 1] if k + 1 < last else end
-            at, extreme, is_clear = _turn(t, y, first, last, k, low, high)
+        for k in np.nonzero(turns)[0]:
+            low = own_t[k - 1] if k > 0 else start
+            high = own_t[k + 1] if k + 1 < size else end
+            at, extreme, is_clear = _turn(own_t, own_y, k, low, high)
             is_clear &= bottom <= extreme <= top and (count == 0 or at > place[count - 1])
-            if is_clear and at > low and at < high and at != t[k]:
-                place[count], value[count], before[count] = at, extreme, k + (at > t[k])
+            if is_clear and at > low and at < high and at != own_t[k]:
+                place[count], value[count] = at, extreme
+                before[count] = first + k + (at > own_t[k])
                 count += 1
     return before[:count], place[:count], value[:count]
 
@@ -217,32 +233,69 @@ def limits_at_breaks(t, y, breaks):
 
 
 @equation
-def _parts(t, y, first, last, k, tolerance):
-    """Return into how many parts lines from sample `k` to the next are divided."""
-    bend = 0.0
-    for j in (max(k, first + 1), min(k + 1, last - 2)):
-        if first < j < last - 1:
-            rise = (y[j + 1] - y[j]) / (t[j + 1] - t[j]) - (y[j] - y[j - 1]) / (t[j] - t[j - 1])
-            bend = max(bend, abs(rise / (t[j + 1] - t[j - 1])))
-    gap = bend * (t[k + 1] - t[k]) ** 2 / 4
-    return int(min(np.ceil(np.sqrt(gap / tolerance)), _PARTS)) if tolerance > 0.0 else 1
+def _parts(t, y, tolerance):
+    """Return into how many parts lines from each sample of a piece to the next are divided."""
+    parts = np.ones(t.size, np.int64)
+    if t.size < 5 or not tolerance > 0.0:
+        return parts
+    slopes = consecutive_differences(y) / consecutive_differences(t)
+    bends = np.abs(consecutive_differences(slopes) / (t[2:] - t[:-2]))
+    for k in range(t.size - 1):
+        bend = max(bends[max(k - 1, 0)], bends[min(k, bends.size - 1)])
+        gap = bend * (t[k + 1] - t[k]) ** 2 / 4
+        parts[k] = 1 + int(min(np.sqrt(gap / tolerance), _PARTS - 1))
+    return parts
 
 
 @equation
-def _between(t, y, first, last, k, parts):
-    """Return the times and values that divide the way from sample `k` to the next."""
-    share = np.arange(1, parts) / parts
-    at = t[k] + share * (t[k + 1] - t[k])
-    line = share * (y[k + 1] - y[k])
-    a, b = _window(first, last, k)
-    s = t[a:b] - t[k]
-    c = _coefficients(s, y[a:b] - y[k])
-    off = np.array([_at(s, c, x)[0] for x in at - t[k]]) - line
-    doubt = max(_doubt(t, y, first, last, k), _doubt(t, y, first, last, k + 1))
-    if not np.max(np.abs(off)) > _CLEAR * doubt:
-        off = 0.0 * off
-        doubt = 0.0
-    return at, y[k] + line + np.sign(off) * np.maximum(np.abs(off) - _GUARD * doubt, 0.0)
+def _divide(t, y, k, table, doubt, times, values):
+    """Write the times and values that divide the way from sample `k` to the next."""
+    a, n = _window(table, k), times.size
+    step, rise = t[k + 1] - t[k], y[k + 1] - y[k]
+    c = table[a]
+    for i in range(n):
+        times[i] = t[k] + (i + 1) / (n + 1) * step
+    values[:] = c[-1]
+    for m in range(c.size - 2, -1, -1):
+        for i in range(n):
+            values[i] = values[i] * (times[i] - t[a + m]) + c[m]
+    farthest = 0.0
+    for i in range(n):
+        values[i] -= y[k] + (i + 1) / (n + 1) * rise
+        farthest = max(farthest, abs(values[i]))
+    guard = _GUARD * doubt if farthest > _CLEAR * doubt else np.inf
+    for i in range(n):
+        off = np.sign(values[i]) * max(abs(values[i]) - guard, 0.0)
+        values[i] = y[k] + (i + 1) / (n + 1) * rise + off
+
+
+@equation
+def _follow(t, y, parts, times, values):
+    """Write the curve of a piece as points that lines connect; return how many."""
+    table, n = _differences(t, y), 0
+    doubt = _doubt(t, y, table, 0) if t.size > 4 else 0.0
+    for k in range(t.size):
+        times[n], values[n], n = t[k], y[k], n + 1
+        if t.size > 4 and k + 1 < t.size:
+            doubt, before = _doubt(t, y, table, k + 1), doubt
+            if parts[k] > 1:
+                end = n + parts[k] - 1
+                _divide(t, y, k, table, max(before, doubt), times[n:end], values[n:end])
+                n = end
+    return n
+
+
+@equation
+def _put(times, values, n, t, y):
+    """Write samples; return how many points there are then."""
+    times[n : n + t.size], values[n : n + t.size] = t, y
+    return n + t.size
+
+
+@equation
+def _beyond(t, y, at):
+    """Return limits outside of all samples of a piece."""
+    return np.array([_extrapolated(t, y, here) for here in at])
 
 
 @equation
@@ -253,45 +306,24 @@ def path(t, y, breaks, apart=0.0):
     apart = apart if apart > 0.0 else _APART * (t[-1] - t[0])
     tolerance = _LINE * (np.max(y) - np.min(y))
     firsts, lasts, starts, ends = _pieces(t, breaks)
-    times, values = [t[:0].copy()], [y[:0].copy()]
-    done = 0
+    parts, n = np.ones(t.size, np.int64), 0
+    for first, last in zip(firsts, lasts):  # noqa: B905 (numba)
+        parts[first:last] = _parts(t[first:last], y[first:last], tolerance)
+    size = np.sum(parts) + 2 * _ENDS * firsts.size
+    times, values, done = np.empty(size), np.empty(size), 0
     for first, last, start, end in zip(firsts, lasts, starts, ends):  # noqa: B905 (numba)
-        times.append(t[done:first].copy())  # samples at breaks
-        values.append(y[done:first].copy())
+        n = _put(times, values, n, t[done:first], y[done:first])  # samples at breaks
         done = max(done, last)
         if last == first:
             continue
         own_t, own_y = t[first:last], y[first:last]
         if start + apart < t[first]:
-            for at in np.linspace(start + apart, t[first], _ENDS)[:-1]:
-                times.append(np.array([at]))
-                values.append(np.array([_extrapolated(own_t, own_y, at)]))
-        for k in range(first, last):
-            times.append(t[k : k + 1].copy())
-            values.append(y[k : k + 1].copy())
-            parts = _parts(t, y, first, last, k, tolerance) if k + 1 < last else 1
-            if parts > 1 and last - first > 4:
-                at, here = _between(t, y, first, last, k, parts)
-                times.append(at)
-                values.append(here)
+            at = np.linspace(start + apart, t[first], _ENDS)[:-1]
+            n = _put(times, values, n, at, _beyond(own_t, own_y, at))
+        n += _follow(own_t, own_y, parts[first:last], times[n:], values[n:])
         if end - apart > t[last - 1]:
-            for at in np.linspace(t[last - 1], end - apart, _ENDS)[1:]:
-                times.append(np.array([at]))
-                values.append(np.array([_extrapolated(own_t, own_y, at)]))
-    times.append(t[done:].copy())
-    values.append(y[done:].copy())
+            at = np.linspace(t[last - 1], end - apart, _ENDS)[1:]
+            n = _put(times, values, n, at, _beyond(own_t, own_y, at))
+    n = _put(times, values, n, t[done:], y[done:])
     bottom, top = _limits(y)
-    return _joined(times), np.minimum(np.maximum(_joined(values), bottom), top)
-
-
-@equation
-def _joined(parts):
-    """Return arrays one after another; numba's `concatenate` takes no list."""
-    size = 0
-    for part in parts:
-        size += part.size
-    whole, done = np.empty(size), 0
-    for part in parts:
-        whole[done : done + part.size] = part
-        done += part.size
-    return whole
+    return times[:n], np.minimum(np.maximum(values[:n], bottom), top)

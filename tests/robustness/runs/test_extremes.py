@@ -8,11 +8,12 @@ import pytest
 from examples import some
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
 from nlctl.analysis import metrics
 from nlctl.analysis.metrics import highest, in_machine_code, lowest
-from nlctl.analysis.metrics.curves import limits_at_breaks, path
+from nlctl.analysis.metrics.curves import _differences, _doubt, limits_at_breaks, path
 
 NONE = np.empty(0)
 
@@ -111,6 +112,24 @@ def test_one_kink_or_jump_is_not_overshot(place, phase, bends, factors):
     t = np.arange(-15, 16) + phase
     fine = np.concatenate([np.linspace(t[0], t[-1], 20_001), [place, np.nextafter(place, 9)]])
     assert highest(t, y(t)) <= y(fine).max() + 1e-6
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(5, 30))
+def test_a_doubt_is_the_largest_distance_from_what_neighbours_say(seed, n):
+    """By polynomials of SciPy through the others of three windows, on any samples."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.5, 1.5, n))
+    y = np.sin(t)
+    count = min(9, max(n - 2, 4))
+    for k in range(n):
+        first = min(max(k - 4, 0), n - count)
+        begin = max(min(first - 1, n - count - 2), 0)
+        distances = []
+        for start in range(begin, min(begin + 3, n - count + 1)):
+            others = [j for j in range(start, start + count) if j != k]
+            distances.append(abs(KroghInterpolator(t[others], y[others])(t[k]) - y[k]))
+        doubt = _doubt(t, y, _differences(t, y), k)
+        assert doubt == pytest.approx(max(distances), rel=1e-6, abs=2e-12)
 
 
 def test_a_smooth_peak_is_found_from_below_to_eighth_order():
