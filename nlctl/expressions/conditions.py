@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
-from .graph import ORDERS, Expr, Graph, needed
+from .graph import ORDERS, Expr, Graph, needed, parts_first
 from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -140,17 +140,20 @@ def switching_functions(graph: Graph, condition: Expr) -> tuple[Expr, ...]:
     return tuple(part for product in (function, *edges) for part in _factors(product))
 
 
-def _factors(function: Expr, known: dict[Expr, tuple[Expr, ...]] | None = None) -> tuple[Expr, ...]:
+def _is_product(node: Expr) -> bool:
+    return node.op == "neg" or (node.op == "mul" and not is_square(node))
+
+
+def _factors(function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
-    known = {} if known is None else known  # parts that products have in common
-    if function.op == "neg":
-        return _factors(function.args[0], known)
-    if function.op != "mul" or is_square(function):
-        return (function,)
-    if function not in known:
-        parts = [part for arg in function.args if arg.varies for part in _factors(arg, known)]
-        known[function] = tuple(parts) if len(set(parts)) == len(parts) > 0 else (function,)
-    return known[function]
+    factors: dict[Expr, tuple[Expr, ...]] = {}
+    for node in parts_first([function], _is_product):
+        factors[node] = (node,)
+        if _is_product(node):
+            several = [part for arg in node.args if arg.varies for part in factors[arg]]
+            if len(set(several)) == len(several) > 0:
+                factors[node] = tuple(several)
+    return factors[function]
 
 
 def _signed(graph: Graph, number: Expr) -> Expr:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from .graph import Expr, Graph
+from .signs import POSITIVE, UNKNOWN
 
 _ROOTS = ("sqrt", "log", "log2", "log10")
 _ARCS = ("arcsin", "arccos", "arctanh")
 _BEHIND_ONE = {"arccosh": "sub", "log1p": "add"}
-_SQUARES = ("absolute", "sqrt", "hypot")  # at least 0
-_ABOVE = ("exp", "exp2", "cosh")  # above 0
 
 
 def domain_edges(graph: Graph, nodes: Iterable[Expr]) -> list[Expr]:
@@ -28,7 +27,7 @@ def poles(graph: Graph, nodes: Iterable[Expr]) -> list[Expr]:
     """Return what is 0 where one of all parts of some expressions is infinite."""
     divisors: dict[Expr, None] = {}
     for node in nodes:
-        if node.op == "div" and node.args[1].varies and not is_positive(node.args[1]):
+        if node.op == "div" and node.args[1].varies and node.args[1].sign != POSITIVE:
             divisors[graph.number(node.args[1])] = None
         if node.op == "tan" and node.varies:
             divisors[graph.op("cos", node.args[0])] = None
@@ -40,7 +39,7 @@ def _ends(node: Expr) -> bool:
     if not node.varies:
         return False
     if node.op in _ROOTS or (node.op == "power" and not _is_whole(node.args[1])):
-        return not _is_never_negative(node.args[0])
+        return node.args[0].sign == UNKNOWN
     return node.op in (*_ARCS, *_BEHIND_ONE)
 
 
@@ -59,29 +58,3 @@ def _is_whole(exponent: Expr) -> bool:
 def is_square(expr: Expr) -> bool:
     """Return whether an expression is a product of a number with itself, as it is written."""
     return expr.op == "mul" and expr.args[0] is expr.args[1]
-
-
-def is_positive(expr: Expr) -> bool:
-    """Return whether an expression is seen to be above 0 wherever it is a number."""
-    if expr.op == "const":
-        return bool(expr.data > 0)
-    if expr.op == "add":
-        return all(map(_is_never_negative, expr.args)) and any(map(is_positive, expr.args))
-    if expr.op in ("mul", "div", "sqrt"):
-        return all(map(is_positive, expr.args))
-    if expr.op == "maximum":
-        return any(map(is_positive, expr.args))
-    return expr.op in _ABOVE
-
-
-def _is_never_negative(expr: Expr) -> bool:
-    """Return whether an expression is seen to be at least 0."""
-    if expr.op == "const":
-        return bool(expr.data >= 0)
-    if is_square(expr):
-        return True
-    if expr.op in ("add", "mul", "div"):
-        return all(map(_is_never_negative, expr.args))
-    if expr.op == "maximum":
-        return any(map(_is_never_negative, expr.args))
-    return expr.op in _SQUARES or is_positive(expr)

@@ -7,11 +7,13 @@ constants.  It never changes the order of a sum.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from .signs import sign_of
 
 SMALL = 8  # arrays up to this size are numbers of their own, longer ones are loops
 BUDGET = 3000  # expressions of one function, beyond which it is better called than written out
@@ -59,6 +61,7 @@ class Expr:
     kind: str  # ``"f"`` float, ``"i"`` integer, ``"b"`` truth value
     index: int  # its place in the graph, after all that it is made of
     varies: bool  # whether it depends on more than parameters
+    sign: int  # what is seen of it, see `signs`
     # of an integer: what it is for the parameter values of the trace; None if it depends on
     # more than parameters
     value: int | None
@@ -75,13 +78,18 @@ def numpy_function(op: str) -> Any:
 
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
+    return parts_first(exprs, lambda expr: expr not in known)
+
+
+def parts_first(exprs: Iterable[Expr], divides: Callable[[Expr], bool]) -> tuple[Expr, ...]:
+    """Return expressions and the parts of those that it divides, parts first."""
     nodes: dict[Expr, None] = {}
     waiting = list(exprs)
     while waiting:
         expr = waiting.pop()
         if expr not in nodes:
             nodes[expr] = None
-            waiting.extend(expr.args if expr not in known else ())
+            waiting.extend(expr.args if divides(expr) else ())
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 
@@ -187,7 +195,7 @@ class Graph:
             varies = varies or any(a.varies for a in args)
             known = self._known[key] = Expr(
                 op=op, args=args, data=data, size=size, kind=kind,
-                index=len(self.nodes), varies=varies, value=value,
+                index=len(self.nodes), varies=varies, sign=sign_of(op, args, data), value=value,
             )  # fmt: skip
             self.nodes.append(known)
         return known

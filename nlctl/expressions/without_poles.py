@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .edges import is_positive
-from .graph import Expr, Graph, needed
+from .graph import Expr, Graph, needed, parts_first
+from .signs import POSITIVE
 
 _MOST = 4  # divisors of one fraction: with each the products become longer
 # a divisor above 0 with these alone is of the size of what is divided; exponentials overflow
@@ -32,7 +32,12 @@ class Fraction(NamedTuple):
 
 def as_fraction(graph: Graph, expr: Expr) -> Fraction:
     """Return sums, products and quotients as one fraction, whatever else as it is."""
-    return _fraction(graph, expr, {})
+    fractions: dict[Expr, Fraction] = {}
+    for node in parts_first([expr], _combines):
+        fraction = _of_parts(graph, node, fractions)
+        fits = fraction.count <= _MOST
+        fractions[node] = fraction if fits else Fraction(graph.number(node))
+    return fractions[expr]
 
 
 def compared(graph: Graph, a: Fraction, b: Fraction) -> Expr:
@@ -49,21 +54,18 @@ def multiplied(graph: Graph, factor: Expr, *others: Expr | None) -> Expr:
     return factor
 
 
-def _fraction(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
-    if expr not in known:
-        fraction = _of_parts(graph, expr, known)
-        known[expr] = fraction if fraction.count <= _MOST else Fraction(graph.number(expr))
-    return known[expr]
+def _combines(expr: Expr) -> bool:
+    return expr.varies and expr.op in ("neg", "add", "sub", "mul", "div")
 
 
-def _of_parts(graph: Graph, expr: Expr, known: dict[Expr, Fraction]) -> Fraction:
+def _of_parts(graph: Graph, expr: Expr, fractions: dict[Expr, Fraction]) -> Fraction:
     if expr.op == "tan" and expr.varies:
         return Fraction(graph.op("sin", expr.args[0]), graph.op("cos", expr.args[0]), count=1)
-    if expr.op not in ("neg", "add", "sub", "mul", "div") or not expr.varies:
+    if not _combines(expr):
         return Fraction(graph.number(expr))
-    a, b = (_fraction(graph, arg, known) for arg in (expr.args[0], expr.args[-1]))
+    a, b = fractions[expr.args[0]], fractions[expr.args[-1]]
     divides = expr.op == "div" and expr.args[1].varies
-    is_above = divides and is_positive(expr.args[1])
+    is_above = divides and expr.args[1].sign == POSITIVE
     stays = not divides or (is_above and not _is_of_size(expr.args[1]))
     if a.is_whole and b.is_whole and stays:
         return Fraction(graph.number(expr))

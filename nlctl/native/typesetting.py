@@ -98,7 +98,16 @@ def typeset(
     system = known_system("typeset", system)
     system = ct.ss(system) if isinstance(system, ct.TransferFunction) else system
     read = schedule(overridden(system, params), solve_loops=True)
-    return tuple(_block(read, node, values) for node in read.nodes)
+    return tuple(_written(read, node, values) for node in read.nodes)
+
+
+def _written(read: Schedule, node: Node, values: bool) -> BlockEquations:
+    try:
+        return _block(read, node, values)
+    except RecursionError:
+        raise CompileError(
+            f"block '{node.path}' has no formula: its expressions are nested too deeply"
+        ) from None
 
 
 def _block(read: Schedule, node: Node, values: bool) -> BlockEquations:

@@ -300,6 +300,22 @@ def test_a_relay_with_hysteresis_oscillates_with_the_period_of_its_width(actuato
     np.testing.assert_allclose(found, exact, rtol=0, atol=8e3 * rtol * width)
 
 
+@pytest.mark.parametrize("method", ["tsit5", "taylor"])
+def test_a_value_of_one_state_alone_is_no_run_without_end(method):
+    """4 = 0.4 // 0.1, and 0.4 > 0.4 is not: -0.4 at x = 0.4, 0.6 on both sides of it."""
+
+    def update(t, x, u, params):
+        n = x[0] // 0.1
+        return [(n + 1 if x[0] > 0.4 else n) % 2 - x[0]]
+
+    system = ct.nlsys(update, None, inputs=0, outputs=1, states=1, name="floor")
+    times = np.linspace(0, 0.1, 11)
+    passed = nlctl.input_output_response(system, times, 0, 0.4, method=method, ignore_errors=True)
+    assert passed.statistics.status in (Status.OK, Status.CHATTERING)
+    if passed.success:
+        assert passed.states[0] == pytest.approx(1 - 0.6 * np.exp(-times), abs=1e-7)
+
+
 @pytest.mark.slow
 def test_members_of_an_ensemble_chatter_whatever_is_beside_them():
     """Statuses, times and steps of nine members, together and three of them alone."""

@@ -171,17 +171,19 @@ class _Places(LaneEquations):
                 low, first = (t, x), middle
             if not abs(last - first) > _REMAINS * whole:
                 return None
-        # the jump itself may have a value of its own, as sign(0) has: beside it on both sides
+        # the jump itself may have a value of its own, as sign(0) has: next to it on both sides
+        alone = np.array([first, last])
         wider = Jump(times=(low[0], high[0]), before=low[1], after=high[1], inputs=u).sides(1.0)
         (t, before, _), (t_2, after, _) = wider
         jump = Jump(times=(float(t), float(t_2)), before=before, after=after, inputs=u)
         away = 1.0 / weights[: jump.before.size]
-        found = self._stands_out(jump, i) and self._depends_on_state(jump, i, away)
+        found = self._stands_out(jump, i, alone) and self._depends_on_state(jump, i, away)
         return jump if found else None
 
-    def _stands_out(self, jump: Jump, i: int) -> bool:
+    def _stands_out(self, jump: Jump, i: int, alone: np.ndarray) -> bool:
         """Whether component `i` jumps by more than it changes next to the jump."""
         # What changes by rounding does so everywhere, and what is smooth by more over a longer way.
+        # Two conditions that do not switch at the same number leave one with a value of its own.
         with np.errstate(all="ignore"):
             points = [jump.sides(wider) for wider in _BESIDE]
             below, above = (
@@ -190,7 +192,7 @@ class _Places(LaneEquations):
             )
         for k in range(_BESIDE.size - 3):
             low, high = below[k : k + 4], above[k : k + 4]
-            whole = abs(high[0] - low[0])
+            whole = np.abs([high[0] - low[0], *(alone - low[0])]).max()
             if max(np.ptp(low), np.ptp(high)) <= _FLAT * whole and whole > 0.0:
                 return True
         return False

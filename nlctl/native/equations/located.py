@@ -13,7 +13,7 @@ from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
-from ...expressions.graph import Expr, Graph, needed
+from ...expressions.graph import Expr, Graph, needed, parts_first
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .reader import Reader
 
 _MOST = 256  # switching functions of one diagram; more cost more than they are worth
+_MOST_FREQUENCIES = 64  # in a product: of more it is a train of pulses rather than a wave
 _BENDS = ("absolute", "minimum", "maximum")
 _STEEP = ("sqrt", "power", "cbrt", "hypot")  # a rate that has no derivative where it is 0
 
@@ -242,7 +243,7 @@ def _moving(
     waves: dict[tuple[Expr, ...], None] = {}
     pulses = []
     for term in terms:
-        frequencies = _frequencies(graph, term, timed, {})
+        frequencies = _frequencies(graph, term, timed)
         if frequencies is None:
             pulses.append(term)
         elif frequencies:
@@ -250,25 +251,32 @@ def _moving(
     return tuple(waves), tuple(pulses)
 
 
-def _frequencies(
-    graph: Graph, node: Expr, timed: set[Expr], known: dict[Expr, tuple[Expr, ...] | None]
-) -> tuple[Expr, ...] | None:
+def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...] | None:
     """Return the angular frequencies in a function of t; None if it has no highest one."""
     # Of pieces that are put together at conditions those of the pieces: where one switches, a step
     # ends anyway.
-    if node not in timed or node.op == "leaf" or node.kind == "b":
-        return ()
-    if node not in known:
-        known[node] = None
-        if node.op in ("sin", "cos"):
-            one = graph.const(1.0)
-            (slope,) = tangents(graph, node.args, lambda e: one if e.data[0] == "t" else None)
-            known[node] = None if slope is None or slope.varies else (slope,)
-        elif node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed):
-            parts = [_frequencies(graph, arg, timed, known) for arg in node.args]
-            if not any(part is None for part in parts):
-                known[node] = tuple(slope for part in parts for slope in part or ())
-    return known[node]
+    found: dict[Expr, tuple[Expr, ...] | None] = {}
+
+    def is_combined(node: Expr) -> bool:
+        is_product = node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed)
+        return is_product and node in timed and node.kind != "b"
+
+    for node in parts_first([term], is_combined):
+        parts = [found[arg] for arg in node.args] if is_combined(node) else []
+        several = tuple(slope for part in parts for slope in part or ())
+        found[node] = several if None not in parts and len(several) <= _MOST_FREQUENCIES else None
+        if node in timed and node.op != "leaf" and node.kind != "b" and not parts:
+            found[node] = _frequency(graph, node)
+    return found[term]
+
+
+def _frequency(graph: Graph, node: Expr) -> tuple[Expr, ...] | None:
+    """Return the angular frequency of a sine or cosine; None if it is not constant."""
+    if node.op not in ("sin", "cos"):
+        return None
+    one = graph.const(1.0)
+    (slope,) = tangents(graph, node.args, lambda e: one if e.data[0] == "t" else None)
+    return None if slope is None or slope.varies else (slope,)
 
 
 _PRODUCTS = (

@@ -84,7 +84,10 @@ def recurrences(
     # The first rows of an order are the states, then switching functions, then the right-hand
     # side.
     reader = _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows)
-    return reader.read(stores, packed)
+    try:
+        return reader.read(stores, packed)
+    except RecursionError:
+        raise NoSeriesError("its expressions are nested too deeply") from None
 
 
 _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coefficients of a node
