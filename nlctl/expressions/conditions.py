@@ -71,12 +71,20 @@ def _rooted(node: Expr) -> Expr | None:
     return square.args[0] if square is not node and is_square(square) else None
 
 
-def _is_quotient(node: Expr) -> bool:
+def _is_quotient(number: Expr) -> bool:
     """Return whether a number is (a - fmod(a, b)) / b or one less: an integer but for rounding."""
+    return all(_moved(node) or _is_divided(node) for node in parts_first([number], _moved))
+
+
+def _moved(node: Expr) -> tuple[Expr, ...]:
+    """Return of which numbers a number is one, or one less."""
     if node.op == "select":
-        return all(map(_is_quotient, node.args[1:]))
-    if node.op == "sub" and node.args[1].op == "const":
-        return _is_quotient(node.args[0])
+        return node.args[1:]
+    return node.args[:1] if node.op == "sub" and node.args[1].op == "const" else ()
+
+
+def _is_divided(node: Expr) -> bool:
+    """Return whether a number is (a - fmod(a, b)) / b."""
     difference = node.args[0] if node.op == "div" else node
     if difference.op != "sub" or difference.args[1].op != "fmod":
         return False
@@ -147,7 +155,7 @@ def _is_product(node: Expr) -> bool:
 def _factors(function: Expr) -> tuple[Expr, ...]:
     """Return what a product changes its sign with: between two roots close by it is hardly < 0."""
     factors: dict[Expr, tuple[Expr, ...]] = {}
-    for node in parts_first([function], _is_product):
+    for node in parts_first([function], lambda e: e.args if _is_product(e) else ()):
         factors[node] = (node,)
         if _is_product(node):
             several = [part for arg in node.args if arg.varies for part in factors[arg]]

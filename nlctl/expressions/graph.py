@@ -78,18 +78,18 @@ def numpy_function(op: str) -> Any:
 
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
-    return parts_first(exprs, lambda expr: expr not in known)
+    return parts_first(exprs, lambda expr: () if expr in known else expr.args)
 
 
-def parts_first(exprs: Iterable[Expr], divides: Callable[[Expr], bool]) -> tuple[Expr, ...]:
-    """Return expressions and the parts of those that it divides, parts first."""
+def parts_first(exprs: Iterable[Expr], parts: Callable[[Expr], Iterable[Expr]]) -> tuple[Expr, ...]:
+    """Return expressions, their `parts`, the parts of these and so on, parts first."""
     nodes: dict[Expr, None] = {}
     waiting = list(exprs)
     while waiting:
         expr = waiting.pop()
         if expr not in nodes:
             nodes[expr] = None
-            waiting.extend(expr.args if divides(expr) else ())
+            waiting.extend(parts(expr))
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 

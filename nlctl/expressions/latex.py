@@ -16,10 +16,15 @@ GREEK_LETTERS = frozenset(_GREEK.split())
 MARKS = {"hat": r"\hat", "bar": r"\bar", "tilde": r"\tilde", "dot": r"\dot", "ddot": r"\ddot"}
 _RELATIONS = {"lt": "<", "le": r"\le", "gt": ">", "ge": r"\ge", "eq": "=", "ne": r"\ne"}
 _WORDS = {"and": r"\text{ and }", "or": r"\text{ or }", "xor": r"\text{ xor }"}
-WORD, SUM, TERM, SIGNED, FACTOR, ATOM = range(6)  # how tightly a formula holds together
+# how tightly a formula holds together; what is open, as \sin x, would take what follows into it
+WORD, SUM, TERM, SIGNED, OPEN, FACTOR, ATOM = range(7)
+# of others by their brackets
+_TIGHTNESS = {"remainder": SUM, "exp": FACTOR, "exp2": FACTOR, "hypot": ATOM}
 LETTERS = "ijklm"
 Index = tuple[int, int, str]  # element start + step (letter - 1) of a vector, from 0
-ENCLOSED = r"(?:\{{\{{|\\left\(|\\left\||\\l[a-z]+ |, |\(1 \+ )\{{{}\}}"  # where {0} needs no ( )
+ENCLOSED = (
+    r"(?:\{{\{{|\\left\(|\\left\||\\l(?:floor|ceil) |, |\(1 \+ )\{{{}\}}"  # where {0} needs no ( )
+)
 
 
 def symbol(name: str) -> str:
@@ -185,11 +190,13 @@ class LatexWriter:
         numbers = [float(f.data) for f in factors if f.op == "const"]
         negative = (sum(flipped) + sum(value < 0 for value in numbers)) % 2
         texts = [number_text(abs(value)) for value in numbers if abs(value) != 1]
+        last = []
         for factor in dict.fromkeys(f for f in factors if f.op != "const"):
             count = factors.count(factor)
-            text = self._held(factor, index, depth, ATOM if count > 1 else FACTOR)
-            texts.append(f"{text}^{{{count}}}" if count > 1 else text)
-        return ("-" if negative else "") + _product(texts or ["1"]), TERM
+            text = self._held(factor, index, depth, ATOM if count > 1 else OPEN)
+            is_open = count == 1 and self._written(factor, index, depth)[1] == OPEN
+            (last if is_open else texts).append(f"{text}^{{{count}}}" if count > 1 else text)
+        return ("-" if negative else "") + _product([*texts, *last] or ["1"]), TERM
 
     def _factors(self, expr: Expr) -> Iterator[Expr]:
         for arg in expr.args:
@@ -220,7 +227,7 @@ class LatexWriter:
         return self._matrix(expr.args, expr.data[1], expr.data[0], depth), ATOM
 
     def _lu_det(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
-        return rf"\det {self._lu(expr.args[0], None, depth)[0]}", FACTOR
+        return rf"\det {self._lu(expr.args[0], None, depth)[0]}", OPEN
 
     def _lu_solve(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         assert index is not None
@@ -258,7 +265,8 @@ class LatexWriter:
             self._held(arg, index, depth, SUM if inside else ATOM)
             for arg, inside in zip(expr.args, enclosed, strict=True)
         ]
-        return row.latex.format(*parts), ATOM if all(enclosed) else FACTOR
+        text = row.latex.format(*parts).replace("1 + -", "1 - ")
+        return text, _TIGHTNESS.get(expr.op, ATOM if all(enclosed) else OPEN)
 
     def _other(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         if expr.op in _RELATIONS:

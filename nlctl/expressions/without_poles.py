@@ -33,7 +33,7 @@ class Fraction(NamedTuple):
 def as_fraction(graph: Graph, expr: Expr) -> Fraction:
     """Return sums, products and quotients as one fraction, whatever else as it is."""
     fractions: dict[Expr, Fraction] = {}
-    for node in parts_first([expr], _combines):
+    for node in parts_first([expr], lambda e: e.args if _combines(e) else ()):
         fraction = _of_parts(graph, node, fractions)
         fits = fraction.count <= _MOST
         fractions[node] = fraction if fits else Fraction(graph.number(node))

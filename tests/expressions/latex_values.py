@@ -14,6 +14,7 @@ FUNCTIONS = {
 NAMED = {"sgn": np.sign, "arsinh": np.arcsinh, "arcosh": np.arccosh, "artanh": np.arctanh,
          "trunc": np.trunc, "round": np.rint, "atan2": np.arctan2, "fmod": np.fmod,
          "erf": special.erf, "erfc": special.erfc}  # fmt: skip
+OPEN = (r"\operatorname", r"\log", *(rf"\{name} " for name in FUNCTIONS))
 RELATIONS = {"<": "__lt__", r"\le": "__le__", ">": "__gt__", r"\ge": "__ge__",
              "=": "__eq__", r"\ne": "__ne__"}  # fmt: skip
 
@@ -57,11 +58,22 @@ class Reader:
             if self.take(r"\cdot"):
                 value = value * self.power()
             elif self.take(r"\bmod"):
-                value = np.remainder(value, self.power())
+                value = np.remainder(value, self.product())
             elif self.begins():
                 value = value * self.power()
             else:
                 return value
+
+    def operand(self):
+        """What a function has that stands without brackets: all up to the next function."""
+        if self.text.startswith(r"\left("):
+            return self.atom()
+        value = self.power()
+        while True:
+            self.skip()
+            if not self.begins() or self.text.startswith(OPEN):
+                return value
+            value = value * self.power()
 
     def begins(self):
         closing = (r"\right", r"\end", r"\\", r"\le", r"\ge", r"\ne", r"\text", r"\quad")
@@ -91,7 +103,7 @@ class Reader:
             self.text = self.text[number.end() :]
             return float(number[0])
         if self.take(r"\frac"):
-            return self.braced() / self.braced()
+            return np.divide(self.braced(), self.braced())
         if self.take(r"\sqrt[3]"):
             return np.cbrt(self.braced())
         if self.take(r"\sqrt"):
@@ -118,26 +130,26 @@ class Reader:
         return self.function()
 
     def function(self):
-        for name, extreme in ((r"\min", min), (r"\max", max)):
+        for name, extreme in ((r"\min", np.minimum), (r"\max", np.maximum)):
             if self.take(name):
-                return extreme(self.arguments())
+                return extreme(*self.arguments())
         for base in ("2", "{10}"):
             if self.take(rf"\log_{base}"):
-                return np.log(self.atom()) / np.log(float(base.strip("{}")))
+                return np.log(self.operand()) / np.log(float(base.strip("{}")))
         found = re.match(r"\\operatorname\{(\w+)\}", self.text)
         if found:
-            self.text = self.text[found.end() :].lstrip()
+            self.text = self.text[found.end() :]
             if found[1] == "H":  # its index is the value at 0
                 self.need("_")
                 at_0 = self.braced()
                 return np.heaviside(self.atom(), at_0)
             two = found[1] in ("atan2", "fmod")
-            return NAMED[found[1]](*(self.arguments() if two else [self.atom()]))
+            return NAMED[found[1]](*(self.arguments() if two else [self.operand()]))
         found = re.match(r"\\([a-z]+)", self.text)
         assert found is not None, self.text
         assert found[1] in FUNCTIONS, self.text
         self.text = self.text[found.end() :]
-        return FUNCTIONS[found[1]](self.atom())
+        return FUNCTIONS[found[1]](self.operand())
 
     def arguments(self):
         self.need(r"\left(")
@@ -151,12 +163,23 @@ class Reader:
         chosen = None
         while not self.take(r"\end{cases}"):
             with np.errstate(all="ignore"):
-                value = self.total()
+                value = self.number_or_truth("&")
             self.need("&")
             holds = self.take(r"\text{otherwise}") or self.condition()
             chosen = value if chosen is None and holds else chosen
             self.take(r"\\")
         return chosen
+
+    def number_or_truth(self, end):
+        """A sum, or a condition, which ends where `end` follows."""
+        before = self.text
+        if not before.lstrip().startswith(r"\text{not }"):
+            value = self.total()
+            self.skip()
+            if self.text.startswith(end) and bool(self.text) == bool(end):
+                return value
+        self.text = before
+        return self.condition()
 
     def condition(self):
         value = self.comparison()
@@ -184,7 +207,7 @@ class Reader:
             except AssertionError:
                 pass
             self.text = rf"\left({before}"
-        low, holds = self.total(), True
+        low, holds = self.total(), None
         for _ in range(2):
             self.skip()
             sign = next((r for r in RELATIONS if self.text.startswith(r)), None)
@@ -192,15 +215,15 @@ class Reader:
                 break
             self.need(sign)
             high = self.total()
-            holds = holds and bool(getattr(np.float64(low), RELATIONS[sign])(high))
+            holds = holds is not False and bool(getattr(np.float64(low), RELATIONS[sign])(high))
             low = high
-        return holds
+        return bool(low) if holds is None else holds
 
 
 def value(text, symbols):
     """Return the value of a formula."""
     reader = Reader(text, symbols)
-    found = reader.total()
+    found = reader.number_or_truth("")
     reader.skip()
     assert not reader.text, f"left over: {reader.text!r} of {text!r}"
     return float(found)

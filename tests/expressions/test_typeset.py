@@ -8,6 +8,9 @@ import control as ct
 import numpy as np
 import pytest
 import user_functions
+from hypothesis import given
+from hypothesis import strategies as st
+from latex_values import value as value_of
 from latex_values import values
 from test_derivatives import quiet
 
@@ -16,7 +19,10 @@ from nlctl.analysis.catalogue import block_records
 from nlctl.analysis.report.document import Equation
 from nlctl.analysis.report.mathml import mathml
 from nlctl.errors import UsageError
-from nlctl.expressions.latex import number_text, symbol
+from nlctl.expressions.evaluate import evaluate_expressions
+from nlctl.expressions.functions import FUNCTIONS
+from nlctl.expressions.graph import Graph
+from nlctl.expressions.latex import LatexWriter, number_text, symbol
 from nlctl.native.typesetting import DERIVATIVE, changing
 
 
@@ -82,13 +88,43 @@ def test_numbers():
     assert {number: number_text(number) for number in table} == table
 
 
+SIGNS = {"add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1}
+OPERATIONS = [*SIGNS, *SIGNS, *SIGNS, *(op for op in FUNCTIONS if op != "copysign")]  # sgn 0 is 0
+
+
+def drawn_expression(graph, rng):
+    """An expression of up to five operations."""
+    nodes = [*(graph.leaf("x", i, None) for i in range(3)), graph.const(-0.5), graph.const(3.0)]
+    for op in rng.choice(OPERATIONS, rng.integers(1, 6)):
+        count = SIGNS[op] if op in SIGNS else FUNCTIONS[op].count
+        nodes.append(graph.op(str(op), *(nodes[k] for k in rng.integers(-4, 0, count))))
+    return nodes[-1]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_formula_is_read_as_what_is_computed(seed):
+    """By a reader for whom a function without brackets has all that follows it."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(0.2, 1.4, 3)
+    symbols = {f"x_{{{i + 1}}}": number for i, number in enumerate(x)}
+    writer = LatexWriter(leaf=lambda _, index: f"x_{{{index[0] + 1}}}")
+    for _ in range(50):
+        expr = drawn_expression(Graph(), rng)
+        text = writer.formula(expr)
+        with np.errstate(all="ignore"):
+            (computed,) = evaluate_expressions([expr], {"x": x[:, None]})
+            read = value_of(text, symbols)
+        number = float(np.squeeze(computed))
+        assert read == pytest.approx(number, rel=1e-9, abs=1e-9, nan_ok=True), text
+
+
 def scalars(system, t, x, u):
     """Return the values of the symbols of a block with few states, for `latex_values`."""
     known = {"t": t}
     known |= {symbol(name): v for name, v in zip(system.state_labels, x, strict=True)}
     known |= {symbol(name): v for name, v in zip(system.input_labels, u, strict=True)}
-    for name, given in system.params.items():
-        for place, v in np.ndenumerate(given) if np.asarray(given).dtype.kind in "fib" else ():
+    for name, array in system.params.items():
+        for place, v in np.ndenumerate(array) if np.asarray(array).dtype.kind in "fib" else ():
             index = ",".join(str(k + 1) for k in place)
             known[f"{symbol(name)}_{{{index}}}" if place else symbol(name)] = v
     return known

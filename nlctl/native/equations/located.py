@@ -261,7 +261,7 @@ def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...]
         is_product = node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed)
         return is_product and node in timed and node.kind != "b"
 
-    for node in parts_first([term], is_combined):
+    for node in parts_first([term], lambda node: node.args if is_combined(node) else ()):
         parts = [found[arg] for arg in node.args] if is_combined(node) else []
         several = tuple(slope for part in parts for slope in part or ())
         found[node] = several if None not in parts and len(several) <= _MOST_FREQUENCIES else None
