@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,8 @@ ORDERS = ("lt", "le", "gt", "ge")
 LINEAR = ("lu", "lu_solve")  # of whole matrices, see `linear_systems`
 OF_FACTORS = ("lu_det", "lu_regular")  # numbers that are read from factors
 SPECIAL = ("erf", "erfc")  # functions of `scipy.special` that are in the table of functions
+
+_T = TypeVar("_T")
 
 
 class Untraceable(Exception):  # noqa: N818 (it ends a trace; nobody else sees it)
@@ -91,6 +93,24 @@ def parts_first(exprs: Iterable[Expr], parts: Callable[[Expr], Iterable[Expr]]) 
             nodes[expr] = None
             waiting.extend(parts(expr))
     return tuple(sorted(nodes, key=lambda e: e.index))
+
+
+def filled(
+    known: dict[Expr, _T], node: Expr, parts: Callable[[Expr], Iterable[Expr]],
+    make: Callable[[Expr], _T],
+) -> _T:  # fmt: skip
+    """Return what is made of an expression, after what is made of its parts, however deep."""
+    waiting = [node]
+    while waiting:
+        last = waiting[-1]
+        before = None if last in known else next((p for p in parts(last) if p not in known), None)
+        if before is not None:
+            waiting.append(before)
+            continue
+        waiting.pop()
+        if last not in known:
+            known[last] = make(last)
+    return known[node]
 
 
 CATCHABLE = "is catchable"  # attribute of an error that a traced function may catch

@@ -147,9 +147,13 @@ def alternating(t, x, u, params):
     return [-x[0] + 1e-6 * y]
 
 
-def test_what_cannot_follow_a_long_chain_says_so():
-    """Taylor's method and formulas."""
-    with pytest.raises(errors.ParameterError, match="nested too deeply; use method='tsit5'"):
-        run(alternating, method="taylor")
+def test_taylors_method_follows_a_long_chain():
+    """Its coefficients are made parts first."""
+    native, reference = run(alternating, method="taylor")
+    assert native == pytest.approx(reference, abs=1e-7)
+
+
+def test_what_is_too_deep_for_a_formula_has_none():
+    """And says so."""
     with pytest.raises(errors.CompileError, match="'s' has no formula: its expressions are nested"):
         nlctl.typeset(loop(alternating))

@@ -28,7 +28,7 @@ from ...expressions.arrays import scalar
 from ...expressions.conditions import at_integers, switching_function
 from ...expressions.derivatives import linear, partials
 from ...expressions.functions import FUNCTIONS
-from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, needed
+from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, filled, needed
 from ...expressions.linear_systems import solution
 from ...expressions.stage import Stage
 from ...expressions.without_poles import as_fraction, multiplied
@@ -84,13 +84,18 @@ def recurrences(
     # The first rows of an order are the states, then switching functions, then the right-hand
     # side.
     reader = _Reader(graph=graph, n=sizes["x"], g=sizes["g"], overflows=overflows)
-    try:
-        return reader.read(stores, packed)
-    except RecursionError:
-        raise NoSeriesError("its expressions are nested too deeply") from None
+    return reader.read(stores, packed)
 
 
 _Key = tuple[str, Expr]  # "term": an expression at order k; "node": the coefficients of a node
+
+
+def _affine(node: Expr) -> tuple[Expr, ...]:
+    """Return the parts of what is affine in them."""
+    affine = node.op in ("add", "sub", "neg")
+    affine |= node.op == "mul" and not all(a.varies for a in node.args)
+    affine |= node.op == "div" and not node.args[1].varies
+    return node.args if affine and node.varies else ()
 
 
 @dataclass(kw_only=True)
@@ -185,29 +190,32 @@ class _Reader:
 
     def term(self, node: Expr) -> Expr | None:
         """Return an expression's coefficient of order k, None where it is 0."""
-        if node not in self.terms:
-            slope = self.slope(node)
-            if isinstance(slope, Expr):
-                self.terms[node] = self.graph.op("mul", slope, self.weight(IS_FIRST_ROW))
-            else:
-                self.terms[node] = None if slope is None else self._term(node)
-        return self.terms[node]
+        return filled(self.terms, node, self._behind, self._coefficient)
+
+    def _behind(self, node: Expr) -> tuple[Expr, ...]:
+        """Return the expressions whose terms make that of another."""
+        if self.slope(node) is not False or node.op in ("leaf", "call", "solve", *OF_FACTORS):
+            return ()
+        return node.args[1:] if node.op == "select" else node.args
+
+    def _coefficient(self, node: Expr) -> Expr | None:
+        slope = self.slope(node)
+        if isinstance(slope, Expr):
+            return self.graph.op("mul", slope, self.weight(IS_FIRST_ROW))
+        return None if slope is None else self._term(node)
 
     def slope(self, node: Expr) -> Expr | bool | None:
         """Return the slope of what is affine in time; False for what is not, or may not be."""
-        if node not in self.slopes:
-            self.slopes[node] = self._slope(node) if node.varies else None
-        return self.slopes[node]
+        return filled(self.slopes, node, _affine, self._slope)
 
     def _slope(self, node: Expr) -> Expr | bool | None:
+        if not node.varies:
+            return None
         if node.op == "leaf" and node.data[0] == "t":
             return self.graph.const(1.0)
         if node.op == "leaf" and node.data[0] == "u":
             return _moved(self.graph, node, "v", 0)
-        affine = node.op in ("add", "sub", "neg")
-        affine |= node.op == "mul" and not all(a.varies for a in node.args)
-        affine |= node.op == "div" and not node.args[1].varies
-        slopes = [self.slope(a) for a in node.args] if affine else [False]
+        slopes = [self.slope(a) for a in _affine(node)] or [False]
         if any(s is False for s in slopes):
             return False
         return self._linear(node, [s if isinstance(s, Expr) else None for s in slopes])
