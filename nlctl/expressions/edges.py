@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from .graph import Expr, Graph
-from .signs import POSITIVE, UNKNOWN
+from .signs import ANY_SIGN, POSITIVE
 
 _ROOTS = ("sqrt", "log", "log2", "log10")
 _ARCS = ("arcsin", "arccos", "arctanh")
@@ -39,7 +39,7 @@ def _ends(node: Expr) -> bool:
     if not node.varies:
         return False
     if node.op in _ROOTS or (node.op == "power" and not _is_whole(node.args[1])):
-        return node.args[0].sign == UNKNOWN
+        return node.args[0].sign == ANY_SIGN
     return node.op in (*_ARCS, *_BEHIND_ONE)
 
 

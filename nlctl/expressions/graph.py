@@ -95,7 +95,7 @@ def parts_first(exprs: Iterable[Expr], parts: Callable[[Expr], Iterable[Expr]]) 
     return tuple(sorted(nodes, key=lambda e: e.index))
 
 
-def filled(
+def deduce(
     known: dict[Expr, _T], node: Expr, parts: Callable[[Expr], Iterable[Expr]],
     make: Callable[[Expr], _T],
 ) -> _T:  # fmt: skip

@@ -78,6 +78,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["stepping", "operating_points", "frequency"],
     ],
     "nlctl.expressions": [
+        ["signs"],
         ["graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing", "edges"],

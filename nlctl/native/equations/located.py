@@ -255,19 +255,20 @@ def _frequencies(graph: Graph, term: Expr, timed: set[Expr]) -> tuple[Expr, ...]
     """Return the angular frequencies in a function of t; None if it has no highest one."""
     # Of pieces that are put together at conditions those of the pieces: where one switches, a step
     # ends anyway.
-    found: dict[Expr, tuple[Expr, ...] | None] = {}
+    frequencies: dict[Expr, tuple[Expr, ...] | None] = {}
 
     def is_combined(node: Expr) -> bool:
         is_product = node.op in _PRODUCTS or (node.op == "div" and node.args[1] not in timed)
         return is_product and node in timed and node.kind != "b"
 
     for node in parts_first([term], lambda node: node.args if is_combined(node) else ()):
-        parts = [found[arg] for arg in node.args] if is_combined(node) else []
+        parts = [frequencies[arg] for arg in node.args] if is_combined(node) else []
         several = tuple(slope for part in parts for slope in part or ())
-        found[node] = several if None not in parts and len(several) <= _MOST_FREQUENCIES else None
+        has_highest = None not in parts and len(several) <= _MOST_FREQUENCIES
+        frequencies[node] = several if has_highest else None
         if node in timed and node.op != "leaf" and node.kind != "b" and not parts:
-            found[node] = _frequency(graph, node)
-    return found[term]
+            frequencies[node] = _frequency(graph, node)
+    return frequencies[term]
 
 
 def _frequency(graph: Graph, node: Expr) -> tuple[Expr, ...] | None:

@@ -28,7 +28,7 @@ from ...expressions.arrays import scalar
 from ...expressions.conditions import at_integers, switching_function
 from ...expressions.derivatives import linear, partials
 from ...expressions.functions import FUNCTIONS
-from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, filled, needed
+from ...expressions.graph import COMPARISONS, LOGIC, OF_FACTORS, Expr, Graph, deduce, needed
 from ...expressions.linear_systems import solution
 from ...expressions.stage import Stage
 from ...expressions.without_poles import as_fraction, multiplied
@@ -190,7 +190,7 @@ class _Reader:
 
     def term(self, node: Expr) -> Expr | None:
         """Return an expression's coefficient of order k, None where it is 0."""
-        return filled(self.terms, node, self._behind, self._coefficient)
+        return deduce(self.terms, node, self._behind, self._coefficient)
 
     def _behind(self, node: Expr) -> tuple[Expr, ...]:
         """Return the expressions whose terms make that of another."""
@@ -206,7 +206,7 @@ class _Reader:
 
     def slope(self, node: Expr) -> Expr | bool | None:
         """Return the slope of what is affine in time; False for what is not, or may not be."""
-        return filled(self.slopes, node, _affine, self._slope)
+        return deduce(self.slopes, node, _affine, self._slope)
 
     def _slope(self, node: Expr) -> Expr | bool | None:
         if not node.varies:
