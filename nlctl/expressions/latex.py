@@ -16,8 +16,8 @@ GREEK_LETTERS = frozenset(_GREEK.split())
 MARKS = {"hat": r"\hat", "bar": r"\bar", "tilde": r"\tilde", "dot": r"\dot", "ddot": r"\ddot"}
 _RELATIONS = {"lt": "<", "le": r"\le", "gt": ">", "ge": r"\ge", "eq": "=", "ne": r"\ne"}
 _WORDS = {"and": r"\text{ and }", "or": r"\text{ or }", "xor": r"\text{ xor }"}
-# how tightly a formula holds together; what is open, as \sin x, would take what follows into it
-WORD, SUM, TERM, SIGNED, OPEN, FACTOR, ATOM = range(7)
+# how tightly a formula holds together; what is unclosed, as \sin x, would take what follows into it
+WORD, SUM, TERM, SIGNED, UNCLOSED, FACTOR, ATOM = range(7)
 # of others by their brackets
 _TIGHTNESS = {"remainder": SUM, "exp": FACTOR, "exp2": FACTOR, "hypot": ATOM}
 LETTERS = "ijklm"
@@ -193,9 +193,9 @@ class LatexWriter:
         last = []
         for factor in dict.fromkeys(f for f in factors if f.op != "const"):
             count = factors.count(factor)
-            text = self._held(factor, index, depth, ATOM if count > 1 else OPEN)
-            is_open = count == 1 and self._written(factor, index, depth)[1] == OPEN
-            (last if is_open else texts).append(f"{text}^{{{count}}}" if count > 1 else text)
+            text = self._held(factor, index, depth, ATOM if count > 1 else UNCLOSED)
+            is_unclosed = count == 1 and self._written(factor, index, depth)[1] == UNCLOSED
+            (last if is_unclosed else texts).append(f"{text}^{{{count}}}" if count > 1 else text)
         return ("-" if negative else "") + _product([*texts, *last] or ["1"]), TERM
 
     def _factors(self, expr: Expr) -> Iterator[Expr]:
@@ -227,7 +227,7 @@ class LatexWriter:
         return self._matrix(expr.args, expr.data[1], expr.data[0], depth), ATOM
 
     def _lu_det(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
-        return rf"\det {self._lu(expr.args[0], None, depth)[0]}", OPEN
+        return rf"\det {self._lu(expr.args[0], None, depth)[0]}", UNCLOSED
 
     def _lu_solve(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         assert index is not None
@@ -266,7 +266,7 @@ class LatexWriter:
             for arg, inside in zip(expr.args, enclosed, strict=True)
         ]
         text = row.latex.format(*parts).replace("1 + -", "1 - ")
-        return text, _TIGHTNESS.get(expr.op, ATOM if all(enclosed) else OPEN)
+        return text, _TIGHTNESS.get(expr.op, ATOM if all(enclosed) else UNCLOSED)
 
     def _other(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         if expr.op in _RELATIONS:
