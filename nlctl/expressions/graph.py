@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any, TypeVar
 
 import numpy as np
@@ -80,7 +81,8 @@ def numpy_function(op: str) -> Any:
 
 def needed(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
     """Return all that expressions are made of, parts first; nothing behind what is known."""
-    return parts_first(exprs, lambda expr: () if expr in known else expr.args)
+    parts = (lambda expr: () if expr in known else expr.args) if known else attrgetter("args")
+    return parts_first(exprs, parts)
 
 
 def parts_first(exprs: Iterable[Expr], parts: Callable[[Expr], Iterable[Expr]]) -> tuple[Expr, ...]:
@@ -92,7 +94,7 @@ def parts_first(exprs: Iterable[Expr], parts: Callable[[Expr], Iterable[Expr]]) 
         if expr not in nodes:
             nodes[expr] = None
             waiting.extend(parts(expr))
-    return tuple(sorted(nodes, key=lambda e: e.index))
+    return tuple(sorted(nodes, key=attrgetter("index")))
 
 
 def deduce(
