@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from itertools import repeat
 
 from .functions import FUNCTIONS
 from .graph import Expr, Untraceable, needed
@@ -215,13 +217,21 @@ class LatexWriter:
         rows, rest = [], expr
         while rest.op == "select" and (rest is expr or rest not in self.known):
             condition, yes, rest = rest.args
-            text = self._written(condition, index, depth)[0]
+            conditions = [condition]
             while yes.op == "select" and yes.args[2] is rest and yes not in self.known:
                 inner, yes, _ = yes.args
-                text = _both(text, self._written(inner, index, depth)[0])
+                conditions.append(inner)
+            text = self._all(conditions, index, depth)
             rows.append(f"{self._written(yes, index, depth)[0]} & {text}")
         rows.append(rf"{self._written(rest, index, depth)[0]} & \text{{otherwise}}")
         return _cases(rows), ATOM
+
+    def _all(self, conditions: Sequence[Expr], index: Index | None, depth: int) -> str:
+        """Return that several conditions hold at once."""
+        if len(conditions) == 1:
+            return self._written(conditions[0], index, depth)[0]
+        least = (WORD if condition.op == "and" else SUM for condition in conditions)
+        return reduce(_both, map(self._held, conditions, repeat(index), repeat(depth), least))
 
     def _lu(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         return self._matrix(expr.args, expr.data[1], expr.data[0], depth), ATOM

@@ -173,11 +173,13 @@ class Reader:
     def number_or_truth(self, end):
         """A sum, or a condition, which ends where `end` follows."""
         before = self.text
-        if not before.lstrip().startswith(r"\text{not }"):
+        try:
             value = self.total()
             self.skip()
             if self.text.startswith(end) and bool(self.text) == bool(end):
                 return value
+        except AssertionError:
+            pass
         self.text = before
         return self.condition()
 
@@ -202,7 +204,8 @@ class Reader:
                 value = self.condition()
                 self.need(r"\right)")
                 number = (*RELATIONS, r"\bmod", "+", "-", "^")  # is made of what is in brackets
-                if not self.text.lstrip().startswith(number) and value in (True, False):
+                self.skip()
+                if not self.text.startswith(number) and not self.begins():
                     return value
             except AssertionError:
                 pass

@@ -105,17 +105,39 @@ def drawn_expression(graph, rng):
 def test_a_formula_is_read_as_what_is_computed(seed):
     """By a reader for whom a function without brackets has all that follows it."""
     rng = np.random.default_rng(seed)
-    x = rng.uniform(0.2, 1.4, 3)
+    x = rng.integers(1, 90, 3) / 64  # sums of these are exact, in whatever order they are read
     symbols = {f"x_{{{i + 1}}}": number for i, number in enumerate(x)}
     writer = LatexWriter(leaf=lambda _, index: f"x_{{{index[0] + 1}}}")
-    for _ in range(50):
-        expr = drawn_expression(Graph(), rng)
+    for draw in [drawn_expression, drawn_choice] * 25:
+        expr = draw(Graph(), rng)
         text = writer.formula(expr)
         with np.errstate(all="ignore"):
             (computed,) = evaluate_expressions([expr], {"x": x[:, None]})
             read = value_of(text, symbols)
         number = float(np.squeeze(computed))
         assert read == pytest.approx(number, rel=1e-9, abs=1e-9, nan_ok=True), text
+
+
+RELATIONS, WORDS = ["lt", "le", "gt", "ge", "eq", "ne"], ["and", "or", "xor", "not"]
+
+
+def drawn_choice(graph, rng):
+    """A choice, made of up to eight choices, conditions, and sums and products of them."""
+    numbers = [*(graph.leaf("x", i, None) for i in range(3)), graph.const(-0.5), graph.const(0.75)]
+    conditions = [graph.op("lt", numbers[0], numbers[1])]
+    for kind in rng.choice(4, rng.integers(2, 9)):
+        pair = [numbers[k] for k in rng.integers(-4, 0, 2)]
+        two = [conditions[k] for k in rng.integers(-min(3, len(conditions)), 0, 2)]
+        if kind == 0:
+            conditions.append(graph.op(str(rng.choice(RELATIONS)), *pair))
+        elif kind == 1:
+            word = str(rng.choice(WORDS))
+            conditions.append(graph.op(word, *two[: 1 if word == "not" else 2]))
+        elif kind == 2:
+            numbers.append(graph.op(str(rng.choice(["add", "mul"])), *pair))
+        else:
+            numbers.append(graph.op("select", two[0], *pair))
+    return graph.op("select", conditions[-1], numbers[-1], numbers[-2])
 
 
 def scalars(system, t, x, u):
