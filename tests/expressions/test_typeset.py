@@ -89,7 +89,9 @@ def test_numbers():
 
 
 SIGNS = {"add": 2, "sub": 2, "mul": 2, "div": 2, "neg": 1}
-OPERATIONS = [*SIGNS, *SIGNS, *SIGNS, *(op for op in FUNCTIONS if op != "copysign")]  # sgn 0 is 0
+# on paper sgn 0 is 0, and e^x has no largest value
+OPERATIONS = [*SIGNS, *SIGNS, *SIGNS, *(FUNCTIONS.keys() - {"copysign", "logaddexp"})]
+OPERATIONS.sort()
 
 
 def drawn_expression(graph, rng):
