@@ -114,10 +114,11 @@ def test_a_formula_is_read_as_what_is_computed(seed):
         expr = draw(Graph(), rng)
         text = writer.formula(expr)
         with np.errstate(all="ignore"):
-            (computed,) = evaluate_expressions([expr], {"x": x[:, None]})
+            (computed,) = evaluate_expressions([expr], {"x": np.outer(x, [1.0, 1.0 + 1e-14])})
             read = value_of(text, symbols)
-        number = float(np.squeeze(computed))
-        assert read == pytest.approx(number, rel=1e-9, abs=1e-9, nan_ok=True), text
+        number, moved = np.broadcast_to(computed, 2)
+        hangs_on_rounding = not np.isclose(number, moved, rtol=1e-10, equal_nan=True)
+        assert hangs_on_rounding or read == pytest.approx(number, 1e-9, 1e-9, nan_ok=True), text
 
 
 RELATIONS, WORDS = ["lt", "le", "gt", "ge", "eq", "ne"], ["and", "or", "xor", "not"]
