@@ -160,7 +160,7 @@ class LatexWriter:
             text = self._written(piece, (first - at, by, letter), depth)[0]
             rows.append(rf"{text} & {_range_text(at, length, index)}")
             at += length
-        return _cases(rows), ATOM
+        return _cases(rows), UNCLOSED
 
     def _sum(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         letter = LETTERS[depth + 1] if depth + 1 < len(LETTERS) else f"i_{depth}"
@@ -180,7 +180,8 @@ class LatexWriter:
             yield f"{flip[its_sign] if negative else its_sign} {text[1:] if negative else text}"
 
     def _add(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
-        text = " ".join(self._terms(expr, "+", index, depth))
+        *before, last = self._terms(expr, "+", index, depth)
+        text = " ".join([*(f"{term[:2]}{_closed(term[2:])}" for term in before), last])
         return (text[2:] if text.startswith("+ ") else f"-{text[2:]}"), SUM
 
     _sub = _neg = _add
@@ -198,7 +199,9 @@ class LatexWriter:
             text = self._held(factor, index, depth, ATOM if count > 1 else UNCLOSED)
             is_unclosed = count == 1 and self._written(factor, index, depth)[1] == UNCLOSED
             (last if is_unclosed else texts).append(f"{text}^{{{count}}}" if count > 1 else text)
-        return ("-" if negative else "") + _product([*texts, *last] or ["1"]), TERM
+        return ("-" if negative else "") + _product(
+            [*texts, *map(_closed, last[:-1]), *last[-1:]] or ["1"]
+        ), TERM
 
     def _factors(self, expr: Expr) -> Iterator[Expr]:
         for arg in expr.args:
@@ -224,7 +227,7 @@ class LatexWriter:
             text = self._all(conditions, index, depth)
             rows.append(f"{self._written(yes, index, depth)[0]} & {text}")
         rows.append(rf"{self._written(rest, index, depth)[0]} & \text{{otherwise}}")
-        return _cases(rows), ATOM
+        return _cases(rows), UNCLOSED
 
     def _all(self, conditions: Sequence[Expr], index: Index | None, depth: int) -> str:
         """Return that several conditions hold at once."""
@@ -281,12 +284,12 @@ class LatexWriter:
     def _other(self, expr: Expr, index: Index | None, depth: int) -> tuple[str, int]:
         if expr.op in _RELATIONS:
             left, right = (self._held(arg, index, depth, SUM) for arg in expr.args)
-            return f"{left} {_RELATIONS[expr.op]} {right}", SUM
+            return f"{_closed(left)} {_RELATIONS[expr.op]} {_closed(right)}", SUM
         if expr.op in _WORDS:
             least = [WORD if arg.op == expr.op != "xor" else SUM for arg in expr.args]
             pairs = zip(expr.args, least, strict=True)
             left, right = (self._held(arg, index, depth, least_bound) for arg, least_bound in pairs)
-            return f"{left}{_WORDS[expr.op]}{right}", WORD
+            return f"{_closed(left)}{_WORDS[expr.op]}{_closed(right)}", WORD
         raise Untraceable(f"{expr.op} of {expr.data} has no formula")
 
 
@@ -298,6 +301,11 @@ def _product(texts: list[str]) -> str:
         word = text.startswith(r"\mathrm") or joined.rpartition(" ")[2].startswith(r"\mathrm")
         joined += rf" \cdot {text}" if dot else rf" \, {text}" if word else f" {text}"
     return joined
+
+
+def _closed(text: str) -> str:
+    """Return what something may follow: in brackets if it ends with a list of cases."""
+    return rf"\left({text}\right)" if text.endswith(r"\end{cases}") else text
 
 
 def _is_guard(choice: Expr) -> bool:

@@ -168,6 +168,9 @@ class Reader:
             holds = self.take(r"\text{otherwise}") or self.condition()
             chosen = value if chosen is None and holds else chosen
             self.take(r"\\")
+        self.skip()
+        ends = (r"\right", r"\end", r"\\", "}", "&", ",")
+        assert not self.text or self.text.startswith(ends), "nothing may follow a list of cases"
         return chosen
 
     def number_or_truth(self, end):
