@@ -12,6 +12,7 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed
+from .sharp import as_power
 from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -19,6 +20,7 @@ _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
 _OF_SECONDS = ("copysign",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
 _ROOTS = ("sqrt", "hypot")
+_STEEP = 3  # exponents from which on a power is too flat around 0 to be followed there
 _INVERSE = {"exp": math.log, "log": math.exp, "tanh": math.atanh}
 _OF_QUOTIENTS = ("remainder", "fmod")
 # functions that jump
@@ -167,8 +169,9 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     is_zero = a.op == "const" and a.data == 0.0
     first, second = as_fraction(graph, a), as_fraction(graph, b)
     if not (first.is_whole and second.is_whole):
-        if is_zero:
-            return multiplied(graph, second.dividend, second.poles)
+        for one, other in ((first, b), (second, a)):
+            if other.op == "const" and other.data == 0.0:
+                return multiplied(graph, one.dividend, one.poles)
         return compared(graph, first, second)
     if is_zero:
         return b
@@ -178,11 +181,24 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
         if inverse is not None:
             pair = [graph.number(rising.args[0]), graph.const(inverse)]
             return graph.op("sub", *pair[::step])
+    for power, level, step in ((a, b, 1), (b, a, -1)):
+        base, exponent = as_power(power)
+        if exponent >= _STEEP and level.op == "const" and (level.data > 0.0 or exponent % 2):
+            pair = _rooted_power(graph, graph.number(base), exponent, float(level.data))
+            return graph.op("sub", *pair[::step])
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
             return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
+
+
+def _rooted_power(graph: Graph, base: Expr, exponent: int, level: float) -> tuple[Expr, Expr]:
+    """Return what is as far apart as a power and a constant, without being flat around 0."""
+    root = math.copysign(abs(level) ** (1.0 / exponent), level)
+    if exponent % 2:
+        return base, graph.const(root)
+    return graph.op("mul", base, base), graph.const(root * root)
 
 
 def _inverse(op: str, level: Expr) -> float | None:

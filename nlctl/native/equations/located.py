@@ -14,6 +14,7 @@ from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed
+from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
@@ -59,11 +60,18 @@ class Conditions:
     waves: tuple[tuple[Expr, ...], ...] = ()
     pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
     beyond: int = 0  # conditions that are too many to be located
+    # by what functions are measured that are flat but for a narrow range of their argument
+    sharp: tuple[SharpArgument, ...] = ()
 
     @property
     def rows(self) -> int:
         """Numbers that the switching functions are."""
         return sum(condition.rows for condition in self.located)
+
+    @property
+    def kinds(self) -> list[int]:
+        """How each of the numbers is by which sharp functions are measured."""
+        return [each.kind for each in self.sharp for _ in range(each.expr.size or 1)]
 
     @property
     def count(self) -> int:
@@ -134,8 +142,28 @@ def found_conditions(
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond
-    )
+        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
+        sharp=_sharp(reader, rates, inside - timed),
+    )  # fmt: skip
+
+
+def _sharp(reader: Reader, rates: Sequence[Tracer], moving: set[Expr]) -> tuple[SharpArgument, ...]:
+    """Return by what sharp functions of the users' blocks are measured."""
+    # Those of nlctl's own blocks are as smooth as their parameters have them.
+    nodes: dict[Expr, None] = {}
+    for i, node in enumerate(reader.blocks):
+        if node.sampled or _is_of_nlctl(node):
+            continue
+        given = set(_pieces([reader.wired(node.inputs)]))
+        parts = needed(_pieces([reader.signals[i], rates[i]]), given)
+        nodes |= dict.fromkeys(part for part in parts if part in moving)
+    arguments, rows = [], 0
+    for argument in sharp_arguments(reader.graph, nodes):
+        called = any(part.op == "call" for part in needed([argument.expr]))
+        rows += 0 if called else argument.expr.size or 1
+        if not called and rows <= _MOST:
+            arguments.append(argument)
+    return tuple(arguments)
 
 
 def _with_sides(graph: Graph, condition: Expr) -> list[tuple[Expr, int]]:
@@ -191,10 +219,14 @@ def _places(leaf: Expr) -> range:
 
 def _declares(node: Node) -> bool:
     """Whether a block is one of nlctl's that say where they switch: their tests hold that."""
-    system = node.system
-    if not isinstance(system, Block) or not type(system.spec).__module__.startswith("nlctl."):
+    if not _is_of_nlctl(node):
         return False
-    return bool(count_switching_functions(node) or memory_states(system.spec))
+    return bool(count_switching_functions(node) or memory_states(node.system.spec))
+
+
+def _is_of_nlctl(node: Node) -> bool:
+    system = node.system
+    return isinstance(system, Block) and type(system.spec).__module__.startswith("nlctl.")
 
 
 def _key(function: Expr) -> object:

@@ -29,6 +29,7 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
+from .events.sharp import look_at_sharp
 from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
@@ -268,6 +269,8 @@ def advance(rhs, point, along, task, w, rounds):
             look_at_kinks(rhs, task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
+        if task.sharp.kinds.size and task.fixed == 0.0:
+            look_at_sharp(task, lanes, w, found)
         if rows.memory.size:
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
