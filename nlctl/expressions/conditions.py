@@ -166,14 +166,17 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
     # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
     # a step could pass through a small circle unseen.
-    is_zero = a.op == "const" and a.data == 0.0
     first, second = as_fraction(graph, a), as_fraction(graph, b)
     if not (first.is_whole and second.is_whole):
         for one, other in ((first, b), (second, a)):
-            if other.op == "const" and other.data == 0.0:
+            if _is_zero(other):
                 return multiplied(graph, one.dividend, one.poles)
         return compared(graph, first, second)
-    if is_zero:
+    for one, other in ((a, b), (b, a)):
+        if _is_zero(other) and one.op == "sub":  # what that says is compared
+            a, b = map(graph.number, one.args)
+            break
+    if _is_zero(a):
         return b
     for rising, level, step in ((a, b, 1), (b, a, -1)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
@@ -191,6 +194,10 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
             return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
+
+
+def _is_zero(expr: Expr) -> bool:
+    return expr.op == "const" and expr.data == 0.0
 
 
 def _rooted_power(graph: Graph, base: Expr, exponent: int, level: float) -> tuple[Expr, Expr]:

@@ -30,6 +30,7 @@ _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
 _FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
 _ROUNDED = 1.0 + 1e-9
+_SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -196,8 +197,13 @@ class Driver:
         longest = self._longest_step(float(solver.t_old), stop)
         length = float(solver.t - solver.t_old)
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
+        may_grow &= solver.t_old != self._narrow  # a longer step from there has been refused
         if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
             return longest
+        part = self.jumps.followed(solver.t_old + STEP_PLACES * length, state)
+        if part < 1.0 and part * length > _SHORTEST * self._span:
+            self._narrow = float(solver.t_old)
+            return part * length
         return self._span / _PLACES if self._slept(solver, state) else 0.0
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
@@ -343,7 +349,7 @@ class Driver:
         if self.progress is not None:
             self.progress(self.reached)
 
-    _repeated, _longest, _ended, _failed = 0, 0.0, False, np.nan
+    _repeated, _longest, _ended, _failed, _narrow = 0, 0.0, False, np.nan, np.nan
     _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:

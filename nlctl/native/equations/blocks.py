@@ -130,7 +130,8 @@ def _conditions(
     kept = [array for _, array in events.committed.values()]
     others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
     given = [watch.function for watch in events.watched if not watches_nan(watch.what)]
-    return found_conditions(reader, rates, signs, falls, others, given)
+    shown = [e for e, _ in y[: system.noutputs or 0].pieces()]
+    return found_conditions(reader, rates, signs, falls, others, given, shown)
 
 
 def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:

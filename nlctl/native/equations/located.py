@@ -60,6 +60,7 @@ class Conditions:
     waves: tuple[tuple[Expr, ...], ...] = ()
     pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
     beyond: int = 0  # conditions that are too many to be located
+    shown: int = 0  # conditions that move an output of the diagram alone: none of these is located
     # by what functions are measured that are flat but for a narrow range of their argument
     sharp: tuple[SharpArgument, ...] = ()
 
@@ -98,10 +99,12 @@ def found_conditions(
     guards: Mapping[int, Tracer],
     others: Iterable[Expr],
     watched: Iterable[Expr] = (),
+    shown: Iterable[Expr] = (),
 ) -> Conditions:
     """Return what switches in a diagram whose blocks have been read."""
     # Where it moves rates, declared switching functions, guards, by their blocks' places, what
-    # arrives at delays and memories become (`others`), or an event function (`watched`).
+    # arrives at delays and memories become (`others`), or an event function (`watched`). What
+    # moves nothing but an output (`shown`) is counted.
     declared, others, watched = tuple(declared), tuple(others), tuple(watched)
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
@@ -111,7 +114,8 @@ def found_conditions(
     known = {_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
-    rows = beyond = 0
+    rows = beyond = count = 0
+    only_shown = set(needed(list(shown))) - inside
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
     # values of parameters: 1 for those that are not known
@@ -120,6 +124,7 @@ def found_conditions(
         if condition in timed and condition in inside:
             of_time[condition] = None
         if condition in timed or condition not in inside:
+            count += condition in only_shown
             continue
         path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
@@ -143,7 +148,7 @@ def found_conditions(
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
-        sharp=_sharp(reader, rates, inside - timed),
+        shown=count, sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
-from .events.sharp import look_at_sharp
+from .events.sharp import forget, look_at_sharp
 from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
@@ -232,6 +232,7 @@ def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
     again |= _happens(task, lanes, w, passed, sampled)
     if again:
         restart(rhs, task, lanes, w, passed)
+        forget(lanes, w, passed)
     if task.rows.guarded < task.rows.switching:
         for j in range(lanes.size):
             done[j] |= passed[j]

@@ -18,7 +18,7 @@ from ....expressions.sharp import AREA, ITSELF, RANGE
 from ...machine.address import call_out
 from ..control import shorten
 from ..evaluate import inputs_at, on_this_side
-from ..memory import Places1, Places2, Reals1, Reals3
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3
 from ..methods.dense import solution_at
 from ..methods.quartic import least_value, polynomial_at, quartic
 from ..state import INNER, opposite
@@ -29,6 +29,9 @@ _AIM = 0.8  # of that: what a shorter step is to lead through
 _WRONG = 4.0  # what a polynomial may be wrong by where it may lead into the range
 _FAR = 3.0  # times that: it does not lead there
 _SHORTER = 0.3  # part of a step to be tried where it is not followed
+_CALM = 2.0  # what an argument moves by in a step that is not looked into
+_WITHIN = 2.0  # times what it moves by from end to end: it gets no farther in between
+_ROUNDING = 1e-9  # of a step
 _LEAST = 0.005  # part of a step to be tried at least
 _DENSE = 2  # the row of task.pair.inside that is no method's stages
 _CHECKED = (0.11, 0.61)  # parts of a step at which a polynomial is checked
@@ -50,24 +53,74 @@ class SharpArrays(NamedTuple):
 
     at: Reals3  # (parts, rows, lanes)
     part: Reals1  # of the step: where it is looked next, or how long one to try is to be
+    last: Reals2  # at the end of the step before: (rows, lanes)
+    pace: Reals2  # and how fast that has moved (1/s)
+    until: Reals1  # the time at which it has ended (s)
     table: Places2
 
 
 @numba.njit(**INNER)
 def look_at_sharp(task, lanes, w, found):
     """Have shorter steps tried where an accepted one has led through a sharp function."""
-    nodes, part, wanted = task.pair.inside[_DENSE], w.sharp.part, w.inside.wanted
+    sharp, wanted = w.sharp, w.inside.wanted
     shortest, any_wanted = _SHORTEST * (task.times[-1] - task.times[0]), False
     for j in range(lanes.size):
-        wanted[j] = found[j] > AGAIN and not lanes[j].across and lanes[j].step > shortest
+        lane = lanes[j]
+        wanted[j] = found[j] > AGAIN and not lane.across and lane.step > shortest
         any_wanted |= wanted[j] != 0
+        w.t[j] = lane.t + lane.step
     if not any_wanted:
         return
-    for n in range(5):
+    _measured(task, lanes, w, w.x_new, 4)
+    any_wanted = False
+    for j in range(lanes.size):
+        wanted[j] = wanted[j] and not _is_calm(task, lanes[j], w, j)
+        any_wanted |= wanted[j] != 0
+    if any_wanted:
+        _look_within(task, lanes, w, found)
+    for j in range(lanes.size):
+        if found[j] > AGAIN:
+            sharp.until[j] = lanes[j].t + lanes[j].step
+            for i in range(task.sharp.kinds.size):
+                moved = abs(sharp.at[4, i, j] - sharp.last[i, j])
+                sharp.pace[i, j], sharp.last[i, j] = moved / lanes[j].step, sharp.at[4, i, j]
+
+
+@numba.njit(**INNER)
+def _is_calm(task, lane, w, j):
+    """Whether arguments hardly move: from end to end, nor at the pace of the step before."""
+    # What is behind a jump, or a step that was not looked at, has no such pace.
+    sharp, calm = w.sharp, abs(w.sharp.until[j] - lane.t) <= _ROUNDING * lane.step
+    for i in range(task.sharp.kinds.size):
+        kind, before, end = task.sharp.kinds[i], sharp.last[i, j], sharp.at[4, i, j]
+        moved = abs(end - before)
+        most = max(moved, sharp.pace[i, j] * lane.step)
+        if kind == ITSELF:
+            is_far = max(before, end) + _WITHIN * most < -RANGE
+            is_far |= min(before, end) - _WITHIN * most > RANGE
+            calm &= most <= _CALM or is_far
+        else:
+            nearest = min(abs(end), abs(before)) + (1.0 if kind == AREA else 0.0)
+            calm &= max(kind, 1) * most <= _CALM * nearest
+    return calm
+
+
+@numba.njit(**INNER)
+def forget(lanes, w, jumped):
+    """Take nothing that arguments were before for what they are behind a jump."""
+    for j in range(lanes.size):
+        if jumped[j]:
+            w.sharp.until[j] = np.nan
+
+
+@numba.njit(**INNER)
+def _look_within(task, lanes, w, found):
+    """Look at arguments within steps, and have shorter ones tried where they lead too far."""
+    nodes, part, wanted = task.pair.inside[_DENSE], w.sharp.part, w.inside.wanted
+    for n in range(4):
         for j in range(lanes.size):
-            place = 0.0 if n == 0 else 1.0 if n == 4 else nodes[n - 1]
-            part[j] = place if wanted[j] else 0.0
-        _measured(task, lanes, w, n)
+            part[j] = nodes[n - 1] if wanted[j] and n > 0 else 0.0
+        _inside(task, lanes, w, n)
     any_wanted = False
     for j in range(lanes.size):
         wanted[j] = wanted[j] and _any_moves(task, w, j)
@@ -77,7 +130,7 @@ def look_at_sharp(task, lanes, w, found):
     for n in range(2):
         for j in range(lanes.size):
             part[j] = _CHECKED[n] if wanted[j] else 0.0
-        _measured(task, lanes, w, 5 + n)
+        _inside(task, lanes, w, 5 + n)
     for j in range(lanes.size):
         if wanted[j]:
             part[j] = 1.0
@@ -89,16 +142,22 @@ def look_at_sharp(task, lanes, w, found):
 
 
 @numba.njit(**INNER)
-def _measured(task, lanes, w, n):
+def _inside(task, lanes, w, n):
     """Fill row `n` of ``w.sharp.at`` at the parts of steps."""
     for j in range(lanes.size):
         w.t[j] = lanes[j].t + w.sharp.part[j] * lanes[j].step
         solution_at(w.sharp.part[j], task, lanes[j], w, j, w.ahead.x)
+    _measured(task, lanes, w, w.ahead.x, n)
+
+
+@numba.njit(**INNER)
+def _measured(task, lanes, w, x, n):
+    """Fill row `n` of ``w.sharp.at`` at the times w.t."""
     if task.timed.jumps.shape[1]:
         on_this_side(lanes, w)
     if w.u.shape[0]:
         inputs_at(task, lanes, w)
-    call_out(task.sharp.functions[0], w.t, w.ahead.x, w.u, task.p, w.sharp.at[n])
+    call_out(task.sharp.functions[0], w.t, x, w.u, task.p, w.sharp.at[n])
 
 
 @numba.njit(**INNER)
