@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
-from scipy.integrate import RK45
+from scipy.integrate import RK45, OdeSolver
 
 from ..errors import DivergedError
 from ..sampling.system import happening
@@ -145,6 +145,8 @@ class Driver:
             if allowed:
                 bound = allowed
                 short = {**self._bounded(t, stop), "max_step": bound}
+                if solver.t_old == self._narrow and isinstance(solver, OdeSolver):
+                    short["first_step"] = min(bound, stop - solver.t_old)  # that is long enough
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
