@@ -220,9 +220,8 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
     spare = workspace(
         compiled.cache, x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"],
         len(read.outputs), code.lowered.rows["s"], len(program.guards), len(read.lines),
-        SLOPES if terms else settings.pair.stages, terms or (1, 0),
+        SLOPES if terms else settings.pair.stages, terms or (1, 0), len(code.lowered.sharp),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
-        len(code.lowered.sharp),
     )  # fmt: skip
     spare.work.lanes["stiff"] = method == "rodas5p"
     return Run(machine=code, task=task, work=with_past(compiled, task, spare.work, p), spare=spare)

@@ -126,30 +126,43 @@ def found_conditions(
         if condition in timed or condition not in inside:
             count += condition in only_shown
             continue
-        path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
-        functions = _with_sides(reader.graph, condition)
-        for function, side in functions:
-            key, size = _key(function), function.size or 1
-            if key in located:
-                located[key] = replace(located[key], bends=bends and located[key].bends)
-                continue
-            if key in known or not function.varies or _remembers(function, node):
-                continue
-            size *= side >= 0  # of two functions of integers one counts
-            if rows + size > _MOST:
-                beyond += size
-            elif size or _key(functions[0][0]) in located:
-                located[key] = Located(
-                    function=function, block=path, what=condition.op, bends=bends, integers=side
-                )
-                rows += size
+        path, functions = "" if node is None else node.path, _with_sides(reader.graph, condition)
+        one = Located(function=condition, block=path, what=condition.op, bends=bends)
+        rows, left = _entered(located, known, functions, one, node, rows)
+        beyond += left
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
         located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
         shown=count, sharp=_sharp(reader, rates, inside - timed),
     )  # fmt: skip
+
+
+def _entered(
+    located: dict[object, Located],
+    known: set[object],
+    functions: Sequence[tuple[Expr, int]],
+    condition: Located,
+    node: Node | None,
+    rows: int,
+) -> tuple[int, int]:
+    """Enter a condition by its switching functions; return all rows, and how many are too many."""
+    beyond = 0
+    for function, side in functions:
+        key, size = _key(function), function.size or 1
+        if key in located:
+            located[key] = replace(located[key], bends=condition.bends and located[key].bends)
+            continue
+        if key in known or not function.varies or _remembers(function, node):
+            continue
+        size *= side >= 0  # of two functions of integers one counts
+        if rows + size > _MOST:
+            beyond += size
+        elif size or _key(functions[0][0]) in located:
+            located[key] = replace(condition, function=function, integers=side)
+            rows += size
+    return rows, beyond
 
 
 def _sharp(reader: Reader, rates: Sequence[Tracer], moving: set[Expr]) -> tuple[SharpArgument, ...]:

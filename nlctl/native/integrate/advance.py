@@ -270,15 +270,13 @@ def advance(rhs, point, along, task, w, rounds):
             look_at_kinks(rhs, task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
-        if task.sharp.kinds.size and task.fixed == 0.0:
-            look_at_sharp(task, lanes, w, found)
+        look_at_sharp(task, lanes, w, found)
         if rows.memory.size:
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        if rows.ways.size:
-            _see(task, lanes, w)
+        _see(task, lanes, w)
         _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
         if rows.ways.size:
             _note_jumps(task, lanes, w, done)

@@ -100,8 +100,8 @@ def new_work(
     lines: int = 0,
     stages: int = 3,
     terms: tuple[int, int] = (1, 0),
-    log: int = 0,
     sharp: int = 0,
+    log: int = 0,
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on."""
     # The inputs include the lines, and so do the outputs what arrives there. `terms` are the

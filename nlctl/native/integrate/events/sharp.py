@@ -62,6 +62,8 @@ class SharpArrays(NamedTuple):
 @numba.njit(**INNER)
 def look_at_sharp(task, lanes, w, found):
     """Have shorter steps tried where an accepted one has led through a sharp function."""
+    if task.sharp.kinds.size == 0 or task.fixed > 0.0:
+        return
     sharp, wanted = w.sharp, w.inside.wanted
     shortest, any_wanted = _SHORTEST * (task.times[-1] - task.times[0]), False
     for j in range(lanes.size):
