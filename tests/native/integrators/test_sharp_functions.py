@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 import nlctl
+from nlctl.expressions.conditions import switching_function
 from nlctl.expressions.graph import Graph
 from nlctl.expressions.sharp import AREA, ITSELF, SharpArgument, as_power, sharp_arguments
 
@@ -131,3 +132,42 @@ def test_powers_that_are_products(exponent):
         power = graph.op("mul", power, x)
     assert as_power(power) == (x, exponent)
     assert as_power(graph.op("power", x, graph.const(-2.5)))[1] == 1
+
+
+@pytest.mark.parametrize("method", ["tsit5", "rodas5p", "taylor"])
+@pytest.mark.parametrize("start", [0.0, 1.0])
+def test_both_sides_are_equal_at_the_last_instant(method, start):
+    """tanh(60 (x - 1)) and 0.3 x - 0.5 cross at 0.9966, and both are 1 where x = 5."""
+
+    def above(x):
+        return np.tanh(60 * (x - 1)) - (0.3 * x - 0.5)
+
+    compared = flowing(lambda z: 1.0 if np.tanh(60 * (z - 1)) > 0.3 * z - 0.5 else 0.0)
+    run = nlctl.input_output_response(compared, [0, 5 - start], 0, [start, 0.0], method=method)
+    known = 4.0 if start else 5.0 - brentq(above, 0.9, 1.1)
+    assert run.states[1, -1] == pytest.approx(known, abs=1e-6)
+
+
+def test_waves_of_a_condition_in_the_reference():
+    """sin(40 z) is above 0.99 for 2 acos(0.99) / 40 in each of 12 waves, all within one step."""
+    compared = flowing(lambda z: 1.0 if np.sin(40 * z) > 0.99 else 0.0)
+    run = nlctl.input_output_response(
+        compared, [0, 24 * np.pi / 40], 0, [0.0, 0.0], engine="python-control"
+    )
+    assert run.states[1, -1] == pytest.approx(12 * 2 * np.arccos(0.99) / 40, abs=1e-5)
+
+
+def test_nothing_is_multiplied_by_a_zero_that_is_compared_with():
+    graph = Graph({"x": 2})
+    x, y = (graph.leaf("x", i, None) for i in range(2))
+    quotient = graph.op("div", x, y)
+    for pair in ((quotient, graph.const(0.0)), (graph.const(0.0), quotient)):
+        assert switching_function(graph, graph.op("lt", *pair)) == graph.op("mul", x, y)
+
+
+def test_conditions_of_outputs_alone_are_counted():
+    shows = ct.nlsys(
+        lambda t, x, u, p: [1.0], lambda t, x, u, p: 1.0 if x[0] > 0.5 else 0.0,
+        inputs=0, outputs=1, states=1, name="shows",
+    )  # fmt: skip
+    assert "conditions   1 of outputs alone, not located" in str(nlctl.compile(shows))
