@@ -12,6 +12,7 @@ from functools import reduce
 
 from .edges import domain_edges, have_edges, is_square, poles
 from .graph import ORDERS, Expr, Graph, needed, parts_first
+from .sharp import as_power
 from .without_poles import as_fraction, compared, multiplied
 
 _OF_DIFFERENCES = (*ORDERS, "minimum", "maximum")
@@ -19,6 +20,7 @@ _OF_FIRSTS = ("absolute", "sign", "heaviside", "arctan2")
 _OF_SECONDS = ("copysign",)
 _OF_INTEGERS = {"floor": 0.0, "ceil": 0.0, "trunc": 0.0, "rint": 0.5}
 _ROOTS = ("sqrt", "hypot")
+_STEEP = 3  # exponents from which on a power is too flat around 0 to be followed there
 _INVERSE = {"exp": math.log, "log": math.exp, "tanh": math.atanh}
 _OF_QUOTIENTS = ("remainder", "fmod")
 # functions that jump
@@ -175,13 +177,17 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
     """Return a - b; of what is compared with 0 itself, so that no rounding comes in."""
     # Of a root, a distance, the squares: near 0 it has a corner that no polynomial follows, so that
     # a step could pass through a small circle unseen.
-    is_zero = a.op == "const" and a.data == 0.0
     first, second = as_fraction(graph, a), as_fraction(graph, b)
     if not (first.is_whole and second.is_whole):
-        if is_zero:
-            return multiplied(graph, second.dividend, second.poles)
+        for one, other in ((first, b), (second, a)):
+            if _is_zero(other):
+                return multiplied(graph, one.dividend, one.poles)
         return compared(graph, first, second)
-    if is_zero:
+    for one, other in ((a, b), (b, a)):
+        if _is_zero(other) and one.op == "sub":  # what that says is compared
+            a, b = map(graph.number, one.args)
+            break
+    if _is_zero(a):
         return b
     for rising, level, step in ((a, b, 1), (b, a, -1)):
         # e^(-z^2) - c may be a narrow peak, -z^2 - log c is none
@@ -189,11 +195,28 @@ def _difference(graph: Graph, a: Expr, b: Expr) -> Expr:
         if inverse is not None:
             pair = [graph.number(rising.args[0]), graph.const(inverse)]
             return graph.op("sub", *pair[::step])
+    for power, level, step in ((a, b, 1), (b, a, -1)):
+        base, exponent = as_power(power)
+        if exponent >= _STEEP and level.op == "const" and (level.data > 0.0 or exponent % 2):
+            pair = _rooted_power(graph, graph.number(base), exponent, float(level.data))
+            return graph.op("sub", *pair[::step])
     for root, other, step in ((a, b, 1), (b, a, -1)):
         if root.op in _ROOTS and not other.varies:
             squares = [_square_of_root(graph, root), graph.op("mul", other, other)]
             return graph.op("sub", *squares[::step])
     return graph.op("sub", a, b)
+
+
+def _is_zero(expr: Expr) -> bool:
+    return expr.op == "const" and expr.data == 0.0
+
+
+def _rooted_power(graph: Graph, base: Expr, exponent: int, level: float) -> tuple[Expr, Expr]:
+    """Return what is as far apart as a power and a constant, without being flat around 0."""
+    root = math.copysign(abs(level) ** (1.0 / exponent), level)
+    if exponent % 2:
+        return base, graph.const(root)
+    return graph.op("mul", base, base), graph.const(root * root)
 
 
 def _inverse(op: str, level: Expr) -> float | None:

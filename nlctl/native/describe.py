@@ -74,6 +74,7 @@ def _conditions(reading: Reading) -> Iterator[str]:
     parts = [f"{found.count} located"] if found.rows else []
     parts += [f"{len(found.of_time)} of t alone, solved before a run"] if found.of_time else []
     parts += [f"{found.beyond} too many to be located"] if found.beyond else []
+    parts += [f"{found.shown} of outputs alone, not located"] if found.shown else []
     if parts:
         yield ", ".join(parts)
     if reading.equations.calls:

@@ -212,6 +212,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
         ),
         clocks=of_program.clocks or ticks_of(compiled.program, code, due),
         resets=of_program.resets,
+        sharp=of_program.sharp,
         lines=of_program.lines or lines_of(compiled, p, course.varied, entries_of((code.out,))),
     )
     if method == "taylor":
@@ -219,7 +220,7 @@ def prepared(course: Course, x0: np.ndarray, p: np.ndarray) -> Run:
     spare = workspace(
         compiled.cache, x0, times, read.ninputs, code.lowered.rows["g"], code.lowered.rows["m"],
         len(read.outputs), code.lowered.rows["s"], len(program.guards), len(read.lines),
-        SLOPES if terms else settings.pair.stages, terms or (1, 0),
+        SLOPES if terms else settings.pair.stages, terms or (1, 0), len(code.lowered.sharp),
         log_room(task, code.lowered.rows["g"], _NOTED + 2 * task.timed.jumps.shape[1]),
     )  # fmt: skip
     spare.work.lanes["stiff"] = method == "rodas5p"

@@ -15,6 +15,7 @@ from ..responses.watched import Watched
 from ..upstream.systems import System
 from . import compiled as engine
 from .compiled import Compiled, with_watched
+from .followed import followed
 from .happened import row_labels
 from .machine.evaluations import prepared_parameters
 from .machine.routine import Routine
@@ -37,12 +38,12 @@ def known_conditions(
     jumps = found["jumps"][np.isfinite(found["jumps"])]
     located = lowered.conditions.rows - len(watched)  # these the run watches itself
     if not located:
-        return Known(stops=jumps, longest=_longest(found, times))
+        return Known(stops=jumps, longest=_longest(found, times), followed=followed(compiled, p))
     first = compiled.program.switching
     labels = row_labels(compiled, lowered.conditions)[first : first + located]
     return Known(
         stops=jumps, longest=_longest(found, times), labels=tuple(labels),
-        partners=tuple(lowered.conditions.partners[:located]),
+        partners=tuple(lowered.conditions.partners[:located]), followed=followed(compiled, p),
         crossings=_crossings(compiled, p, slice(first, first + located)),
     )  # fmt: skip
 

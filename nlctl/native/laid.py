@@ -12,6 +12,7 @@ from .diagram.program import Program
 from .histories import lines_of
 from .integrate.delayed import DelayLines
 from .integrate.events.functions import EventRows
+from .integrate.events.sharp import Sharp
 from .integrate.memory import with_table
 from .integrate.methods.lu import WHOLE
 from .integrate.methods.stiff import UNKNOWN, StiffMethod, stiff_method
@@ -28,6 +29,7 @@ class Laid(NamedTuple):
     code: Machine
     rows: EventRows
     resets: Resets
+    sharp: Sharp
     stiff: StiffMethod  # before it is known what derivatives there are
     clocks: Ticks | None  # of a program without sampled blocks
     lines: DelayLines | None  # of one without delays
@@ -45,6 +47,11 @@ def _laid(reading: Reading, code: Machine) -> Laid:
         code=code,
         rows=_rows(program, code, reading.schedule.watched),
         resets=_resets(program, code),
+        sharp=with_table(
+            Sharp,
+            functions=entries_of(code.sharp),
+            kinds=np.array(code.lowered.sharp, dtype=np.int64),
+        ),
         stiff=stiff_method(reading.system.nstates or 0, UNKNOWN, np.zeros((1, 1)), WHOLE),
         clocks=None if program.clocks else ticks_of(program, code, nothing),
         lines=None if lines else lines_of(reading, np.zeros((0, width)), [], signals),

@@ -30,7 +30,8 @@ from .timed.ahead import OfTime
 
 PREPARE = {"prepare": ("p", "c")}
 EVALUATE = {"rhs": ("t", "x", "u", "c", "dx", "g", "m"), "out": ("t", "x", "u", "c", "y")}
-SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks, and of resets
+SAMPLE = ("t", "x", "u", "c", "s")  # of those of sampled blocks, of resets, of sharp functions
+_OF_S = ("sample", "reset", "sharp")
 POINT, DIRECTION = "point", "v"
 ALONG = {POINT: ("t", "x", "u", "c"), "along": ("t", "x", "u", "c", DIRECTION, "dx")}
 
@@ -64,6 +65,11 @@ class Lowered:
     def shape(self, array: str) -> tuple[int, ...]:
         """Return the shape of one of its arrays."""
         return (self.lanes,) if array == "t" else (self.rows[array], self.lanes)
+
+    @property
+    def sharp(self) -> list[int]:
+        """How each of the numbers is by which sharp functions are measured."""
+        return self.conditions.kinds if "sharp" in self.functions else []
 
     @cached_property
     def timed(self) -> OfTime:
@@ -110,7 +116,7 @@ def lower(
     stores = stores_of(found, found.results)
     wanted = {"rhs": [*stores["dx"], *stores["g"], *stores["m"]], "out": stores["y"]}
     samples = {name: SAMPLE for name in stores if name.startswith("sample")}
-    samples |= {name: SAMPLE for name in stores if name == "reset"}
+    samples |= {name: SAMPLE for name in stores if name in ("reset", "sharp")}
     wanted |= {name: stores[name] for name in samples}
     return _lowered(schedule, program, found, EVALUATE | samples, wanted, lanes)
 
@@ -146,7 +152,8 @@ def _lowered(
     rows = {
         "p": parameters, "t": 1, "x": n, "u": m, "c": max(size, 1), "dx": n,
         "g": program.events + found.conditions.rows, "m": len(program.memory),
-        "y": len(schedule.outputs), "v": n + m + 1, "s": max(len(program.sampled), program.resets),
+        "y": len(schedule.outputs), "v": n + m + 1,
+        "s": max(len(program.sampled), program.resets, len(found.conditions.kinds)),
     }  # fmt: skip
     return Lowered(
         functions=functions, exact=exact, calls=found.calls, solvers=found.solvers, rows=rows,
@@ -160,7 +167,7 @@ def stores_of(found: Equations, names: Iterable[str]) -> dict[str, list[Store]]:
         name: [
             part
             for row, array in found.results[name]
-            for part in _stores("s" if name.startswith(("sample", "reset")) else name, row, array)
+            for part in _stores("s" if name.startswith(_OF_S) else name, row, array)
         ]
         for name in names
     }

@@ -18,6 +18,19 @@ STEP_PLACES = np.array([0.0, 1e-3, *(np.arange(1, 15) / 15.0), 1.0 - 1e-3, 1.0])
 FEW_PLACES = np.array([0.0, 1e-3, 0.25, 0.5, 0.75, 1.0 - 1e-3, 1.0])
 _CLOSE = 2.0  # a function that falls by half of its value from place to place may reach 0
 _ULPS = 4.0
+# each time four neighbours, as far apart as places of a step, and one between the middle two:
+# not halfway, where a wave that the four do not see may be 0 as well
+_BETWEEN = 0.38
+CHECKED_PLACES = np.array([k + i for k in (0, 4, 8, 12) for i in (0, 1, 2, 3, 1 + _BETWEEN)]) / 15.0
+FEW_CHECKED = np.array([k + i for k in (0, 1) for i in (0, 1, 2, 3, 1 + _BETWEEN)]) / 4.0
+# the cubic through values at -1, 0, 1, 2 there
+_CUBIC = np.array([
+    -_BETWEEN * (_BETWEEN - 1) * (_BETWEEN - 2) / 6,
+    (_BETWEEN + 1) * (_BETWEEN - 1) * (_BETWEEN - 2) / 2,
+    -(_BETWEEN + 1) * _BETWEEN * (_BETWEEN - 2) / 2,
+    (_BETWEEN + 1) * _BETWEEN * (_BETWEEN - 1) / 6,
+])  # fmt: skip
+_NEAR, _FOLLOWED = 20.0, 0.1  # of the range of a function in a step
 _RESOLVED = 1e-9  # of a bracket: how closely an extreme value is located
 _NEITHER = 2.0  # the side of a number that is NaN
 _STEADY = 0.6  # a memory that changes by less than this part in half of the time does not jump
@@ -69,6 +82,20 @@ def first_event(
         return None
     apart = _TOGETHER * max(abs(begin), abs(end))
     return Event(min(found.time + apart, end), found.number, max(found.time - apart, begin))
+
+
+def is_followed(values: np.ndarray) -> bool:
+    """Return whether looks at `CHECKED_PLACES` say what functions are at those in between.
+
+    Shapes: `values` (5 k, n).
+    """
+    fives = values.reshape(-1, 5, values.shape[1])
+    known, between = fives[:, :4], fives[:, 4]
+    with np.errstate(invalid="ignore"):
+        missed = np.abs(np.einsum("k,ikn->in", _CUBIC, known) - between)
+        extent = np.ptp(values, axis=0)
+        is_near = np.abs(values).min(axis=0) <= _NEAR * extent
+    return not np.any(is_near & (missed > _FOLLOWED * extent))
 
 
 def _side(values: Any) -> Any:

@@ -10,14 +10,22 @@ from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
-from scipy.integrate import RK45
+from scipy.integrate import RK45, OdeSolver
 
 from ..errors import DivergedError
 from ..sampling.system import happening
 from ..supplied import supplying
 from ..upstream.control_internals import outputs_now, parts_now, rates_now
 from ..upstream.systems import System
-from .crossings import FEW_PLACES, STEP_PLACES, Event, first_event
+from .crossings import (
+    CHECKED_PLACES,
+    FEW_CHECKED,
+    FEW_PLACES,
+    STEP_PLACES,
+    Event,
+    first_event,
+    is_followed,
+)
 from .jumps import Jumps
 from .past import Past
 from .stops import TIME_ROUNDING, Stops
@@ -30,6 +38,9 @@ _SHORT = 0.25  # of the longest step so far: an integrator that has begun again
 _WIDER = 16.0  # than the bound of steps: where they may be so long it begins again
 _FIRST = 1e-9  # of a run: the first step of an explicit method where another one has failed
 _ROUNDED = 1.0 + 1e-9
+_SHORT_ONE = 0.01  # of the longest step so far: conditions are followed in it
+_SHORTER, _REFUSALS = 0.3, 9  # part of a step to be tried instead, and how often in a row
+_SHORTEST = 1e-7  # of a run: shorter steps are taken whatever they lead through
 _REVERSES = 0.01  # part of the tolerance: a memory that goes back by less does not reverse
 
 
@@ -143,7 +154,7 @@ class Driver:
             allowed = self._allowed(solver, state, bound, stop)
             if allowed:
                 bound = allowed
-                short = {**self._bounded(t, stop), "max_step": bound}
+                short = self._shortened(solver, stop, {**self._bounded(t, stop), "max_step": bound})
                 solver = self.method(self._rates, solver.t_old, self._held, stop, **short)
                 continue
             self._note_left(float(solver.t_old), float(solver.t), state)
@@ -178,6 +189,13 @@ class Driver:
         first = min(_FIRST * self._span, own["max_step"], stop - t)
         return RK45(self._rates, t, self._held, stop, first_step=first, **own)
 
+    def _shortened(self, solver: Any, stop: float, bounded: dict[str, Any]) -> dict[str, Any]:
+        """Return the arguments of an integrator that begins a step again, which was too long."""
+        begin = float(solver.t_old)
+        if begin != self._narrow or not isinstance(solver, OdeSolver):
+            return bounded
+        return bounded | {"first_step": min(bounded["max_step"], stop - begin)}
+
     def _first_seen(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return what is seen where a flow begins; what is exactly 0 has the side it comes from."""
         seen = self.jumps.look(t, x) if self.jumps.any else np.zeros(0)
@@ -196,9 +214,30 @@ class Driver:
         longest = self._longest_step(float(solver.t_old), stop)
         length = float(solver.t - solver.t_old)
         may_grow = longest > _WIDER * bound and bound != self._span / _PLACES
+        may_grow &= solver.t_old != self._narrow  # a longer step from there has been refused
         if length > _ROUNDED * longest or (may_grow and length > 0.5 * bound):
             return longest
+        part = self.jumps.followed(solver.t_old + STEP_PLACES * length, state)
+        if part < 1.0 and part * length > _SHORTEST * self._span:
+            self._narrow = float(solver.t_old)
+            return part * length
+        if length > _SHORT_ONE * self._longest and not self._is_resolved(solver, state):
+            return _SHORTER * length
         return self._span / _PLACES if self._slept(solver, state) else 0.0
+
+    def _is_resolved(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
+        """Whether conditions are as far apart within a step as their looks say, not waves of them.
+
+        A step with a jump in it never is: it is asked for so many shorter ones alone.
+        """
+        begin, length = float(solver.t_old), float(solver.t - solver.t_old)
+        self._refused = self._refused + 1 if begin == self._refused_at else 0
+        self._refused_at = begin
+        if self.jumps.crossings is None or self._refused >= _REFUSALS:
+            return True
+        places = FEW_CHECKED if length < _SHORT * self._longest else CHECKED_PLACES
+        looks = [self._looked(s, state(s)) for s in (begin + places * length).tolist()]
+        return is_followed(np.array(looks)[:, : sum(self.jumps.kinds)])
 
     def _slept(self, solver: Any, state: Callable[[float], np.ndarray]) -> bool:
         """Whether the step just made, from rest, has passed something that moves the state."""
@@ -343,7 +382,8 @@ class Driver:
         if self.progress is not None:
             self.progress(self.reached)
 
-    _repeated, _longest, _ended, _failed = 0, 0.0, False, np.nan
+    _repeated, _longest, _ended, _failed, _narrow = 0, 0.0, False, np.nan, np.nan
+    _refused, _refused_at = 0, np.nan
     _came = np.zeros(0)  # the last sides of what `_signs` returns, 0 where there was none yet
 
     def _record_within(self, until: float, state: Any, closes: bool) -> None:

@@ -96,6 +96,18 @@ class Jumps:
             self._label(found, sum(row.size for row in seen))
         return np.concatenate([*seen, become])
 
+    def followed(self, t: np.ndarray, state: Callable[[float], np.ndarray]) -> float:
+        """Return up to which part of a step functions that are flat elsewhere are followed.
+
+        Shapes: `t` (k,): times from the begin to the end of the step.
+        """
+        if self.conditions.followed is None:
+            return 1.0
+        given = [np.concatenate([self.inputs(s), self._leaving(s)]) for s in t.tolist()]
+        states = [state(s) for s in t.tolist()]
+        places = (t - t[0]) / (t[-1] - t[0])
+        return self.conditions.followed(places, t, np.array(states).T, np.array(given).T)
+
     def watched_at(self, t: float, x: np.ndarray) -> np.ndarray:
         """Return the functions that the run watches; memories are what they have become."""
         u = self.inputs(t) if self.watched else _NOTHING

@@ -31,3 +31,6 @@ class Known:
     # and how far behind it, or with a sign before, that is which says what its sign means; 0 for
     # none
     partners: tuple[int, ...] = ()
+    # ``followed(places, t, x, u)``: up to which part of a step functions that are flat elsewhere
+    # are followed, by times, states and inputs as of `crossings` at some parts of it, in columns
+    followed: Callable[..., float] | None = None

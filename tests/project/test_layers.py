@@ -68,7 +68,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["compiled"],
         ["cut_delays", "ensemble_result", "integrate", "members"],
         ["along", "audit", "discrete", "happened", "histories", "integrators", "laid", "settings"]
-        + ["spare"],
+        + ["followed", "spare"],
         ["chattering", "known", "ship"],
         ["run"],
         ["taylor"],
@@ -82,7 +82,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing", "edges"],
-        ["without_poles"],
+        ["sharp", "without_poles"],
         [
             "conditions",
             "continuity",

@@ -114,7 +114,8 @@ def _sizes(model: Model) -> list[str]:
 
 def _equations(model: Model) -> str:
     """Return what is compiled for any processor, and where it can be for a wide one."""
-    module, functions = CModule(), model.lowered.functions
+    module, functions = CModule(), dict(model.lowered.functions)
+    functions.pop("sharp", None)  # its own integrator does not ask for that
     labels = {
         f"{array}[{i}]": comment(v.name)
         for array, kind in (("x", "states"), ("u", "inputs"), ("p", "parameters"))

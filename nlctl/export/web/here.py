@@ -31,6 +31,7 @@ def carried_out(run: Run, text: str, names: Sequence[str], p: np.ndarray) -> Run
     address = code.addresses
     samples = [address[f"sample{k}"] for k in range(len(run.machine.samples))]
     resets = [address["reset"]] if run.machine.resets else []
+    sharp = [address["sharp"]] if run.machine.sharp else []
     c = np.zeros_like(task.p)
     ctypes.CFUNCTYPE(None, _PLACE, _PLACE)(address["prepare"])(p.ctypes.data, c.ctypes.data)
     task = with_fields(
@@ -38,6 +39,7 @@ def carried_out(run: Run, text: str, names: Sequence[str], p: np.ndarray) -> Run
         p=c,
         clocks=with_fields(task.clocks, functions=np.array(samples, dtype=np.int64)),
         resets=with_fields(task.resets, functions=np.array(resets, dtype=np.int64)),
+        sharp=with_fields(task.sharp, functions=np.array(sharp, dtype=np.int64)),
     )
     table, work = task.table.ctypes.data, run.work.table.ctypes.data
     rhs, out, lane = address["rhs"], address["out"], run.work.lanes[0]

@@ -201,12 +201,14 @@ def _host(run: Run, p: np.ndarray, timed: TimedProgram) -> str:
     functions = {
         "task.clocks.functions": samples,
         "task.resets.functions": ("reset",),
+        "task.sharp.functions": ("sharp",),
         "task.lines.signals": ("out",),
     }
     filled = [*_FILLED, *(["task.times"] if _is_even(run.task.times) else [])]
+    others = [name for name in ("reset", "sharp") if name in run.machine.lowered.functions]
     declared = [
         f"declare void @{name}(ptr, ptr, ptr, ptr, ptr{', ptr, ptr' if name == 'rhs' else ''})"
-        for name in ("rhs", "out", *samples, *(["reset"] if run.machine.resets else []))
+        for name in ("rhs", "out", *samples, *others)
     ]
     rooms = {"live.t": 1, "live.c": timed.rows, "live.s": timed.size}
     defined = [

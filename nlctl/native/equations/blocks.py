@@ -38,7 +38,8 @@ class Equations:
     graph: Graph
     # for ``"dx"``, ``"g"``, ``"m"`` and ``"y"`` pairs of a row and the array that is to be written
     # there.  For ``"sample0"`` and so on those of sampled blocks' next states, at each meeting, and
-    # for ``"reset"`` the states after jumps of all blocks with guards, if any
+    # for ``"reset"`` the states after jumps of all blocks with guards, if any, and for ``"sharp"``
+    # by what sharp functions are measured, if there are such
     results: dict[str, list[tuple[int, Tracer]]]
     calls: dict[str, Call]  # opaque functions by name
     solvers: dict[str, Solver]  # searches for the signals of algebraic loops, by name
@@ -92,6 +93,8 @@ def equations(
         if events.guards:
             sizes_of_guarded = [n.size if count_guards(n) else 0 for n in reader.blocks]
             results["reset"] = list(_in_rows(sizes_of_guarded, reader.resets).values())
+        if switches.sharp:
+            results["sharp"] = _rows_of(graph, (each.expr for each in switches.sharp))
         results = reader.all_known(results)
         for k, what in enumerate(meetings):
             at_instant = during(schedule, what)
@@ -127,17 +130,23 @@ def _conditions(
     kept = [array for _, array in events.committed.values()]
     others = [e for array in (y[system.noutputs or 0 :], *kept) for e, _ in array.pieces()]
     given = [watch.function for watch in events.watched if not watches_nan(watch.what)]
-    return found_conditions(reader, rates, signs, falls, others, given)
+    shown = [e for e, _ in y[: system.noutputs or 0].pieces()]
+    return found_conditions(reader, rates, signs, falls, others, given, shown)
 
 
 def _located(reader: Reader, switches: Conditions) -> list[tuple[int, Tracer]]:
     """Return the switching functions of conditions with their rows, behind those declared."""
     row = sum(count_switching_functions(node) for node in reader.blocks)
-    functions = []
-    for function in (condition.function for condition in switches.located):
-        functions.append((row, vector_of(reader.graph, function)))
-        row += function.size or 1
-    return functions
+    return _rows_of(reader.graph, (each.function for each in switches.located), row)
+
+
+def _rows_of(graph: Graph, exprs: Iterable[Expr], row: int = 0) -> list[tuple[int, Tracer]]:
+    """Return expressions as arrays with their rows, from one on."""
+    arrays = []
+    for expr in exprs:
+        arrays.append((row, vector_of(graph, expr)))
+        row += expr.size or 1
+    return arrays
 
 
 def _in_rows(

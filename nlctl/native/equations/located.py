@@ -14,6 +14,7 @@ from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
 from ...expressions.graph import Expr, Graph, needed, parts_first
+from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
@@ -60,11 +61,19 @@ class Conditions:
     waves: tuple[tuple[Expr, ...], ...] = ()
     pulses: tuple[Expr, ...] = ()  # other functions of t alone that drive the equations
     beyond: int = 0  # conditions that are too many to be located
+    shown: int = 0  # conditions that move an output of the diagram alone: none of these is located
+    # by what functions are measured that are flat but for a narrow range of their argument
+    sharp: tuple[SharpArgument, ...] = ()
 
     @property
     def rows(self) -> int:
         """Numbers that the switching functions are."""
         return sum(condition.rows for condition in self.located)
+
+    @property
+    def kinds(self) -> list[int]:
+        """How each of the numbers is by which sharp functions are measured."""
+        return [each.kind for each in self.sharp for _ in range(each.expr.size or 1)]
 
     @property
     def count(self) -> int:
@@ -91,10 +100,12 @@ def found_conditions(
     guards: Mapping[int, Tracer],
     others: Iterable[Expr],
     watched: Iterable[Expr] = (),
+    shown: Iterable[Expr] = (),
 ) -> Conditions:
     """Return what switches in a diagram whose blocks have been read."""
     # Where it moves rates, declared switching functions, guards, by their blocks' places, what
-    # arrives at delays and memories become (`others`), or an event function (`watched`).
+    # arrives at delays and memories become (`others`), or an event function (`watched`). What
+    # moves nothing but an output (`shown`) is counted.
     declared, others, watched = tuple(declared), tuple(others), tuple(watched)
     solved = [e for located in reader.fixed_points.values() for e in located]
     roots = [*others, *_pieces([*rates, *declared, *guards.values()]), *solved]
@@ -104,7 +115,8 @@ def found_conditions(
     known = {_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
-    rows = beyond = 0
+    rows = beyond = count = 0
+    only_shown = set(needed(list(shown))) - inside
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
     # values of parameters: 1 for those that are not known
@@ -113,30 +125,64 @@ def found_conditions(
         if condition in timed and condition in inside:
             of_time[condition] = None
         if condition in timed or condition not in inside:
+            count += condition in only_shown
             continue
-        path = "" if node is None else node.path
         bends = condition.op in _BENDS or (steep and only_bends(reader.graph, roots, condition, p))
-        functions = _with_sides(reader.graph, condition)
-        for function, side in functions:
-            key, size = _key(function), function.size or 1
-            if key in located:
-                located[key] = replace(located[key], bends=bends and located[key].bends)
-                continue
-            if key in known or not function.varies or _remembers(function, node):
-                continue
-            size *= side >= 0  # of two functions of integers one counts
-            if rows + size > _MOST:
-                beyond += size
-            elif size or _key(functions[0][0]) in located:
-                located[key] = Located(
-                    function=function, block=path, what=condition.op, bends=bends, integers=side
-                )
-                rows += size
+        path, functions = "" if node is None else node.path, _with_sides(reader.graph, condition)
+        one = Located(function=condition, block=path, what=condition.op, bends=bends)
+        rows, left = _entered(located, known, functions, one, node, rows)
+        beyond += left
     waves, pulses = _moving(reader.graph, _terms(moving, timed), timed)
     ordered = tuple(sorted(located.values(), key=lambda one: not one.bends))
     return Conditions(
-        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond
-    )
+        located=ordered, of_time=tuple(of_time), waves=waves, pulses=pulses, beyond=beyond,
+        shown=count, sharp=_sharp(reader, rates, inside - timed),
+    )  # fmt: skip
+
+
+def _entered(
+    located: dict[object, Located],
+    known: set[object],
+    functions: Sequence[tuple[Expr, int]],
+    condition: Located,
+    node: Node | None,
+    rows: int,
+) -> tuple[int, int]:
+    """Enter a condition by its switching functions; return all rows, and how many are too many."""
+    beyond = 0
+    for function, side in functions:
+        key, size = _key(function), function.size or 1
+        if key in located:
+            located[key] = replace(located[key], bends=condition.bends and located[key].bends)
+            continue
+        if key in known or not function.varies or _remembers(function, node):
+            continue
+        size *= side >= 0  # of two functions of integers one counts
+        if rows + size > _MOST:
+            beyond += size
+        elif size or _key(functions[0][0]) in located:
+            located[key] = replace(condition, function=function, integers=side)
+            rows += size
+    return rows, beyond
+
+
+def _sharp(reader: Reader, rates: Sequence[Tracer], moving: set[Expr]) -> tuple[SharpArgument, ...]:
+    """Return by what sharp functions of the users' blocks are measured."""
+    # Those of nlctl's own blocks are as smooth as their parameters have them.
+    nodes: dict[Expr, None] = {}
+    for i, node in enumerate(reader.blocks):
+        if node.sampled or _is_of_nlctl(node):
+            continue
+        given = set(_pieces([reader.wired(node.inputs)]))
+        parts = needed(_pieces([reader.signals[i], rates[i]]), given)
+        nodes |= dict.fromkeys(part for part in parts if part in moving)
+    arguments, rows = [], 0
+    for argument in sharp_arguments(reader.graph, nodes):
+        called = any(part.op == "call" for part in needed([argument.expr]))
+        rows += 0 if called else argument.expr.size or 1
+        if not called and rows <= _MOST:
+            arguments.append(argument)
+    return tuple(arguments)
 
 
 def _with_sides(graph: Graph, condition: Expr) -> list[tuple[Expr, int]]:
@@ -192,10 +238,14 @@ def _places(leaf: Expr) -> range:
 
 def _declares(node: Node) -> bool:
     """Whether a block is one of nlctl's that say where they switch: their tests hold that."""
-    system = node.system
-    if not isinstance(system, Block) or not type(system.spec).__module__.startswith("nlctl."):
+    if not _is_of_nlctl(node):
         return False
-    return bool(count_switching_functions(node) or memory_states(system.spec))
+    return bool(count_switching_functions(node) or memory_states(node.system.spec))
+
+
+def _is_of_nlctl(node: Node) -> bool:
+    system = node.system
+    return isinstance(system, Block) and type(system.spec).__module__.startswith("nlctl.")
 
 
 def _key(function: Expr) -> object:

@@ -29,6 +29,7 @@ from .events.location import (
     step_accepted,
 )
 from .events.near_side import look_before
+from .events.sharp import forget, look_at_sharp
 from .log import OF_TIME, log_is_full, note
 from .methods import explicit, taylor
 from .methods.dense import solution_at
@@ -231,6 +232,7 @@ def _jump(rhs, task, lanes, w, done, passed, sampled, any_passed):
     again |= _happens(task, lanes, w, passed, sampled)
     if again:
         restart(rhs, task, lanes, w, passed)
+        forget(lanes, w, passed)
     if task.rows.guarded < task.rows.switching:
         for j in range(lanes.size):
             done[j] |= passed[j]
@@ -268,13 +270,13 @@ def advance(rhs, point, along, task, w, rounds):
             look_at_kinks(rhs, task, lanes, w, found)
         if has_events(w) and not task.taylor.highest:
             look_between(rhs, task, lanes, w, found)
+        look_at_sharp(task, lanes, w, found)
         if rows.memory.size:
             look_before(rhs, task, lanes, w, found)
         any_passed = _accept(task, lanes, w, found, done, passed)
         _note_events(task, lanes, w, found, done)
         _take(task, w, done)
-        if rows.ways.size:
-            _see(task, lanes, w)
+        _see(task, lanes, w)
         _jump(rhs, task, lanes, w, done, passed, sampled, any_passed)
         if rows.ways.size:
             _note_jumps(task, lanes, w, done)

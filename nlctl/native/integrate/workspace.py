@@ -14,6 +14,7 @@ from ...accumulation import PACE
 from .delayed import DelayLines, KeptSignals, new_past
 from .evaluate import Scratch, new_ahead
 from .events.functions import EventRows, Events, Inside, Memories
+from .events.sharp import Sharp, SharpArrays
 from .log import Log
 from .memory import Places2, Reals1, Reals2, Reals3, arrays_alike, type_of, with_fields, with_table
 from .methods.stiff import StiffArrays, StiffMethod, new_stiff
@@ -44,6 +45,7 @@ class Task(NamedTuple):
     timed: Timed
     clocks: Ticks
     resets: Resets
+    sharp: Sharp
     lines: DelayLines
     table: Places2
 
@@ -74,6 +76,7 @@ class Work(NamedTuple):
     events: Events
     memories: Memories
     inside: Inside
+    sharp: SharpArrays
     stiff: StiffArrays
     taylor: TaylorArrays
     guards: Guards
@@ -97,11 +100,13 @@ def new_work(
     lines: int = 0,
     stages: int = 3,
     terms: tuple[int, int] = (1, 0),
+    sharp: int = 0,
     log: int = 0,
 ) -> Work:
     """Return the arrays for integrating members from `x0` (states, lanes) on."""
     # The inputs include the lines, and so do the outputs what arrives there. `terms` are the
-    # numbers of orders and rows of Taylor coefficients, and `log` of events that can be noted.
+    # numbers of orders and rows of Taylor coefficients, `log` of events that can be noted, and
+    # `sharp` those by which sharp functions are measured.
     n, lanes = x0.shape
     states = {name: np.zeros((n, lanes)) for name in ("x", "x_new", "x_stage")}
     states["x"][:] = x0
@@ -125,6 +130,9 @@ def new_work(
         memories=arrays_alike(Memories, (memories, lanes), m_inside=(4, memories, lanes)),
         inside=arrays_alike(
             Inside, (lanes,), values=(5,), newton=(5,), bracket=(3, lanes), height=(3, lanes)
+        ),
+        sharp=arrays_alike(
+            SharpArrays, (sharp, lanes), at=(7, sharp, lanes), part=(lanes,), until=(lanes,)
         ),
         stiff=new_stiff(n if lanes == 1 else 0, inputs),  # that method is for single runs
         taylor=new_terms(*terms, inputs, lanes),

@@ -35,6 +35,8 @@ class Machine:
     samples: tuple[Any, ...] = ()
     # ``reset(t, x, u, c, s)``, if there are guards: the states of their blocks behind a jump
     resets: tuple[Any, ...] = ()
+    # ``sharp(t, x, u, c, s)``, if there are sharp functions: by what these are measured
+    sharp: tuple[Any, ...] = ()
     meetings: tuple[Happening, ...] = ()  # what happens to them there
 
     @property
@@ -51,7 +53,7 @@ class Machine:
 
     @cached_property
     def _routines(self) -> list[Routine]:
-        every = (self.rhs, self.out, *self.samples, *self.resets)
+        every = (self.rhs, self.out, *self.samples, *self.resets, *self.sharp)
         return [function for function in every if isinstance(function, Routine)]
 
     @property
@@ -96,6 +98,7 @@ def machine(
     if not lowered.holds_for(p):
         raise ValueError("members whose integers differ have no machine code in common")
     prepare, rhs, out, *samples = lowered_code(lowered)
+    sharp = (samples.pop(),) if "sharp" in lowered.functions else ()
     resets = (samples.pop(),) if program.guards else ()
     known.append(
         Machine(
@@ -106,6 +109,7 @@ def machine(
             out=out,
             samples=tuple(samples),
             resets=resets,
+            sharp=sharp,
             meetings=meetings,
         )
     )

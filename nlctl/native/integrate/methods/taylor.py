@@ -24,14 +24,14 @@ from ...machine.address import (
 from ..evaluate import input_rates, inputs_at
 from ..events.crossing import BEFORE_CONDITION
 from ..events.location import SMALL_KINK, behind_event, triggered
-from ..memory import Places1, Places2, Reals2, Reals3, with_table, zeros
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3, with_table, zeros
 from ..state import INNER, METHOD, RUNNING, STIFF, opposite
+from .dips import first_dip, lacking, value_and_slope
 
 SLOPES = 2  # slopes at both ends of a step
 _AIM = 0.25  # of the tolerance: what the error of a step is to be
 FOLLOWED = 0.01  # what the last two terms of a polynomial that is looked at may be of all
 _LOOKS = 16  # parts of a step
-_ROUNDED = 1e-12  # of how far a polynomial may get from its start: it is not known any better
 _TURNS = 5  # attempts at where a polynomial is least
 _BRIEF = 0.01  # part of a step: a nearer break point is located by trying
 _PLACES = 4  # at 0.9, 0.99, ... of a step that ends at an event
@@ -59,6 +59,7 @@ class TaylorArrays(NamedTuple):
     expanded: Places1  # 1 where they are those of the step being tried
     u_rate: Reals2  # (inputs, lanes)
     largest: Reals2  # of coefficients, or of what a step lacks, over the tolerance
+    shifted: Reals1  # one polynomial around another place, see `dips`
     table: Places2
 
 
@@ -72,7 +73,7 @@ def new_terms(orders: int, rows: int, inputs: int, lanes: int) -> TaylorArrays:
     """Return the arrays for so many orders and rows of coefficients."""
     return with_table(
         TaylorArrays, terms=zeros((orders, rows, lanes)), expanded=np.zeros(lanes, dtype=np.int64),
-        u_rate=np.zeros((inputs, lanes)), largest=np.zeros((4, lanes)),
+        u_rate=np.zeros((inputs, lanes)), largest=np.zeros((4, lanes)), shifted=np.zeros(orders),
     )  # fmt: skip
 
 
@@ -227,7 +228,7 @@ def _farthest(task, w, i, h, j):
     p, row, start = task.taylor.highest - 1, w.x.shape[0] + i, w.events.g_start[i, j]
     part, most = 1.0, abs(start) + SMALL_KINK * task.atol
     for n in range(1, _LOOKS):
-        f = _value_and_slope(p, n / _LOOKS * h, w.taylor.terms, row, j)[0]
+        f = value_and_slope(p, n / _LOOKS * h, w.taylor.terms, row, j)[0]
         if abs(f) > most and not opposite(start, f):
             part, most = n / _LOOKS, abs(f)
     return part
@@ -269,7 +270,7 @@ def _root(task, w, i, h, j):
     for n in range(60):
         part = f_low / (f_low - f_high)
         middle = low + (high - low) * (0.5 if n % 3 == 2 else min(max(part, 0.01), 0.99))
-        f = _value_and_slope(p, middle * h, w.taylor.terms, row, j)[0]
+        f = value_and_slope(p, middle * h, w.taylor.terms, row, j)[0]
         if opposite(f, -f_low):
             low, f_low = middle, f
         else:
@@ -331,14 +332,18 @@ def _compare(task, lane, w, j):
             side = events.g_start[i, j]
             if i >= task.rows.guarded and w.guards.above[i - task.rows.guarded, j] != 0:
                 side = 1.0
-            first, farthest = _crossing(p, w.h[j], taylor.terms, n + i, side, until, j)
+            first, farthest = _crossing(
+                p, w.h[j], taylor.terms, n + i, side, until, taylor.shifted, j
+            )
             if first < until:  # a step that ends there has an event
                 inside.looked[j], inside.foreseen[j] = -1.0, min(inside.foreseen[j], farthest)
     for i in range(task.taylor.sides.shape[0]):
         first, farthest, row = 0.5, -1.0, task.taylor.sides[i, 0]
         if _is_followed(p, w.h[j], taylor.terms, row, j):
             side = taylor.terms[p, task.taylor.sides[i, 1], j]
-            first, farthest = _crossing(p, w.h[j], taylor.terms, row, side, until, j)
+            first, farthest = _crossing(
+                p, w.h[j], taylor.terms, row, side, until, taylor.shifted, j
+            )
         if first < until:
             inside.looked[j] = -1.0 if inside.looked[j] != 0.0 else farthest
             inside.foreseen[j] = min(inside.foreseen[j], first)
@@ -378,7 +383,7 @@ def _turning(p, h, terms, row, ends, slopes, j):
     (low, high), (first, last), least = ends, slopes, 0.0
     for _ in range(_TURNS):
         least = low + first / (first - last) * (high - low)
-        slope = _value_and_slope(p, least * h, terms, row, j)[1]
+        slope = value_and_slope(p, least * h, terms, row, j)[1]
         if opposite(slope, first):
             high, last = least, slope
         else:
@@ -387,7 +392,7 @@ def _turning(p, h, terms, row, ends, slopes, j):
 
 
 @numba.njit(**INNER)
-def _crossing(p, h, terms, row, side, until, j):
+def _crossing(p, h, terms, row, side, until, shifted, j):
     """Return where a polynomial is on another side first, 1 for nowhere, and where farthest."""
     first, farthest, most, steep = 1.0, 1.0, 0.0, 0.0
     side = 1.0 if side > 0.0 else -1.0
@@ -401,30 +406,21 @@ def _crossing(p, h, terms, row, side, until, j):
         before, part = part, n / _LOOKS
         if before >= until:
             break
-        value, slope = _value_and_slope(p, part * h, terms, row, j)
+        value, slope = value_and_slope(p, part * h, terms, row, j)
         if fell and slope * side > 0.0:  # in between it is least where the slope is 0, about
             least = _turning(p, h, terms, row, (before, part), (steep, slope), j)
-            under = _value_and_slope(p, least * h, terms, row, j)[0] * side
-            at = least * h  # what it may be wrong by there are its last two terms
-            lacks = at ** (p - 1.0) * (abs(terms[p - 1, row, j]) + abs(at * terms[p, row, j]))
-            if under < (lacks if lacks > _ROUNDED * extent * h else 0.0) and least < until:
+            under = value_and_slope(p, least * h, terms, row, j)[0] * side
+            lacks = lacking(p, least * h, extent * h, terms, row, j)
+            if under < lacks and least < until:
                 first, farthest, most = min(first, least), least, max(most, -under)
         fell, steep = slope * side < 0.0, slope
         if value * side < 0.0 and part < until:
             first = min(first, part)
             if -value * side > most:
                 farthest, most = part, -value * side
+    if first == 1.0:  # seen nowhere: there may be a dip between two of these places
+        first = farthest = first_dip(p, h, terms, row, side, until, extent * h, shifted, j)
     return first, farthest
-
-
-@numba.njit(**INNER)
-def _value_and_slope(highest, h, terms, row, j):
-    """Return a polynomial and its derivative at h."""
-    value, slope = terms[highest, row, j], 0.0
-    for k in range(highest - 1, -1, -1):
-        slope = slope * h + value
-        value = value * h + terms[k, row, j]
-    return value, slope
 
 
 @numba.njit(**INNER)
@@ -457,7 +453,7 @@ def _defect(task, w, dx, j):
     largest = 0.0
     for i in range(w.x.shape[0]):
         at = w.inside.looked[j] * w.h[j]
-        slope = _value_and_slope(task.taylor.highest, at, w.taylor.terms, i, j)[1]
+        slope = value_and_slope(task.taylor.highest, at, w.taylor.terms, i, j)[1]
         defect = abs(w.h[j] * (dx[i, j] - slope))
         part = defect / (task.atol + task.rtol * abs(w.ahead.x[i, j]))
         largest = part if part > largest or part != part else largest

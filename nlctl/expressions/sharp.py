@@ -1,0 +1,83 @@
+"""Functions that move within a narrow range of their argument alone, and by what that is measured.
+
+exp(-(x / w)^2), tanh(x / w), 1 / (1 + (x / w)^2) and high powers are constants, to rounding, but
+for the few w around 0.  What a step that begins and ends there sees of them says nothing of what
+lies in between, whether they are rates or what a condition compares.  A number tells: where it
+moves by 1 the function moves by a factor e at most, and farther than `RANGE` from 0 it is flat.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .edges import is_positive, is_square
+from .graph import Expr, Graph, needed
+
+RANGE = 36.0  # e^-36 is less than rounding
+ITSELF, AREA = 0, -1  # kinds; others are exponents
+_HIGH = 6  # powers from which on a function is as good as 0 around the root of what it is of
+# what functions are measured by, in arguments; erf(6) is 1
+_FACTORS = {
+    "exp": 1.0, "expm1": 1.0, "exp2": math.log(2.0), "cosh": 1.0, "sinh": 1.0, "tanh": 2.0,
+    "erf": 6.0, "erfc": 6.0,
+}  # fmt: skip
+_SHARP = (*_FACTORS, "arctan", "logaddexp")
+
+
+@dataclass(frozen=True)
+class SharpArgument:
+    """What moves gently, and how a function is measured by it."""
+
+    expr: Expr
+    # ``ITSELF``: it is the number; ``AREA``: twice its arsinh is, as of what has the tails of
+    # 1 / x; an exponent: that times the logarithm of its size
+    kind: int
+
+
+def sharp_arguments(graph: Graph, nodes: Iterable[Expr]) -> tuple[SharpArgument, ...]:
+    """Return by what the sharp functions among some expressions are measured."""
+    arguments: dict[SharpArgument, None] = {}
+    powers: dict[Expr, int] = {}
+    for node in nodes:
+        if not node.varies:
+            continue
+        if node.op in _FACTORS:
+            factor, number = graph.const(_FACTORS[node.op]), graph.number(node.args[0])
+            arguments[SharpArgument(graph.op("mul", factor, number), ITSELF)] = None
+        elif node.op == "logaddexp":
+            difference = graph.op("sub", *map(graph.number, node.args))
+            arguments[SharpArgument(difference, ITSELF)] = None
+        elif node.op == "arctan":
+            arguments[SharpArgument(graph.number(node.args[0]), AREA)] = None
+        else:
+            divides = node.op == "div" and is_positive(node.args[1])
+            base, exponent = as_power(node.args[1] if divides else node)
+            if base.varies and (divides or exponent >= _HIGH) and _is_gentle(base):
+                powers[base] = max(powers.get(base, 0), exponent)
+    known = (SharpArgument(graph.number(base), exponent) for base, exponent in powers.items())
+    return (*arguments, *known)
+
+
+def _is_gentle(base: Expr) -> bool:
+    """Return whether no sharp function is in it, which is measured by its own argument."""
+    return not any(node.varies and node.op in _SHARP for node in needed([base]))
+
+
+def as_power(expr: Expr) -> tuple[Expr, int]:
+    """Return an expression as a power of another with a whole exponent: mostly itself to the 1.
+
+    Of products those are seen that are written as such, as x**6 is: x x x x x x.
+    """
+    if expr.op == "power" and expr.args[1].op == "const":
+        exponent = abs(float(expr.args[1].data))
+        return (expr.args[0], int(exponent)) if exponent.is_integer() else (expr, 1)
+    if is_square(expr):
+        base, exponent = as_power(expr.args[0])
+        return base, 2 * exponent
+    if expr.op == "mul":
+        (base, exponent), (other, more) = map(as_power, expr.args)
+        if base is other:
+            return base, exponent + more
+    return expr, 1

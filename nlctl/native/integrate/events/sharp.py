@@ -1,0 +1,261 @@
+"""Functions that are flat but for a narrow range of their argument: no step leads through it.
+
+Neither error control nor what is known of conditions from a few values sees a pulse between two
+places at which it is 0 to rounding.  What moves gently there is the argument, see
+`nlctl.expressions.sharp`: the polynomial through five of its values says how far it leads.  Where
+it moves by more than `_MOST` within the range in which the function is not flat, a shorter step is
+tried, and where a polynomial does not follow it, too.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from ....expressions.sharp import AREA, ITSELF, RANGE
+from ...machine.address import call_out
+from ..control import shorten
+from ..evaluate import inputs_at, on_this_side
+from ..memory import Places1, Places2, Reals1, Reals2, Reals3
+from ..methods.dense import solution_at
+from ..methods.quartic import least_value, polynomial_at, quartic
+from ..state import INNER, opposite
+from .location import AGAIN
+
+_MOST = 8.0  # e^-8 of a pulse is seen
+_AIM = 0.8  # of that: what a shorter step is to lead through
+_WRONG = 4.0  # what a polynomial may be wrong by where it may lead into the range
+_FAR = 3.0  # times that: it does not lead there
+_SHORTER = 0.3  # part of a step to be tried where it is not followed
+_CALM = 2.0  # what an argument moves by in a step that is not looked into
+_WITHIN = 2.0  # times what it moves by from end to end: it gets no farther in between
+_ROUNDING = 1e-9  # of a step
+_LEAST = 0.005  # part of a step to be tried at least
+_DENSE = 2  # the row of task.pair.inside that is no method's stages
+_CHECKED = (0.11, 0.61)  # parts of a step at which a polynomial is checked
+_POINTS, _HALVINGS = 32, 12
+_TINY = 1e-300
+_SHORTEST = 1e-7  # part of a run: shorter steps are taken
+
+
+class Sharp(NamedTuple):
+    """By what sharp functions are measured."""
+
+    functions: Places1  # the one that fills it, if there is any
+    kinds: Places1  # see `SharpArgument.kind`
+    table: Places2
+
+
+class SharpArrays(NamedTuple):
+    """That in the step being tried, at seven parts of it."""
+
+    at: Reals3  # (parts, rows, lanes)
+    part: Reals1  # of the step: where it is looked next, or how long one to try is to be
+    last: Reals2  # at the end of the step before: (rows, lanes)
+    pace: Reals2  # and how fast that has moved (1/s)
+    until: Reals1  # the time at which it has ended (s)
+    table: Places2
+
+
+@numba.njit(**INNER)
+def look_at_sharp(task, lanes, w, found):
+    """Have shorter steps tried where an accepted one has led through a sharp function."""
+    if task.sharp.kinds.size == 0 or task.fixed > 0.0:
+        return
+    sharp, wanted = w.sharp, w.inside.wanted
+    shortest, any_wanted = _SHORTEST * (task.times[-1] - task.times[0]), False
+    for j in range(lanes.size):
+        lane = lanes[j]
+        wanted[j] = found[j] > AGAIN and not lane.across and lane.step > shortest
+        any_wanted |= wanted[j] != 0
+        w.t[j] = lane.t + lane.step
+    if not any_wanted:
+        return
+    _measured(task, lanes, w, w.x_new, 4)
+    any_wanted = False
+    for j in range(lanes.size):
+        wanted[j] = wanted[j] and not _is_calm(task, lanes[j], w, j)
+        any_wanted |= wanted[j] != 0
+    if any_wanted:
+        _look_within(task, lanes, w, found)
+    for j in range(lanes.size):
+        if found[j] > AGAIN:
+            sharp.until[j] = lanes[j].t + lanes[j].step
+            for i in range(task.sharp.kinds.size):
+                moved = abs(sharp.at[4, i, j] - sharp.last[i, j])
+                sharp.pace[i, j], sharp.last[i, j] = moved / lanes[j].step, sharp.at[4, i, j]
+
+
+@numba.njit(**INNER)
+def _is_calm(task, lane, w, j):
+    """Whether arguments hardly move: from end to end, nor at the pace of the step before."""
+    # What is behind a jump, or a step that was not looked at, has no such pace.
+    sharp, calm = w.sharp, abs(w.sharp.until[j] - lane.t) <= _ROUNDING * lane.step
+    for i in range(task.sharp.kinds.size):
+        kind, before, end = task.sharp.kinds[i], sharp.last[i, j], sharp.at[4, i, j]
+        moved = abs(end - before)
+        most = max(moved, sharp.pace[i, j] * lane.step)
+        if kind == ITSELF:
+            is_far = max(before, end) + _WITHIN * most < -RANGE
+            is_far |= min(before, end) - _WITHIN * most > RANGE
+            calm &= most <= _CALM or is_far
+        else:
+            nearest = min(abs(end), abs(before)) + (1.0 if kind == AREA else 0.0)
+            calm &= max(kind, 1) * most <= _CALM * nearest
+    return calm
+
+
+@numba.njit(**INNER)
+def forget(lanes, w, jumped):
+    """Take nothing that arguments were before for what they are behind a jump."""
+    for j in range(lanes.size):
+        if jumped[j]:
+            w.sharp.until[j] = np.nan
+
+
+@numba.njit(**INNER)
+def _look_within(task, lanes, w, found):
+    """Look at arguments within steps, and have shorter ones tried where they lead too far."""
+    nodes, part, wanted = task.pair.inside[_DENSE], w.sharp.part, w.inside.wanted
+    for n in range(4):
+        for j in range(lanes.size):
+            part[j] = nodes[n - 1] if wanted[j] and n > 0 else 0.0
+        _inside(task, lanes, w, n)
+    any_wanted = False
+    for j in range(lanes.size):
+        wanted[j] = wanted[j] and _any_moves(task, w, j)
+        any_wanted |= wanted[j] != 0
+    if not any_wanted:
+        return
+    for n in range(2):
+        for j in range(lanes.size):
+            part[j] = _CHECKED[n] if wanted[j] else 0.0
+        _inside(task, lanes, w, 5 + n)
+    for j in range(lanes.size):
+        if wanted[j]:
+            part[j] = 1.0
+            for i in range(task.sharp.kinds.size):
+                part[j] = min(part[j], _followed(task, w, i, j))
+            if part[j] < 1.0:
+                shorten(lanes[j], max(part[j], _LEAST))
+                found[j] = AGAIN
+
+
+@numba.njit(**INNER)
+def _inside(task, lanes, w, n):
+    """Fill row `n` of ``w.sharp.at`` at the parts of steps."""
+    for j in range(lanes.size):
+        w.t[j] = lanes[j].t + w.sharp.part[j] * lanes[j].step
+        solution_at(w.sharp.part[j], task, lanes[j], w, j, w.ahead.x)
+    _measured(task, lanes, w, w.ahead.x, n)
+
+
+@numba.njit(**INNER)
+def _measured(task, lanes, w, x, n):
+    """Fill row `n` of ``w.sharp.at`` at the times w.t."""
+    if task.timed.jumps.shape[1]:
+        on_this_side(lanes, w)
+    if w.u.shape[0]:
+        inputs_at(task, lanes, w)
+    call_out(task.sharp.functions[0], w.t, x, w.u, task.p, w.sharp.at[n])
+
+
+@numba.njit(**INNER)
+def _any_moves(task, w, j):
+    """Whether the values of an argument may be farther apart than a step may lead."""
+    for i in range(task.sharp.kinds.size):
+        least = most = w.sharp.at[0, i, j]
+        for n in range(1, 5):
+            least, most = min(least, w.sharp.at[n, i, j]), max(most, w.sharp.at[n, i, j])
+        kind, apart = task.sharp.kinds[i], most - least
+        if kind != ITSELF:  # between two of the values it may be nearer to 0
+            nearest = max(max(least, -most) - apart, 0.0)
+            if nearest > max(kind, 1) * apart:
+                continue
+            apart = _measure(kind, max(most, -least)) - max(_measure(kind, nearest), -RANGE)
+        if apart > _AIM * _MOST:
+            return 1
+    return 0
+
+
+@numba.njit(**INNER)
+def _measure(kind, value):
+    """Return by what a function is measured whose argument has a value."""
+    if kind == ITSELF:
+        return value
+    size = abs(value)
+    if kind == AREA:
+        area = 2.0 * np.log(size + np.sqrt(size * size + 1.0))
+        return -area if value < 0.0 else area
+    return kind * np.log(max(size, _TINY))
+
+
+@numba.njit(**INNER)
+def _followed(task, w, i, j):
+    """Return the part of a step up to which an argument may be followed."""
+    values, newton, at = w.inside.values, w.inside.newton, task.pair.inside[_DENSE]
+    kind, wrong = task.sharp.kinds[i], 0.0
+    for n in range(5):
+        values[n] = w.sharp.at[n, i, j]
+    quartic(values, at, newton)
+    for n in range(2):
+        missed = abs(polynomial_at(newton, at, _CHECKED[n]) - w.sharp.at[5 + n, i, j])
+        wrong = missed if not missed <= wrong else wrong
+    least, lowest = least_value(newton, at, False)
+    for n in range(5):
+        newton[n] = -newton[n]
+    most, highest = least_value(newton, at, False)
+    most = -most
+    for n in range(5):
+        newton[n] = -newton[n]
+    nearest = max(least, -most, 0.0)
+    if _is_flat(kind, least - _FAR * wrong, most + _FAR * wrong):
+        return 1.0
+    if not _blurred(kind, nearest, wrong) <= _WRONG:
+        return _SHORTER
+    if _led(kind, newton, at, 1.0, lowest, highest) <= _MOST:
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _led(kind, newton, at, middle, lowest, highest) <= _AIM * _MOST:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@numba.njit(**INNER)
+def _blurred(kind, nearest, wrong):
+    """Return by how much a measure may be wrong where its argument is nearest to 0."""
+    if kind == ITSELF:
+        return wrong
+    return _measure(kind, nearest + wrong) - max(_measure(kind, nearest), -RANGE)
+
+
+@numba.njit(**INNER)
+def _is_flat(kind, least, most):
+    """Whether a function is flat wherever its argument lies between two numbers."""
+    if kind in (ITSELF, AREA):
+        return _measure(kind, least) > RANGE or _measure(kind, most) < -RANGE
+    nearest = max(least, -most, 0.0)
+    return _measure(kind, nearest) > RANGE or _measure(kind, max(most, -least)) < -RANGE
+
+
+@numba.njit(**INNER)
+def _led(kind, newton, at, until, lowest, highest):
+    """Return how far a polynomial leads within the range, up to a part of a step."""
+    least, most, before = RANGE, -RANGE, 0.0
+    for n in range(_POINTS + 4):
+        x = n / _POINTS
+        if n > _POINTS:
+            x = until if n == _POINTS + 1 else lowest if n == _POINTS + 2 else highest
+        if x <= until:
+            value = polynomial_at(newton, at, x)
+            if kind > 0 and opposite(before, value):
+                least = -RANGE  # it goes through 0
+            measure = min(max(_measure(kind, value), -RANGE), RANGE)
+            least, most, before = min(least, measure), max(most, measure), value
+    return most - least
