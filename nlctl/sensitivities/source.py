@@ -48,6 +48,10 @@ class EquationParts:
     committed: list[Expr]  # what each memory would become
     switched: frozenset[int]  # states of memories that jump, and are not driven
     owners: tuple[int, ...]  # the block of each switching function
+    # their rows, those of blocks with memories first, and how many these are: a step ends right
+    # behind where a memory may jump
+    ordered: tuple[int, ...]
+    behind: int
     p: np.ndarray  # parameters near which the equations are evaluated
 
     @property
@@ -171,13 +175,15 @@ def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
+    ordered = sorted(range(len(owners)), key=lambda k: not memory(nodes[owners[k]]))
     return EquationParts(
         equations=computed, extended=extended_program, program=program,
         inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
         committed=list(_single(graph, computed.results["m"]).values()),
-        switched=frozenset(jump), owners=tuple(owners), p=p,
+        switched=frozenset(jump), owners=tuple(owners), ordered=tuple(ordered),
+        behind=sum(bool(memory(nodes[i])) for i in owners), p=p,
     )  # fmt: skip
 
 
