@@ -29,6 +29,7 @@ from .source import EquationParts, equation_parts
 # How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says, or
 # as the part over which it is seen whether a memory turns.
 _LATE, _AHEAD = 0.5, 1e-4
+_PASSED = 1e-14  # of the times: break points of t that are as close are passed together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +50,12 @@ def parameters_with(
     p: np.ndarray,
     scale: np.ndarray,
     settings: Any,
-    span: float,
+    span: tuple[float, float],
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives."""
-    size = extended_program.slot("late").offset + 1
-    late = _LATE * max(np.sqrt(settings.rtol), _AHEAD) * span
+    size = extended_program.slot("rounding").offset + 1
+    late = _LATE * max(np.sqrt(settings.rtol), _AHEAD) * (span[1] - span[0])
+    rounding = _PASSED * max(map(abs, span))
     whole = np.concatenate([p, np.zeros(size - p.size)])
     layout = extended_program.layout
     for j, quantity in enumerate(quantities):
@@ -63,7 +65,10 @@ def parameters_with(
             whole[slots["delay"].offset] = p[original["delay"].offset]
             if quantity.place == original["before"].offset:
                 whole[slots["before"].offset] = scale[j]
-    given = {"scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late}
+    given = {
+        "scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late,
+        "rounding": rounding,
+    }  # fmt: skip
     for name, value in given.items():
         slot = extended_program.slot(name)
         whole[slot.offset : slot.offset + slot.size] = value
@@ -81,7 +86,7 @@ def with_its_derivatives(
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
     extended_program = extended(compiled, combinations, by)
-    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, 1.0)
+    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
     source = equation_parts(compiled, extended_program, whole)
     sides = sides_of(source, n * (1 + by))
     places = StatePlaces(states=n, by=by, branches=sides.rows)

@@ -58,7 +58,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
-    span = float(run.times[-1] - run.times[0])
+    span = float(run.times[0]), float(run.times[-1])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
     integrated = trajectory(_course(differentiated, run, u), start, whole)

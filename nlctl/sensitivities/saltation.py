@@ -77,10 +77,24 @@ class Saltation:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
-        rows.append((self._first(places.together, when.apart), 1))
-        rows.append((self._first(places.grazing, when.grazes), 1))
-        rows.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        happens = [(when.apart, 1), (when.grazes, 1), (graph.op("and", when.happens, sent), 1)]
+        *rows, apart, grazes, jumped = self._behind_breaks([*rows, *happens])
+        rows.append((self._first(places.together, apart[0]), 1))
+        rows.append((self._first(places.grazing, grazes[0]), 1))
+        rows.append((self._first(places.jumped, jumped[0]), 1))
         return rows
+
+    def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
+        """Return numbers as they are behind all break points of t that are passed at once."""
+        graph, t = self.source.graph, self.source.graph.leaf("t", 0, None)
+        behind = graph.op("add", t, self._rounding)
+        exprs = replaced_parts(graph, [e for e, _ in rows], {t: behind})
+        return [(e, size) for e, (_, size) in zip(exprs, rows, strict=True)]
+
+    @property
+    def _rounding(self) -> Expr:
+        """How close break points of t are that are passed at once."""
+        return self.source.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
 
     def at_reset(
         self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
@@ -301,7 +315,9 @@ class Saltation:
         """Return how the time moves at which sides have been left; a clock's does not."""
         graph = self.source.graph
         last = graph.leaf("x", self.places.last, None)
-        free = graph.op("and", graph.op("ne", graph.leaf("t", 0, None), last), jumps)
+        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
+        recent = graph.op("mul", graph.const(2.0), self._rounding)
+        free = graph.op("and", graph.op("gt", ago, recent), jumps)
         causes = []
         for side in self.sides.sides:
             for k in range(side.rows):
