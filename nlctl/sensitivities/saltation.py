@@ -72,9 +72,13 @@ class Saltation:
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
+            states = []
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
+                states.append((s, size))
+            driven = self._driven_across(j, before, behind, move)
+            for s, size in rows_replaced(graph, states, driven):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         happens = [(when.apart, 1), (when.grazes, 1), (graph.op("and", when.happens, sent), 1)]
@@ -236,13 +240,8 @@ class Saltation:
         broken: Expr,
     ) -> list[SomeRows]:
         """Return R' (S + f- t*') - f+ t*' of all states."""
-        graph, source = self.source.graph, self.source
-        arriving = [
-            (graph.op("add", s, graph.op("mul", a, move)), size)
-            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
-        ]
-        seed, moving = self.seeds[j], source.time(arriving, move)
-        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
+        graph = self.source.graph
+        arriving, of = self._arriving(j, before, move)
         changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
         state, left = graph.joined(arriving), graph.joined(list(behind))
         jumped = []
@@ -251,6 +250,39 @@ class Saltation:
             moved = graph.op("sub", moved, graph.op("mul", graph.item(left, k), move))
             jumped.append((graph.op("select", broken, graph.const(0.0), moved), 1))
         return jumped
+
+    def _arriving(
+        self, j: int, before: Sequence[SomeRows], move: Expr
+    ) -> tuple[list[SomeRows], dict[str, Taken]]:
+        """Return where all states go at the time that moves, S + f- t*', and everything."""
+        graph, seed = self.source.graph, self.seeds[j]
+        arriving = [
+            (graph.op("add", s, graph.op("mul", a, move)), size)
+            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
+        ]
+        moving = self.source.time(arriving, move)
+        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
+        return arriving, of
+
+    def _driven_across(
+        self, j: int, before: Sequence[SomeRows], behind: Sequence[SomeRows], move: Expr
+    ) -> dict[int, Expr]:
+        """Return the derivatives of driven memories behind a condition, by their states."""
+        # What drives them may jump there: first they are what has driven them until then.
+        graph, source, driven = self.source.graph, self.source, self.source.driven
+        if not driven:
+            return {}
+        becomes = list(driven.values())
+        earlier = dict(
+            zip(driven, replaced_parts(graph, becomes, self.sides.before), strict=True)
+        )
+        _, of = self._arriving(j, before, move)
+        changes = self._through(source.with_states(becomes, earlier), of)
+        left = graph.joined(list(behind))
+        return {
+            m: graph.op("sub", change, graph.op("mul", graph.item(left, m), move))
+            for m, change in zip(driven, changes, strict=True)
+        }
 
     def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
         """Return the derivatives of expressions, with memories as they are kept."""
