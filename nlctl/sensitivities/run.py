@@ -130,11 +130,11 @@ def _start(
         return start, {}
     arrays = _beginning(differentiated, run, u, start, p)
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
-    driven = list(sides.source.driven)
-    arrays["x"][driven, 0] = x0[driven]  # from where they are moved
+    memories = [*sides.source.driven, *sides.source.catching]
+    arrays["x"][memories, 0] = x0[memories]  # from where they are moved
     for j in range(places.by):
         pieces = [(e, 1) for e in differentiated.saltation.at_start(j).values()]
-        rows = [places.derivative(j) + m for m in driven]
+        rows = [places.derivative(j) + m for m in memories]
         start[rows] = _values(differentiated, pieces, arrays)
     return start, arrays
 

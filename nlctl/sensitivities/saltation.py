@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
@@ -27,8 +27,10 @@ from .source import EquationParts
 
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
+_UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
 _FAR = 1e300
 _WAY = "way"  # the array that stands for the derivatives of the states
+_NOW = "now"  # and the one for memories behind a jump
 _STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 
@@ -68,7 +70,8 @@ class Saltation:
         before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
-        when = self._when_left(graph.op("or", jumps, sent))
+        switches = [self._switches(m) for m in source.catching]
+        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
@@ -77,8 +80,8 @@ class Saltation:
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
                 states.append((s, size))
-            driven = self._driven_across(j, before, behind, move)
-            for s, size in rows_replaced(graph, states, driven):
+            across = self._across(j, before, behind, move)
+            for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
         happens = [(when.apart, 1), (when.grazes, 1), (graph.op("and", when.happens, sent), 1)]
@@ -112,7 +115,10 @@ class Saltation:
         rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
-        sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
+        pairs = [(e, new) for (e, _), new in zip(source.arriving, later, strict=True)]
+        # what is reset to where it has fallen has moved by as little as a step ends behind that
+        atol = graph.leaf("p", source.extended.slot("atol").offset, None)
+        sent = self._differ(pairs, graph.op("mul", graph.const(_UNSEEN), atol))
         when = self._when_fallen(guards)
         together = graph.op("lt", self.sides.margin, graph.const(0.0))
         broken, after = graph.op("or", when.grazes, together), []
@@ -178,9 +184,9 @@ class Saltation:
 
     def at_start(self, j: int) -> dict[int, Expr]:
         """Return derivatives of memories that a run begins by driving, by their states."""
-        driven = self.source.driven
-        changes = self.source.changes(list(driven.values()), self.seeds[j])
-        return dict(zip(driven, changes, strict=True))
+        become = self.source.driven | self.source.catching
+        changes = self.source.changes(list(become.values()), self.seeds[j])
+        return dict(zip(become, changes, strict=True))
 
     # -- states ----------------------------------------------------------------------------------
 
@@ -242,7 +248,7 @@ class Saltation:
         """Return R' (S + f- t*') - f+ t*' of all states."""
         graph = self.source.graph
         arriving, of = self._arriving(j, before, move)
-        changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
+        changes = dict(zip(rows, self._through(list(rows.values()), of, move), strict=True))
         state, left = graph.joined(arriving), graph.joined(list(behind))
         jumped = []
         for k in range(self.places.states):
@@ -260,33 +266,52 @@ class Saltation:
             (graph.op("add", s, graph.op("mul", a, move)), size)
             for (s, size), (a, _) in zip(self._states(j), before, strict=True)
         ]
-        moving = self.source.time(arriving, move)
+        moving = self.source.time(arriving, self._time)
         of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
         return arriving, of
 
-    def _driven_across(
+    def _across(
         self, j: int, before: Sequence[SomeRows], behind: Sequence[SomeRows], move: Expr
     ) -> dict[int, Expr]:
-        """Return the derivatives of driven memories behind a condition, by their states."""
+        """Return the derivatives of memories behind a condition, by their states."""
         # What drives them may jump there: first they are what has driven them until then.
         graph, source, driven = self.source.graph, self.source, self.source.driven
-        if not driven:
+        if not driven and not source.catching:
             return {}
         becomes = list(driven.values())
-        earlier = dict(
-            zip(driven, replaced_parts(graph, becomes, self.sides.before), strict=True)
-        )
+        earlier = dict(zip(driven, replaced_parts(graph, becomes, self.sides.before), strict=True))
+        now = {m: graph.node("leaf", data=(_NOW, m, 0), size=None, varies=True)
+               for m in source.switched} | source.catching  # fmt: skip
+        after = [*source.with_states(becomes, {**now, **earlier}), *source.catching.values()]
         _, of = self._arriving(j, before, move)
-        changes = self._through(source.with_states(becomes, earlier), of)
+        changes = self._through(after, of, move)
         left = graph.joined(list(behind))
-        return {
+        rows = {
             m: graph.op("sub", change, graph.op("mul", graph.item(left, m), move))
-            for m, change in zip(driven, changes, strict=True)
+            for m, change in zip(driven, changes, strict=False)
         }
+        for m, change in zip(source.catching, changes[len(driven) :], strict=True):
+            still = graph.leaf("x", self.places.derivative(j) + m, None)
+            rows[m] = graph.op("select", self._switches(m), change, still)
+        return rows
 
-    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
+    def _switches(self, m: int) -> Expr:
+        """Return whether a memory has just become another."""
+        return self.source.graph.op(
+            "ne", self.source.graph.leaf("x", m, None), self.sides.memories[m]
+        )
+
+    @property
+    def _time(self) -> Expr:
+        """What stands for the derivative of the time."""
+        return self.source.graph.node("leaf", data=(_WAY, -1, 0), size=None, varies=True)
+
+    def _through(
+        self, exprs: Sequence[Expr], of: Mapping[str, Taken], move: Expr
+    ) -> list[Expr]:
         """Return the derivatives of expressions, with memories as they are kept."""
-        # The derivatives of the states are put in last: what they say of memories stays.
+        # The derivatives of the states and of the time are put in last: what they say of memories
+        # stays.
         graph, source = self.source.graph, self.source
 
         def place(start: int, step: int, size: int | None) -> Expr | None:
@@ -296,8 +321,14 @@ class Saltation:
 
         zero = graph.const(0.0)
         kept = self.sides.kept(source.changes(exprs, Direction(of={**of, "x": place})))
-        leaves = [e for e in needed(kept) if e.op == "leaf" and e.data[0] == _WAY]
-        ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
+        leaves = [e for e in needed(kept) if e.op == "leaf" and e is not self._time]
+        ways = {
+            leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero
+            for leaf in leaves
+            if leaf.data[0] == _WAY
+        }
+        ways |= {e: graph.leaf("x", e.data[1], None) for e in leaves if e.data[0] == _NOW}
+        ways[self._time] = move
         return replaced_parts(graph, kept, ways)
 
     def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
@@ -322,8 +353,10 @@ class Saltation:
         changed = source.with_states([e for e, _ in pieces], instead)
         return [(e, size) for e, (_, size) in zip(changed, pieces, strict=True)]
 
-    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]]) -> Expr:
-        """Return whether expressions differ by more than rounding."""
+    def _differ(
+        self, pairs: Sequence[tuple[Expr, SomeRows]], unseen: Expr | None = None
+    ) -> Expr:
+        """Return whether expressions differ by more than rounding, or than what is not seen."""
         graph = self.source.graph
         apart = extent = graph.const(0.0)
         for a, (b, size) in pairs:
@@ -333,7 +366,8 @@ class Saltation:
             parts = [graph.sum(e, size) if size > 1 else e for e in sizes]
             apart = graph.op("add", apart, parts[0])
             extent = graph.op("add", extent, graph.op("add", *parts[1:]))
-        return graph.op("gt", apart, graph.op("mul", graph.const(_NOTICED), extent))
+        least = graph.op("mul", graph.const(_NOTICED), extent)
+        return graph.op("gt", apart, least if unseen is None else graph.op("add", least, unseen))
 
     def _first(self, place: int, happens: Expr) -> Expr:
         """Return when something has first happened, now at the latest if it does."""
