@@ -26,6 +26,7 @@ from .sides import KeptSide, KeptSides
 from .source import EquationParts
 
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
+_AT_REST = 1e2  # times what is passed at once: a time that moves by less stands still
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
 _UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
 _FAR = 1e300
@@ -93,9 +94,13 @@ class Saltation:
 
     def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
         """Return numbers as they are behind all break points of t that are passed at once."""
+        # Only what is of t alone: what states have just crossed could be as near.
         graph, t = self.source.graph, self.source.graph.leaf("t", 0, None)
         behind = graph.op("add", t, self._rounding)
-        exprs = replaced_parts(graph, [e for e, _ in rows], {t: behind})
+        timed = [side for side in self.sides.sides if side.timed]
+        nodes = [e for s in timed for e in (s.node, s.here.now, s.before.now) if e is not None]
+        later = dict(zip(nodes, replaced_parts(graph, nodes, {t: behind}), strict=True))
+        exprs = replaced_parts(graph, [e for e, _ in rows], later)
         return [(e, size) for e, (_, size) in zip(exprs, rows, strict=True)]
 
     @property
@@ -457,12 +462,13 @@ class Saltation:
             grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
         grazes = graph.op("and", grazes, graph.op("not", moving))
         apart = happens = no
+        agree, still = graph.const(_AGREE), graph.op("mul", graph.const(_AT_REST), self._rounding)
         for cause in causes:
             met = graph.op("and", cause.met, graph.op("not", cause.grazes))
             for a, b in zip(cause.moves, moves, strict=True):
                 gap = graph.op("absolute", graph.op("sub", a, b))
                 size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
-                differs = graph.op("gt", gap, graph.op("mul", graph.const(_AGREE), size))
+                differs = graph.op("gt", gap, graph.op("add", still, graph.op("mul", agree, size)))
                 apart = graph.op("or", apart, graph.op("and", met, differs))
         for move in moves:
             happens = graph.op("or", happens, graph.op("ne", move, zero))
