@@ -26,8 +26,8 @@ from .schedule import Extended, extended, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
-# How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says, or
-# as the part over which it is seen whether a memory turns.
+# How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says,
+# or as the part over which it is seen whether a memory turns.
 _LATE, _AHEAD = 0.5, 1e-4
 _PASSED = 1e-14  # of the times: break points of t that are as close are passed together
 

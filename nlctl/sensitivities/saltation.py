@@ -311,9 +311,7 @@ class Saltation:
         """What stands for the derivative of the time."""
         return self.source.graph.node("leaf", data=(_WAY, -1, 0), size=None, varies=True)
 
-    def _through(
-        self, exprs: Sequence[Expr], of: Mapping[str, Taken], move: Expr
-    ) -> list[Expr]:
+    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken], move: Expr) -> list[Expr]:
         """Return the derivatives of expressions, with memories as they are kept."""
         # The derivatives of the states and of the time are put in last: what they say of memories
         # stays.
@@ -358,9 +356,7 @@ class Saltation:
         changed = source.with_states([e for e, _ in pieces], instead)
         return [(e, size) for e, (_, size) in zip(changed, pieces, strict=True)]
 
-    def _differ(
-        self, pairs: Sequence[tuple[Expr, SomeRows]], unseen: Expr | None = None
-    ) -> Expr:
+    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]], unseen: Expr | None = None) -> Expr:
         """Return whether expressions differ by more than rounding, or than what is not seen."""
         graph = self.source.graph
         apart = extent = graph.const(0.0)

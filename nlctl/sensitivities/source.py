@@ -82,8 +82,8 @@ class EquationParts:
         """Return what a memory becomes by what those of other blocks have become."""
         nodes = self.extended.schedule.nodes
         (block,) = (n for n in nodes if n.state_offset <= m < n.state_offset + n.size)
-        own = range(block.state_offset, block.state_offset + block.size)
-        others = {k: expr for k, expr in switching.items() if k not in own}
+        inside = range(block.state_offset, block.state_offset + block.size)
+        others = {k: expr for k, expr in switching.items() if k not in inside}
         return self.with_states([become], others)[0]
 
     def _is_caught(self, expr: Expr) -> bool:

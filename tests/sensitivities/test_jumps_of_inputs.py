@@ -59,7 +59,7 @@ def test_play_behind_a_jump(signal, by_T, slope):
 
 
 def test_play_behind_square_waves():
-    """v = A sign(sin(w t + f)) -+ c behind each edge at t_k, 4 of them: y moves by their heights."""
+    """v = A sign(sin(w t + f)) -+ c behind each of four edges: y moves by their heights."""
     loop = driven(
         lambda t, p: p["A"] * np.sign(np.sin(p["w"] * t + p["f"])), play(0.25),
         {"A": 1.0, "w": 4.0, "f": 0.3},
@@ -83,7 +83,7 @@ def test_play_behind_square_waves():
         lambda t, T, a: np.piecewise(t, [t < T, t >= T], [lambda s: s, lambda s: -a]),
         lambda t, T, a: np.select([t < T, t >= T], [t, -a], 5.0),
         lambda t, T, a: t if t < T else (-a if t >= T else 5.0),
-        lambda t, T, a: np.where(T > t, t, 0.0) - a * np.heaviside(t - T, 1.0),
+        lambda t, T, a: np.where(t < T, t, 0.0) - a * np.heaviside(t - T, 1.0),
     ],
     ids=["< and >", "<= and >=", "piecewise", "select", "if", "heaviside"],
 )
@@ -171,7 +171,7 @@ def test_what_a_reset_leaves_continuous_goes_through_a_delay():
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10, 1e-12])
 def test_kinks_that_blocks_declare(rtol):
-    """v' = min(K (u - v), rise) leaves its limit at t*, and v = u - 1 / K + ... decays from there."""
+    """v' = min(K (u - v), rise) leaves its limit at t*, and u - v decays from there on."""
     rise, K, slope = 2.0, 50.0, 1.0
     source = ct.nlsys(
         None, lambda t, x, u, p: [p["h"] + slope * t], inputs=0, outputs=["u"], params={"h": 1.0},

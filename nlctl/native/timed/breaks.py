@@ -16,8 +16,8 @@ _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
 # Of the times: on either side of a switch nothing is evaluated that is as close.  Machine code
-# contracts products and sums, and may switch some last digits earlier or later than the values here;
-# a memory that has seen the other side too early, or too late, goes the wrong way for good.
+# contracts products and sums, and may switch some last digits earlier or later than values here; a
+# memory that has seen the other side too early, or too late, goes the wrong way for good.
 # Integrators pass break points that are 1e-14 of the times apart at once.
 _DOUBTFUL = 4e-15
 

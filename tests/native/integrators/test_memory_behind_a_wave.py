@@ -23,8 +23,8 @@ def test_every_frequency(wave, actuator, behind):
     # The root is one of floats, and the machine's product and sum may be contracted: which of them
     # is the first behind the jump depends on w.
     source = ct.nlsys(
-        None, lambda t, x, u, p: [(0.9 + 0.18 * t) * wave(np.sin(p["w"] * t + 0.3))], inputs=0, outputs=["u"],
-        params={"w": 4.0}, name="source",
+        None, lambda t, x, u, p: [(0.9 + 0.18 * t) * wave(np.sin(p["w"] * t + 0.3))], inputs=0,
+        outputs=["u"], params={"w": 4.0}, name="source",
     )  # fmt: skip
     loop = nlctl.compile(
         nlctl.interconnect({"source": source, "actuator": actuator}, outputs=["v"])
