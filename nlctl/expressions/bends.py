@@ -20,14 +20,13 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
     """Return whether nothing that expressions are made of jumps at a condition, with such p."""
     if condition.op not in (*ORDERS, *_SIDES, "copysign") or condition.size is not None:
         return False
-    numbers = [graph.number(arg) for arg in condition.args]
-    one = numbers[1 if condition.op == "copysign" else 0]
-    other = numbers[1] if condition.op in ORDERS else graph.const(0.0)
+    one, other = _compared(graph, condition)
     on_it = {one: other} if one.varies else {other: one}
-    there = {**on_it, **_free(graph, roots, condition, on_it)}
+    tied = [n for n in needed(roots) if _is_tied(graph, n, (one, other))]
+    there = {**on_it, **_free(graph, roots, tied, on_it, p)}
     sides = [
-        replaced_parts(graph, roots, {**there, condition: value})
-        for value in _values(graph, condition, there)
+        replaced_parts(graph, roots, {**there, **_on_side(graph, tied, there, one, above)})
+        for above in (True, False)
     ]
     pairs = [pair for pair in zip(*sides, strict=True) if pair[0] is not pair[1]]
     exprs = [expr for pair in pairs for expr in pair]
@@ -40,31 +39,68 @@ def only_bends(graph: Graph, roots: Sequence[Expr], condition: Expr, p: np.ndarr
         return all(np.all(abs(a - b) <= _SAME * (1 + abs(a) + abs(b))) for a, b in apart)
 
 
-def _values(graph: Graph, condition: Expr, there: Mapping[Expr, Expr]) -> list[Expr]:
-    """Return what a condition is on either side of where it switches."""
-    if condition.op == "copysign":
-        (given,) = replaced_parts(graph, condition.args[:1], there)
-        size = graph.op("absolute", graph.number(given))
-        return [size, graph.op("neg", size)]
-    return [graph.const(side) for side in _SIDES.get(condition.op, (True, False))]
+def _compared(graph: Graph, condition: Expr) -> tuple[Expr, Expr]:
+    """Return the two numbers of which a condition asks which is larger."""
+    numbers = [graph.number(arg) for arg in condition.args]
+    one = numbers[1 if condition.op == "copysign" else 0]
+    return one, numbers[1] if condition.op in ORDERS else graph.const(0.0)
+
+
+def _is_tied(graph: Graph, node: Expr, numbers: tuple[Expr, Expr]) -> bool:
+    """Return whether a condition asks which of these two numbers is larger."""
+    if node.op not in (*ORDERS, *_SIDES, "copysign"):
+        return False
+    return _compared(graph, node) in (numbers, numbers[::-1])
+
+
+def _on_side(
+    graph: Graph, tied: Sequence[Expr], there: Mapping[Expr, Expr], one: Expr, above: bool
+) -> dict[Expr, Expr]:
+    """Return what conditions on the same two numbers are where `one` is above the other."""
+    values = {}
+    for node in tied:
+        larger = above == (_compared(graph, node)[0] is one)
+        if node.op == "copysign":
+            (given,) = replaced_parts(graph, node.args[:1], there)
+            size = graph.op("absolute", graph.number(given))
+            values[node] = size if larger else graph.op("neg", size)
+        elif node.op in _SIDES:
+            values[node] = graph.const(_SIDES[node.op][0 if larger else 1])
+        else:
+            values[node] = graph.const(larger == (node.op in ("gt", "ge")))
+    return values
 
 
 def _free(
-    graph: Graph, roots: Sequence[Expr], condition: Expr, on_it: Mapping[Expr, Expr]
+    graph: Graph,
+    roots: Sequence[Expr],
+    tied: Sequence[Expr],
+    on_it: Mapping[Expr, Expr],
+    p: np.ndarray,
 ) -> dict[Expr, Expr]:
     """Return what stands for the other conditions: true or false, whatever they ask for."""
     # What is met only rarely would not be met by values at random. Only those that parameters alone
-    # decide, where this condition switches, are what they are.
-    others = [n for n in needed(roots) if n.op in COMPARISONS and n is not condition]
+    # decide, where this condition switches, are what they are; unless they switch there, too.
+    others = [n for n in needed(roots) if n.op in COMPARISONS and n not in tied]
     truths: dict[Expr, Expr] = {}
     row = 0
     for node, there in zip(others, replaced_parts(graph, others, on_it), strict=True):
         leaves = (e for e in needed([there]) if e.op in ("leaf", "call", "solve"))
-        if any(leaf.op != "leaf" or leaf.data[0] != "p" for leaf in leaves):
+        decided = all(leaf.op == "leaf" and leaf.data[0] == "p" for leaf in leaves)
+        if not decided or _is_met(there, p):
             where = (_TRUTHS, row, 1 if node.size else 0)
             truth = graph.node("leaf", data=where, size=node.size, varies=True)
             truths[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
     return truths
+
+
+def _is_met(comparison: Expr, p: np.ndarray) -> bool:
+    """Return whether a comparison of parameters is of equal ones, whatever they are."""
+    if comparison.op not in ORDERS:
+        return False
+    a, b = evaluate_expressions(list(comparison.args), _at_random([comparison], p))
+    with np.errstate(invalid="ignore"):
+        return bool(np.all(abs(a - b) <= _SAME * (abs(a) + abs(b))))
 
 
 def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:

@@ -113,6 +113,9 @@ class Fit:
         lines += [f"  {name} = {value:.6g} +- {error:.2g}" for name, value, error in rows]
         if self.unidentifiable:
             lines.append(f"  not identifiable from these data: {', '.join(self.unidentifiable)}")
+        lines += [f"  {lack}: data behind that say nothing" for lack in self.response.missing]
+        if not self.success:
+            lines.append(f"  the search has not converged: {self.message}")
         return "\n".join(lines)
 
 

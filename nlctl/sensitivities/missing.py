@@ -188,6 +188,8 @@ class _Run:
         """What has happened to the diagram itself: when, and block and which."""
         conditions, happened = self.compiled.equations.conditions, self.trajectory.happened
         labels = row_labels(self.compiled, conditions)
+        ordered = self.differentiated.sides.source.ordered
+        labels = [*(labels[k] for k in ordered), *labels[len(ordered) :]]
         first = self.compiled.program.switching + conditions.rows
         watching = len(self.differentiated.saltation.turning) + bool(
             self.differentiated.sides.source.driven

@@ -18,6 +18,7 @@ from ..expressions.graph import Expr
 from ..native import Compiled
 from ..native.diagram.program import Program
 from ..native.equations.blocks import Equations
+from ..native.equations.located import Located
 from .directions import Direction, SomeRows
 from .names import Observed, StatePlaces, VariedQuantity
 from .saltation import Saltation
@@ -25,7 +26,10 @@ from .schedule import Extended, extended, with_derivatives
 from .sides import KeptSides, sides_of
 from .source import EquationParts, equation_parts
 
-_LATE = 0.5  # of a step and the root of the relative tolerance: how far behind a turn one ends
+# How far behind a turn a step ends, of a step: as far as the root of the relative tolerance says,
+# or as the part over which it is seen whether a memory turns.
+_LATE, _AHEAD = 0.5, 1e-4
+_PASSED = 1e-14  # of the times: break points of t that are as close are passed together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,10 +50,12 @@ def parameters_with(
     p: np.ndarray,
     scale: np.ndarray,
     settings: Any,
-    span: float,
+    span: tuple[float, float],
 ) -> np.ndarray:
     """Return all parameters of a program with derivatives."""
-    size, late = extended_program.slot("late").offset + 1, _LATE * np.sqrt(settings.rtol) * span
+    size = extended_program.slot("rounding").offset + 1
+    late = _LATE * max(np.sqrt(settings.rtol), _AHEAD) * (span[1] - span[0])
+    rounding = _PASSED * max(map(abs, span))
     whole = np.concatenate([p, np.zeros(size - p.size)])
     layout = extended_program.layout
     for j, quantity in enumerate(quantities):
@@ -59,7 +65,10 @@ def parameters_with(
             whole[slots["delay"].offset] = p[original["delay"].offset]
             if quantity.place == original["before"].offset:
                 whole[slots["before"].offset] = scale[j]
-    given = {"scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late}
+    given = {
+        "scale": scale, "rtol": settings.rtol, "atol": settings.atol, "late": late,
+        "rounding": rounding,
+    }  # fmt: skip
     for name, value in given.items():
         slot = extended_program.slot(name)
         whole[slot.offset : slot.offset + slot.size] = value
@@ -77,7 +86,7 @@ def with_its_derivatives(
     by, n = len(quantities), compiled.system.nstates or 0
     combinations = [s.combination for s in signals if s.combination is not None]
     extended_program = extended(compiled, combinations, by)
-    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, 1.0)
+    whole = parameters_with(extended_program, quantities, p, np.ones(by), settings, (0.0, 1.0))
     source = equation_parts(compiled, extended_program, whole)
     sides = sides_of(source, n * (1 + by))
     places = StatePlaces(states=n, by=by, branches=sides.rows)
@@ -164,6 +173,7 @@ class _Maker:
         program = replace(
             before,
             layout=source.extended.layout,
+            switching=source.behind,
             guards=(*guards, *([owner] if self.sides.watches else [])),
             jumping=tuple(jumping),
             sampled=(*before.sampled, *sampled, *([places.last] if before.sampled else [])),
@@ -174,9 +184,8 @@ class _Maker:
     def equations(self) -> Equations:
         """Return what the program computes."""
         equations = self.source.equations
-        located = tuple(
-            replace(condition, bends=False) for condition in equations.conditions.located
-        )
+        located = (*self._declared(), *equations.conditions.located)
+        located = tuple(replace(condition, bends=False) for condition in located)
         results: dict[str, list[tuple[int, Tracer]]] = {
             "dx": self._flow(),
             "g": self._switching(),
@@ -191,6 +200,12 @@ class _Maker:
         return replace(
             equations, results=results, conditions=replace(equations.conditions, located=located)
         )
+
+    def _declared(self) -> list[Located]:
+        """Return what blocks without memories declare, to be located as conditions are."""
+        # A kink of the states is a jump of the rates of their derivatives.
+        functions = [self.source.switching[k] for k in self.source.ordered[self.source.behind :]]
+        return [Located(function=e, block="", what="", bends=False) for e in functions]
 
     # -- results ---------------------------------------------------------------------------------
 
@@ -230,8 +245,13 @@ class _Maker:
     def _switching(self) -> list[tuple[int, Tracer]]:
         source = self.source
         first = source.program.switching + source.equations.conditions.rows
-        switching = [(row, array) for row, array in source.equations.results["g"] if row < first]
-        switching = [(row, array) for row, array in switching if array.size]
+        declared = [(source.switching[k], 1) for k in source.ordered]
+        switching = self._rows(0, declared)
+        switching += [
+            (row, array)
+            for row, array in source.equations.results["g"]
+            if source.program.switching <= row < first and array.size
+        ]
         rows = [apart for apart, _ in self.saltation.turning]
         rows += [self.sides.driven] if source.driven else []
         rows += source.guards

@@ -58,7 +58,7 @@ def differentiated_run(compiled: Compiled, run: RunWithDerivatives) -> Sensitivi
     differentiated = _compiled(compiled, signals, quantities, p, run.settings)
     values = [p[q.place] if q.state < 0 else x0[q.state] for q in quantities]
     scale = np.array([abs(v) or 1.0 for v in values])
-    span = float(run.times[-1] - run.times[0])
+    span = float(run.times[0]), float(run.times[-1])
     whole = parameters_with(differentiated.extended, quantities, p, scale, run.settings, span)
     start, beginning = _start(differentiated, quantities, run, (u, x0, scale), whole)
     integrated = trajectory(_course(differentiated, run, u), start, whole)
@@ -130,11 +130,11 @@ def _start(
         return start, {}
     arrays = _beginning(differentiated, run, u, start, p)
     start[places.kept : places.together] = _values(differentiated, sides.now, arrays)
-    driven = list(sides.source.driven)
-    arrays["x"][driven, 0] = x0[driven]  # from where they are moved
+    memories = [*sides.source.driven, *sides.source.catching]
+    arrays["x"][memories, 0] = x0[memories]  # from where they are moved
     for j in range(places.by):
         pieces = [(e, 1) for e in differentiated.saltation.at_start(j).values()]
-        rows = [places.derivative(j) + m for m in driven]
+        rows = [places.derivative(j) + m for m in memories]
         start[rows] = _values(differentiated, pieces, arrays)
     return start, arrays
 

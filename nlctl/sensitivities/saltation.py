@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial, reduce
 
 from ..expressions.bends import replaced_parts
 from ..expressions.graph import Expr, Graph, needed
@@ -26,9 +26,12 @@ from .sides import KeptSide, KeptSides
 from .source import EquationParts
 
 _AGREE = 1e-6  # derivatives of a time by two conditions that are one
+_AT_REST = 1e2  # times what is passed at once: a time that moves by less stands still
 _NOTICED = 1e-7  # of the rates: a smaller jump is rounding
+_UNSEEN = 1e3  # times the absolute tolerance: jumps that nobody sees
 _FAR = 1e300
 _WAY = "way"  # the array that stands for the derivatives of the states
+_NOW = "now"  # and the one for memories behind a jump
 _STILL = 1e-4  # of squares of what is known of a number: it does not move
 
 
@@ -68,19 +71,42 @@ class Saltation:
         before = source.moving(self.sides.flow_before, self.sides.earlier(source.committed))
         behind = source.moving(source.flow, source.committed)
         jumps = self._differ([(e, piece) for (e, _), piece in zip(before, behind, strict=True)])
-        when = self._when_left(graph.op("or", jumps, sent))
+        switches = [self._switches(m) for m in source.catching]
+        when = self._when_left(reduce(partial(graph.op, "or"), [jumps, sent, *switches]))
         rows: list[SomeRows] = []
         broken = graph.op("or", when.grazes, when.apart)
         for j, move in enumerate(when.moves):
+            states = []
             for (s, size), (a, _), (b, _) in zip(self._states(j), before, behind, strict=True):
                 if a is not b:
                     s = graph.op("add", s, graph.op("mul", graph.op("sub", a, b), move))
+                states.append((s, size))
+            across = self._across(j, before, behind, move)
+            for s, size in rows_replaced(graph, states, across):
                 rows.append((graph.op("select", broken, graph.const(0.0), s), size))
         rows += self.sides.now
-        rows.append((self._first(places.together, when.apart), 1))
-        rows.append((self._first(places.grazing, when.grazes), 1))
-        rows.append((self._first(places.jumped, graph.op("and", when.happens, sent)), 1))
+        happens = [(when.apart, 1), (when.grazes, 1), (graph.op("and", when.happens, sent), 1)]
+        *rows, apart, grazes, jumped = self._behind_breaks([*rows, *happens])
+        rows.append((self._first(places.together, apart[0]), 1))
+        rows.append((self._first(places.grazing, grazes[0]), 1))
+        rows.append((self._first(places.jumped, jumped[0]), 1))
         return rows
+
+    def _behind_breaks(self, rows: Sequence[SomeRows]) -> list[SomeRows]:
+        """Return numbers as they are behind all break points of t that are passed at once."""
+        # Only what is of t alone: what states have just crossed could be as near.
+        graph, t = self.source.graph, self.source.graph.leaf("t", 0, None)
+        behind = graph.op("add", t, self._rounding)
+        timed = [side for side in self.sides.sides if side.timed]
+        nodes = [e for s in timed for e in (s.node, s.here.now, s.before.now) if e is not None]
+        later = dict(zip(nodes, replaced_parts(graph, nodes, {t: behind}), strict=True))
+        exprs = replaced_parts(graph, [e for e, _ in rows], later)
+        return [(e, size) for e, (_, size) in zip(exprs, rows, strict=True)]
+
+    @property
+    def _rounding(self) -> Expr:
+        """How close break points of t are that are passed at once."""
+        return self.source.graph.leaf("p", self.source.extended.slot("rounding").offset, None)
 
     def at_reset(
         self, begin: int, states: Sequence[SomeRows], guards: Sequence[Expr]
@@ -94,7 +120,10 @@ class Saltation:
         rows |= self._driven_after(rows)
         behind = self._after(rows, source.moving(source.flow, source.committed))
         later = self._after(rows, source.arriving)
-        sent = self._differ([(e, new) for (e, _), new in zip(source.arriving, later, strict=True)])
+        pairs = [(e, new) for (e, _), new in zip(source.arriving, later, strict=True)]
+        # what is reset to where it has fallen has moved by as little as a step ends behind that
+        atol = graph.leaf("p", source.extended.slot("atol").offset, None)
+        sent = self._differ(pairs, graph.op("mul", graph.const(_UNSEEN), atol))
         when = self._when_fallen(guards)
         together = graph.op("lt", self.sides.margin, graph.const(0.0))
         broken, after = graph.op("or", when.grazes, together), []
@@ -160,9 +189,9 @@ class Saltation:
 
     def at_start(self, j: int) -> dict[int, Expr]:
         """Return derivatives of memories that a run begins by driving, by their states."""
-        driven = self.source.driven
-        changes = self.source.changes(list(driven.values()), self.seeds[j])
-        return dict(zip(driven, changes, strict=True))
+        become = self.source.driven | self.source.catching
+        changes = self.source.changes(list(become.values()), self.seeds[j])
+        return dict(zip(become, changes, strict=True))
 
     # -- states ----------------------------------------------------------------------------------
 
@@ -222,14 +251,9 @@ class Saltation:
         broken: Expr,
     ) -> list[SomeRows]:
         """Return R' (S + f- t*') - f+ t*' of all states."""
-        graph, source = self.source.graph, self.source
-        arriving = [
-            (graph.op("add", s, graph.op("mul", a, move)), size)
-            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
-        ]
-        seed, moving = self.seeds[j], source.time(arriving, move)
-        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
-        changes = dict(zip(rows, self._through(list(rows.values()), of), strict=True))
+        graph = self.source.graph
+        arriving, of = self._arriving(j, before, move)
+        changes = dict(zip(rows, self._through(list(rows.values()), of, move), strict=True))
         state, left = graph.joined(arriving), graph.joined(list(behind))
         jumped = []
         for k in range(self.places.states):
@@ -238,9 +262,59 @@ class Saltation:
             jumped.append((graph.op("select", broken, graph.const(0.0), moved), 1))
         return jumped
 
-    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken]) -> list[Expr]:
+    def _arriving(
+        self, j: int, before: Sequence[SomeRows], move: Expr
+    ) -> tuple[list[SomeRows], dict[str, Taken]]:
+        """Return where all states go at the time that moves, S + f- t*', and everything."""
+        graph, seed = self.source.graph, self.seeds[j]
+        arriving = [
+            (graph.op("add", s, graph.op("mul", a, move)), size)
+            for (s, size), (a, _) in zip(self._states(j), before, strict=True)
+        ]
+        moving = self.source.time(arriving, self._time)
+        of = {**seed.of, **moving.of, "u": _sum(graph, seed.of["u"], moving.of["u"])}
+        return arriving, of
+
+    def _across(
+        self, j: int, before: Sequence[SomeRows], behind: Sequence[SomeRows], move: Expr
+    ) -> dict[int, Expr]:
+        """Return the derivatives of memories behind a condition, by their states."""
+        # What drives them may jump there: first they are what has driven them until then.
+        graph, source, driven = self.source.graph, self.source, self.source.driven
+        if not driven and not source.catching:
+            return {}
+        becomes = list(driven.values())
+        earlier = dict(zip(driven, replaced_parts(graph, becomes, self.sides.before), strict=True))
+        now = {m: graph.node("leaf", data=(_NOW, m, 0), size=None, varies=True)
+               for m in source.switched} | source.catching  # fmt: skip
+        after = [*source.with_states(becomes, {**now, **earlier}), *source.catching.values()]
+        _, of = self._arriving(j, before, move)
+        changes = self._through(after, of, move)
+        left = graph.joined(list(behind))
+        rows = {
+            m: graph.op("sub", change, graph.op("mul", graph.item(left, m), move))
+            for m, change in zip(driven, changes, strict=False)
+        }
+        for m, change in zip(source.catching, changes[len(driven) :], strict=True):
+            still = graph.leaf("x", self.places.derivative(j) + m, None)
+            rows[m] = graph.op("select", self._switches(m), change, still)
+        return rows
+
+    def _switches(self, m: int) -> Expr:
+        """Return whether a memory has just become another."""
+        return self.source.graph.op(
+            "ne", self.source.graph.leaf("x", m, None), self.sides.memories[m]
+        )
+
+    @property
+    def _time(self) -> Expr:
+        """What stands for the derivative of the time."""
+        return self.source.graph.node("leaf", data=(_WAY, -1, 0), size=None, varies=True)
+
+    def _through(self, exprs: Sequence[Expr], of: Mapping[str, Taken], move: Expr) -> list[Expr]:
         """Return the derivatives of expressions, with memories as they are kept."""
-        # The derivatives of the states are put in last: what they say of memories stays.
+        # The derivatives of the states and of the time are put in last: what they say of memories
+        # stays.
         graph, source = self.source.graph, self.source
 
         def place(start: int, step: int, size: int | None) -> Expr | None:
@@ -250,8 +324,14 @@ class Saltation:
 
         zero = graph.const(0.0)
         kept = self.sides.kept(source.changes(exprs, Direction(of={**of, "x": place})))
-        leaves = [e for e in needed(kept) if e.op == "leaf" and e.data[0] == _WAY]
-        ways = {leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero for leaf in leaves}
+        leaves = [e for e in needed(kept) if e.op == "leaf" and e is not self._time]
+        ways = {
+            leaf: of["x"](leaf.data[1], leaf.data[2], leaf.size) or zero
+            for leaf in leaves
+            if leaf.data[0] == _WAY
+        }
+        ways |= {e: graph.leaf("x", e.data[1], None) for e in leaves if e.data[0] == _NOW}
+        ways[self._time] = move
         return replaced_parts(graph, kept, ways)
 
     def _driven_after(self, rows: dict[int, Expr]) -> dict[int, Expr]:
@@ -276,8 +356,8 @@ class Saltation:
         changed = source.with_states([e for e, _ in pieces], instead)
         return [(e, size) for e, (_, size) in zip(changed, pieces, strict=True)]
 
-    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]]) -> Expr:
-        """Return whether expressions differ by more than rounding."""
+    def _differ(self, pairs: Sequence[tuple[Expr, SomeRows]], unseen: Expr | None = None) -> Expr:
+        """Return whether expressions differ by more than rounding, or than what is not seen."""
         graph = self.source.graph
         apart = extent = graph.const(0.0)
         for a, (b, size) in pairs:
@@ -287,7 +367,8 @@ class Saltation:
             parts = [graph.sum(e, size) if size > 1 else e for e in sizes]
             apart = graph.op("add", apart, parts[0])
             extent = graph.op("add", extent, graph.op("add", *parts[1:]))
-        return graph.op("gt", apart, graph.op("mul", graph.const(_NOTICED), extent))
+        least = graph.op("mul", graph.const(_NOTICED), extent)
+        return graph.op("gt", apart, least if unseen is None else graph.op("add", least, unseen))
 
     def _first(self, place: int, happens: Expr) -> Expr:
         """Return when something has first happened, now at the latest if it does."""
@@ -301,7 +382,9 @@ class Saltation:
         """Return how the time moves at which sides have been left; a clock's does not."""
         graph = self.source.graph
         last = graph.leaf("x", self.places.last, None)
-        free = graph.op("and", graph.op("ne", graph.leaf("t", 0, None), last), jumps)
+        ago = graph.op("absolute", graph.op("sub", graph.leaf("t", 0, None), last))
+        recent = graph.op("mul", graph.const(2.0), self._rounding)
+        free = graph.op("and", graph.op("gt", ago, recent), jumps)
         causes = []
         for side in self.sides.sides:
             for k in range(side.rows):
@@ -375,12 +458,13 @@ class Saltation:
             grazes = graph.op("or", grazes, graph.op("and", cause.met, cause.grazes))
         grazes = graph.op("and", grazes, graph.op("not", moving))
         apart = happens = no
+        agree, still = graph.const(_AGREE), graph.op("mul", graph.const(_AT_REST), self._rounding)
         for cause in causes:
             met = graph.op("and", cause.met, graph.op("not", cause.grazes))
             for a, b in zip(cause.moves, moves, strict=True):
                 gap = graph.op("absolute", graph.op("sub", a, b))
                 size = graph.op("add", graph.op("absolute", a), graph.op("absolute", b))
-                differs = graph.op("gt", gap, graph.op("mul", graph.const(_AGREE), size))
+                differs = graph.op("gt", gap, graph.op("add", still, graph.op("mul", agree, size)))
                 apart = graph.op("or", apart, graph.op("and", met, differs))
         for move in moves:
             happens = graph.op("or", happens, graph.op("ne", move, zero))

@@ -48,6 +48,10 @@ class EquationParts:
     committed: list[Expr]  # what each memory would become
     switched: frozenset[int]  # states of memories that jump, and are not driven
     owners: tuple[int, ...]  # the block of each switching function
+    # their rows, those of blocks with memories first, and how many these are: a step ends right
+    # behind where a memory may jump
+    ordered: tuple[int, ...]
+    behind: int
     p: np.ndarray  # parameters near which the equations are evaluated
 
     @property
@@ -60,6 +64,42 @@ class EquationParts:
         """The next values of driven memories, by their states."""
         pairs = zip(self.program.memory, self.committed, strict=True)
         return {m: expr for m, expr in pairs if m not in self.switched}
+
+    @cached_property
+    def catching(self) -> dict[int, Expr]:
+        """The next values of memories that catch a number where they switch, by their states."""
+        # A relay's side is one of two constants, whatever is differentiated by; a fault that is
+        # stuck at what a signal has been catches that.
+        pairs = zip(self.program.memory, self.committed, strict=True)
+        switching = {m: expr for m, expr in pairs if m in self.switched}
+        return {
+            m: self._behind_others(m, expr, switching)
+            for m, expr in switching.items()
+            if self._is_caught(expr)
+        }
+
+    def _behind_others(self, m: int, become: Expr, switching: Mapping[int, Expr]) -> Expr:
+        """Return what a memory becomes by what those of other blocks have become."""
+        nodes = self.extended.schedule.nodes
+        (block,) = (n for n in nodes if n.state_offset <= m < n.state_offset + n.size)
+        inside = range(block.state_offset, block.state_offset + block.size)
+        others = {k: expr for k, expr in switching.items() if k not in inside}
+        return self.with_states([become], others)[0]
+
+    def _is_caught(self, expr: Expr) -> bool:
+        """Return whether what a memory becomes moves with anything but memories."""
+        graph, memories = self.graph, self.program.memory
+
+        def of(start: int, step: int, size: int | None) -> Expr | None:
+            return graph.joined([(graph.const(1.0), 1)] * size) if size else graph.const(1.0)
+
+        def of_states(start: int, step: int, size: int | None) -> Expr | None:
+            rows = [start + step * i for i in range(size or 1)]
+            parts = [(graph.const(float(row not in memories)), 1) for row in rows]
+            return graph.joined(parts) if size else parts[0][0] if rows[0] not in memories else None
+
+        every = Direction(of={"t": of, "u": of, "p": of, "x": of_states})
+        return self.slopes([expr], every)[0] is not None
 
     @cached_property
     def flow(self) -> list[SomeRows]:
@@ -171,13 +211,15 @@ def equation_parts(compiled: Compiled, extended_program: Extended, p: np.ndarray
     nodes = compiled.schedule.nodes
     owners = [i for i, node in enumerate(nodes) for _ in range(count_switching_functions(node))]
     jump = [m for node in nodes if memory(node) and _jumps(node) for m in memory(node)]
+    ordered = sorted(range(len(owners)), key=lambda k: not memory(nodes[owners[k]]))
     return EquationParts(
         equations=computed, extended=extended_program, program=program,
         inputs=compiled.system.ninputs or 0,
         switching=[rows[k] for k in range(program.switching)],
         guards=[rows[first + k] for k in range(len(program.guards))],
         committed=list(_single(graph, computed.results["m"]).values()),
-        switched=frozenset(jump), owners=tuple(owners), p=p,
+        switched=frozenset(jump), owners=tuple(owners), ordered=tuple(ordered),
+        behind=sum(bool(memory(nodes[i])) for i in owners), p=p,
     )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from .worth import LOST_MARGIN, Runs, TuningProblem, Worth, checked_samples
 _SAMPLES = 4001  # of a run for which nobody asks when
 _FINER = 4  # times as many samples: whether margins are those of the run, or of where it is seen
 _SAME = 1e-3  # of a margin, or of a cost
+_ROUNDING = 1e-12  # of the last time
 _BETWEEN = 1e-2  # of a margin: how much lower it may be between samples
 
 
@@ -326,13 +327,25 @@ def _margins(spec: Any, cost: Any) -> tuple[MetricLike, ...]:
             )
     if not metrics and cost is None:
         raise ParameterError("tune needs at least one requirement or a cost, got neither")
+    keys = [metric.key for metric in metrics]
+    twice = next((key for key in keys if keys.count(key) > 1), None)
+    if twice is not None:
+        raise ParameterError(f"two requirements have the key '{twice}': give each one of its own")
     return metrics
 
 
 def _times(timepts: Any, margins: Sequence[Any]) -> np.ndarray:
     """Return when signals are sampled."""
     if timepts is not None:
-        return checked_times(timepts)
+        times = checked_times(timepts)
+        for metric in margins:
+            until = getattr(metric, "until", np.nan)
+            if until > times[-1] + _ROUNDING * abs(times[-1]):
+                raise ParameterError(
+                    f"requirement '{metric.key}' looks at signals until {until:g} s, and timepts "
+                    f"end at {times[-1]:g} s"
+                )
+        return times
     ends = [getattr(metric, "until", np.nan) for metric in margins]
     if not ends or not np.isfinite(ends).all() or not max(ends) > 0:
         raise ParameterError("tune needs timepts: what is asked does not say when a run ends")
@@ -416,6 +429,9 @@ def _start(runs: Runs, before: Worth) -> Iterator[str]:
 
 def _flat(runs: Runs) -> Iterator[str]:
     """Yield which requirements none of the gains moves."""
+    if _all_lost(runs):
+        yield "no run that was tried reaches its end: nothing is known of what is asked"
+        return
     tables = np.stack([worth.table for _, _, _, worth in runs.history])
     for j, metric in enumerate(runs.problem.metrics):
         values = tables[:, :, j]
@@ -429,9 +445,18 @@ def _flat(runs: Runs) -> Iterator[str]:
 def _idle(runs: Runs) -> Iterator[str]:
     """Yield which parameters nothing depends on."""
     names = [n for n, most in zip(runs.problem.names, runs.moved, strict=True) if most == 0.0]
-    if names:
+    if names and not _all_lost(runs):
         are = "are" if len(names) > 1 else "is"
         yield f"nothing that is asked depends on {', '.join(names)}, which {are} left at the start"
+
+
+def _all_lost(runs: Runs) -> bool:
+    """Return whether no run that was tried reaches its end."""
+    worths = [worth for _, _, _, worth in runs.history]
+    return all(
+        np.all(w.margins <= LOST_MARGIN) and not (w.has_cost and np.isfinite(w.cost))
+        for w in worths
+    )
 
 
 def _at_bounds(runs: Runs, cube: np.ndarray) -> Iterator[str]:

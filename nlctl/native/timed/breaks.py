@@ -15,6 +15,11 @@ _GRID = 8192  # places at which a condition is looked at that is not made of lin
 _PER_WAVE = 32  # of these for each wave of the fastest sine in it
 _MOST = 2_000_000
 _NEAR = 1e-9  # of the times: where a switch is sought around where it must be
+# Of the times: on either side of a switch nothing is evaluated that is as close.  Machine code
+# contracts products and sums, and may switch some last digits earlier or later than values here; a
+# memory that has seen the other side too early, or too late, goes the wrong way for good.
+# Integrators pass break points that are 1e-14 of the times apart at once.
+_DOUBTFUL = 4e-15
 
 Values = Callable[[Sequence[Expr], np.ndarray], list[np.ndarray]]
 # of times: one integer between two switches and another one behind
@@ -36,7 +41,7 @@ def break_points(
 
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
-    found = [np.zeros(0)]
+    found, doubt = [np.zeros(0)], _DOUBTFUL * max(map(abs, span))
     for condition in conditions:
         places, elements = _known(condition, lines), range(condition.size or 1)
         indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
@@ -46,11 +51,18 @@ def break_points(
                 indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
             if places is None:
-                found.append(_sought(indicator, span, fastest))
+                switched = _sought(indicator, span, fastest)
             else:
-                found.append(_exact(indicator, places, span))
+                switched = _exact(indicator, places, span)
+            switched = switched[(switched > span[0]) & (switched <= span[1])]
+            found += [switched - doubt, switched + doubt] if _is_computed(condition) else [switched]
     every = np.unique(np.concatenate(found))
     return every[(every > span[0]) & (every <= span[1])]
+
+
+def _is_computed(condition: Expr) -> bool:
+    """Return whether rounding has a say in when a condition switches: unless t is compared."""
+    return any(arg.varies and arg.op != "leaf" for arg in condition.args)
 
 
 def _known(condition: Expr, lines: dict[Expr, Lines]) -> np.ndarray | None:
