@@ -15,7 +15,7 @@ from inputs import pieces
 
 import nlctl
 
-COUNT, PERIOD = 20, 5.0  # pieces of throttle and brake, s
+COUNT, PERIOD = 40, 2.5  # pieces of throttle and brake, s
 KEEPING, CHASING, BRAKING = 0.0, 1.0, -1.0
 
 
@@ -135,5 +135,5 @@ def cars(**pedals: Any) -> Any:
 
 
 def plant() -> Any:
-    """Return the cars, the first of which has pedals that are constant for 5 s each."""
+    """Return the cars, the first of which has pedals that are constant for 2.5 s each."""
     return cars(throttle=pieces("throttle", COUNT, PERIOD), brake=pieces("brake", COUNT, PERIOD))

@@ -131,13 +131,13 @@ class _Run:
             )
             if np.any((now == 0.0) & (then == 0.0))
         ]
-        slopes = self.differentiated.sides.source.slopes
-        for name, seed in zip(self.names, self.differentiated.saltation.seeds, strict=True):
-            changes = slopes([level for level, _ in met], seed)
-            moves = self._values([change or zero for change in changes], later)
+        changes = [self._changes([level for level, _ in met], j) for j in range(len(self.names))]
+        moves = self._values([change or zero for row in changes for change in row], later)
+        for j, name in enumerate(self.names):
+            moved = moves[j * len(met) : (j + 1) * len(met)]
             parts = [
                 np.atleast_2d(zeros & (v != 0.0)).any(axis=0)
-                for v, (_, zeros) in zip(moves, met, strict=True)
+                for v, (_, zeros) in zip(moved, met, strict=True)
             ]
             times = at["t"][0][np.any([np.broadcast_to(v, at["t"].size) for v in parts], axis=0)]
             if parts and times.size:
@@ -148,6 +148,14 @@ class _Run:
                 with_respect_to=tuple(name for other, name in lacks if other == time),
             ) for time in sorted({time for time, _ in lacks})
         ]  # fmt: skip
+
+    def _changes(self, levels: list[Expr], j: int) -> list[Expr | None]:
+        """Return the derivatives of levels by a quantity, derived where they are first met."""
+        known, seed = self.differentiated.changes, self.differentiated.saltation.seeds[j]
+        new = [level for level in levels if (level, j) not in known]
+        slopes = self.differentiated.sides.source.slopes(new, seed)
+        known.update(zip(((level, j) for level in new), slopes, strict=True))
+        return [known[level, j] for level in levels]
 
     def _values(self, exprs: list[Expr], at: dict[str, np.ndarray]) -> list[np.ndarray]:
         equations = self.differentiated.sides.source.equations

@@ -8,7 +8,7 @@ with memories and samples what the derivative of these says, and jump at conditi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ class Differentiated:
     sides: KeptSides
     outputs: int  # number of the signals that are outputs
     saltation: Saltation
+    # derivatives of levels that a run was on, by the number of the quantity
+    changes: dict[tuple[Expr, int], Expr | None] = field(default_factory=dict)
 
 
 def parameters_with(

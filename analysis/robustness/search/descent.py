@@ -27,6 +27,9 @@ _SHORTEST_FIRST = 1 / 16  # descents begin with no shorter step
 _RESTARTS = 3  # times that simple signals are drawn in each round
 _KINDS = 3  # test signals before anything else, one of each kind: alternating, a step, constant
 _MOST_CONSTANT = 16  # test signals that are constant
+_STEPS_OF_ROUND = 40  # steps of one signal in each round
+_MOST_STEPS = 128  # of these altogether
+_APART = np.sqrt(2)  # times of steps differ by this factor, from one piece on
 _PIECE = re.compile(r"(.*)\[(\d+)\]")
 
 
@@ -42,15 +45,20 @@ def search_with_derivatives(
     # of a loop that is nearly linear the first order is right in the whole box: few runs show it
     shortest = 1.0 if pieces else _SHORTEST
     radius = _descend(search, derivatives, reasons, 0, 1.0, shortest)
+    steps = from_unit_cube(search.space, single_steps(search.space, rng))
     while search.left:
         for _ in range(_RESTARTS if pieces else 0):
             first = search.margins.size
             in_batches(search, "simple signals", _simple_signals(search.space, pieces, rng))
             radius = _descend(search, derivatives, reasons, first, radius)
         first = search.margins.size
+        for k in range(0, min(len(steps), _STEPS_OF_ROUND), len(_CHANGES)):
+            in_batches(search, "steps", steps.iloc[k : min(k + len(_CHANGES), _STEPS_OF_ROUND)])
+        steps = steps.iloc[_STEPS_OF_ROUND:]
         _one_by_one(search, tests.iloc[kinds:])
         kinds = len(tests)
-        for searcher, draw in (("corners", some_corners), ("uniform", uniform)):
+        draws = (("corners", some_corners), ("uniform", uniform))
+        for searcher, draw in draws[len(pieces) > 0 :]:  # of pieces, steps are the simple corners
             in_batches(search, searcher, draw(search.space, min(_DRAWS, search.left), rng))
         radius = _descend(search, derivatives, reasons, first, radius)
         if search.left >= GENERATION:
@@ -90,6 +98,26 @@ def test_signals(space: Space) -> np.ndarray:
     if pieces:
         add([1.0 - half for half in halves])
     return np.array(signals_found)
+
+
+def single_steps(space: Space, rng: np.random.Generator) -> np.ndarray:
+    """Return points of the unit cube, in random order: one signal steps from end to end."""
+    # The others stay at an end. Times of steps are in a geometric sequence: what matters of a pulse
+    # is its length, of any size.
+    pieces = _pieces(space)
+    many = 1 << min(max(len(pieces) - 1, 0), 7)  # combinations of the ends of the others
+    rows = []
+    for stepping, group in enumerate(pieces):
+        count = int(np.log(len(group) - 1) / np.log(_APART) + 1e-9) + 1
+        times = np.unique(np.rint(_APART ** np.arange(count)).astype(int))
+        for at, rises, ends_of_others in itertools.product(times, (0.0, 1.0), range(many)):
+            row, others = np.full(len(space.names), 0.5), pieces[:stepping] + pieces[stepping + 1 :]
+            row[group] = np.where(np.arange(len(group)) < at, 1.0 - rises, rises)
+            for i, other in enumerate(others):
+                row[other] = ends_of_others >> i & 1
+            rows.append(row)
+    order = rng.permutation(len(rows))[:_MOST_STEPS]
+    return np.array(rows).reshape(-1, len(space.names))[order]
 
 
 def _pieces(space: Space) -> list[list[int]]:

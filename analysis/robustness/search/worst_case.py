@@ -29,7 +29,7 @@ class WorstCase:
     design: Design
     results: pd.DataFrame  # What was evaluated, by row.
     # (design.size,): What chose each row: ``"corners"``, ``"uniform"`` or ``"CMA-ES"``; with
-    # derivatives also ``"test signals"``, ``"simple signals"`` and ``"gradient"``, and
+    # derivatives also ``"test signals"``, ``"simple signals"``, ``"steps"`` and ``"gradient"``, and
     # ``"derivatives"`` for a row that was run once more, for its derivatives.
     searchers: np.ndarray
     is_finished: bool  # False if Ctrl-C ended the search.
@@ -118,8 +118,10 @@ def worst_case(
     (quantities ``name[0]``, ``name[1]``, ... are the pieces of a signal: all alternate between
     their ends, all step halfway, all are constant at an end), a descent from the worst of them
     that ends where the first order fails, and then in turn signals drawn with few changes, three
-    times with a descent from the worst of these, corners, uniform draws and at first the other
-    test signals, a descent from the worst of those, and CMA-ES.  A descent moves all signals of a
+    times with a descent from the worst of these, signals of which one steps from end to end and
+    the others stay at one (each once, after a number of pieces in a geometric sequence), uniform
+    draws and at first the other test signals, a descent from the worst of those, and CMA-ES; a
+    space without signals has corners instead.  A descent moves all signals of a
     row along their derivatives, and goes where their margin would be lowest, by linear programs in
     a box that shrinks (`first_order.lowest_nearby`); the next descent begins with the box that
     could be trusted.  A run with derivatives counts as one run.

@@ -25,7 +25,7 @@ from nlctl.analysis.robustness import (
     prepare,
     worst_case,
 )
-from nlctl.analysis.robustness.search.descent import _next_radius
+from nlctl.analysis.robustness.search.descent import _next_radius, single_steps
 from nlctl.analysis.robustness.search.descent import test_signals as signals_to_try
 from nlctl.analysis.robustness.search.first_order import FirstOrder, lowest_nearby
 
@@ -214,7 +214,23 @@ def test_every_test_signal_is_run_and_those_of_each_kind_are_first():
     np.testing.assert_array_equal(rows[found.searchers == "test signals"], tests)
     drawn = found.searchers[found.searchers != "derivatives"]
     assert set(drawn[3:27]) == {"simple signals"}
-    assert set(drawn[27 : 24 + len(tests)]) == {"test signals"}
+    assert set(drawn[27:35]) == {"steps"}  # behind 1, 2, 3, 4 pieces, upwards and downwards
+    assert set(drawn[35 : 32 + len(tests)]) == {"test signals"}
+
+
+def test_steps_are_of_one_signal_between_its_ends_behind_times_in_a_geometric_sequence():
+    """Two signals of 9 pieces: 2 x 2 directions x 2 ends of the other, behind 1 2 3 4 6 8."""
+    names = [*inputs.names("u", 9), *inputs.names("v", 9), "k"]
+    space = Space(quantities=tuple(Uncertain(name=name, bounds=(0.0, 1.0)) for name in names))
+    steps = single_steps(space, np.random.default_rng(1))
+    assert len(np.unique(steps, axis=0)) == len(steps) == 2 * 2 * 2 * 6
+    assert np.all(steps[:, 18] == 0.5)
+    assert set(np.unique(steps[:, :18])) == {0.0, 1.0}
+    jumps = np.abs(np.diff(steps[:, :18].reshape(-1, 2, 9), axis=2))
+    np.testing.assert_array_equal(jumps.sum(axis=(1, 2)), 1)
+    assert set(np.nonzero(jumps)[2] + 1) == {1, 2, 3, 4, 6, 8}
+    without = Space(quantities=(Uncertain(name="k", bounds=(0.0, 1.0)),))
+    assert single_steps(without, np.random.default_rng(1)).shape == (0, 1)
 
 
 def bent(weight, count=6):
