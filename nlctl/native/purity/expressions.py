@@ -106,7 +106,7 @@ class Expressions(ast.NodeVisitor):
         builtin = builtin if isinstance(builtin, dict) else vars(builtin)
         if name in function.__globals__:
             return self.walk.captured(function.__globals__, name, function.__globals__[name])
-        return captured(builtin[name]) if name in builtin else OUTSIDE
+        return self.walk.captured(builtin, name, builtin[name]) if name in builtin else OUTSIDE
 
     def assign(self, name: str, value: KnownValue) -> None:
         kind = self.frame.shared.get(name)
@@ -297,6 +297,9 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                missing = getattr(type(base.known), "__missing__", None)
+                if isinstance(missing, FunctionType) and key not in base.known:
+                    return self.walk.function(missing, Given((base, captured(key))))
                 return captured(base.known[key])
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
@@ -333,11 +336,13 @@ class Expressions(ast.NodeVisitor):
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
-            if getter is not getattr(entry, "fget", None):
+            if isinstance(entry, functools.cached_property):
+                kept = getattr(thing, name, None)  # Python would compute it at the first call
+                self.walk.captured(vars(thing), name, kept)
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
-            return captured(getattr(thing, name))  # its name or its value
+            return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
