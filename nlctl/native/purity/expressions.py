@@ -349,6 +349,8 @@ class Expressions(ast.NodeVisitor):
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
                 return captured(value)  # a method, a new one each time it is read
+            if (library(type(thing)) or "").startswith("pandas"):
+                return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
@@ -404,11 +406,13 @@ class Expressions(ast.NodeVisitor):
     visit_SetComp = visit_GeneratorExp = visit_ListComp
 
     def visit_DictComp(self, node: ast.DictComp) -> KnownValue:
-        return self.comprehended(node.generators, [node.key, node.value])
+        return self.comprehended(node.generators, [node.value], [node.key])
 
     def comprehended(
-        self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr]
-    ) -> KnownValue:
+        self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr],
+        keys: Sequence[ast.expr] = (),
+    ) -> KnownValue:  # fmt: skip
+        """Return what is known of a list or dict of parts; keys never change."""
         before = dict(self.frame.names)
         for loop in loops:
             over = self.visit(loop.iter)
@@ -416,6 +420,8 @@ class Expressions(ast.NodeVisitor):
             self.bind(loop.target, element(over))
             for condition in loop.ifs:
                 self.condition(condition)
+        for key in keys:
+            self.visit(key)
         held = holder([self.visit(part) for part in parts])
         self.frame.names = before
         return held

@@ -73,7 +73,8 @@ _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load"
                          "read files before the run, and write them after it")  # fmt: skip
 _TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 _OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
-_OF_TABLES = ("to_numpy", "tolist")
+_OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
+              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists
