@@ -31,6 +31,7 @@ from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
+from .library.roots import roots
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
@@ -187,7 +188,9 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value is dataclasses.dataclass:  # it looks at types and defaults alone
                 return value
-            return self.for_numbers(value) if staged.is_of_a_library(value) else self.copied(value)
+            if staged.is_of_a_library(value):
+                return self._library("", value)
+            return self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
@@ -246,6 +249,10 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
+        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize") and (
+            search := roots().get(real)
+        ):
+            return self.copied(search)
         if isinstance(real, np.ufunc):
             self._is_known(real)
             is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
@@ -354,9 +361,9 @@ class Stage:
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
         if staged.is_of_a_library(cls):
             return staged.StagedType(cls, self)
-        if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "fractions", "functools",
-                                                "itertools", "operator", "_operator", "numbers",
-                                                "control", "nlctl"):  # fmt: skip
+        if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "fractions",
+                                                "functools", "itertools", "operator", "_operator",
+                                                "numbers", "control", "nlctl"):  # fmt: skip
             return cls
         if issubclass(cls, tuple):
             return self._copied_tuple(cls)

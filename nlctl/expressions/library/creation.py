@@ -197,7 +197,7 @@ class Joined:
         return by_moving(np.concatenate)(self.graph, [a.short() for a in arrays])
 
 
-ARRAY_METHODS.update(astype=as_type)
+ARRAY_METHODS.update(astype=as_type, to_numpy=lambda _, values: values)  # of a column of pandas
 
 # what is one expression, of the graph
 _OF_GRAPHS = (

@@ -32,11 +32,6 @@ def gamma(np: Facade, x: Any) -> Any:
     return np.where(left, math.pi / (_sine(np, x) * value), value)
 
 
-def beta(np: Facade, a: Any, b: Any) -> Any:
-    """gamma(a) gamma(b) / gamma(a + b)."""
-    return gamma(np, a) * gamma(np, b) / gamma(np, a + b)
-
-
 def _sine(np: Facade, x: Any) -> Any:
     """sin(pi x), 0 at whole numbers."""
     nearest = np.rint(x)

@@ -13,7 +13,7 @@ from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
 from .exponential import expm
-from .gamma import beta, gamma, loggamma_of_size
+from .gamma import gamma, loggamma_of_size
 from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
 from .python import guard_whole
 from .reductions import prod, sum_along
@@ -38,7 +38,7 @@ def enter_scipy() -> None:
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
     enter([linalg.expm], expm)
-    for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size), ("beta", beta)):
+    for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
         formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
     for name, formula_of in _FORMULAS.items():
@@ -48,6 +48,10 @@ def enter_scipy() -> None:
     for name in ("log1p", "expm1", "exp2", "cbrt"):
         if getattr(special, name) is not getattr(np, name):
             enter([getattr(special, name)], functools.partial(_elementwise, name))
+
+
+formula(math.lgamma)(loggamma_of_size)
+formula(math.gamma)(gamma)
 
 
 def cumulative_trapezoid(

@@ -13,7 +13,7 @@ from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
-from ...expressions.graph import Expr, Graph, needed
+from ...expressions.graph import ORDERS, Expr, Graph, needed
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
 from ..diagram.program import count_switching_functions, memory
@@ -103,7 +103,7 @@ def found_conditions(
     known = {_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
-    rows = beyond = 0
+    rows, beyond = 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
     # values of parameters: 1 for those that are not known
@@ -164,7 +164,7 @@ def _undeclared(
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
         parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
-        for condition in conditions(_pieces(parts), given):
+        for condition in conditions(_pieces(parts), given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):

@@ -58,7 +58,8 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
          "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
          "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
-         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack"}  # fmt: skip
+         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
+         "to_numpy"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
            "insort_left", "insort_right"}  # fmt: skip
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
