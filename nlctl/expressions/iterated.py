@@ -1,7 +1,7 @@
-"""Loops whose end depends on what is computed: Newton's method, a bisection, ``break`` at a tolerance.
+"""Loops whose end depends on what is computed: Newton's method, halving, a tolerance.
 
 Each pass is written out, and what it assigns is chosen: the new value where the loop still runs,
-otherwise what there was.  Python ends each such loop; where more passes than `PASSES` would be
+otherwise what there was.  Python ends each such loop; where more passes than `_MOST` would be
 needed, the result is NaN.  Where a pass ends the values hardly differ, so that what only later
 passes ask for is not located.
 """
@@ -19,17 +19,17 @@ import numpy as np
 
 from .arrays import Tracer, scalar
 from .graph import Expr, Graph, Untraceable
-from .merged import asked, call_instead, chosen, later, truth
+from .merged import call_instead, chosen, later, truth_test, truth_value
 from .operators import elementwise
 
-PASSES = 64  # of a loop that nothing else limits
+_MOST = 64  # of a loop that nothing else limits
 _ALWAYS_NEW = (ast.Yield, ast.YieldFrom, ast.Await, ast.Try, ast.With, ast.Delete, ast.Global,
                ast.Nonlocal, ast.FunctionDef, ast.ClassDef, ast.Continue, ast.Match)  # fmt: skip
 _CHANGING = {"append", "extend", "insert", "pop", "remove", "clear", "sort", "reverse", "update",
              "add", "discard", "fill", "appendleft", "popleft", "setdefault"}  # fmt: skip
 
 
-class LoopWriter(ast.NodeTransformer):
+class PassWriter(ast.NodeTransformer):
     """Writes passes that may not be taken any more instead of passes."""
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class LoopWriter(ast.NodeTransformer):
             return None
         call = functools.partial(_method, name)
         if isinstance(node, ast.While):
-            goes_on = ast.UnaryOp(ast.Not(), call("goes_on", later(truth(node.test))))
+            goes_on = ast.UnaryOp(ast.Not(), call("goes_on", later(truth_test(node.test))))
             head: list[ast.stmt] = [ast.If(goes_on, [ast.Break()], [])]
             loop: ast.stmt = ast.While(call("next_pass"), self._tried(name, head + body), [])
         else:
@@ -123,7 +123,7 @@ class LoopWriter(ast.NodeTransformer):
                 continue
             test, before, result, after = end
             done = f"end@{self.count}"
-            asks: list[ast.stmt] = [ast.Assign([ast.Name(done, ast.Store())], truth(test))]
+            asks: list[ast.stmt] = [ast.Assign([ast.Name(done, ast.Store())], truth_test(test))]
             condition = ast.Name(done, ast.Load())
             parts = [self._segment(name, segment), asks]
             if before:
@@ -229,9 +229,9 @@ def _assigned(body: Sequence[ast.stmt]) -> tuple[list[str] | None, list[str]]:
     for part in (n for s in body for n in ast.walk(s)):
         if isinstance(part, _ALWAYS_NEW):
             return None, []
-        if isinstance(part, ast.Call) and isinstance(part.func, ast.Attribute):
-            if part.func.attr in _CHANGING:
-                return None, []
+        method = part.func if isinstance(part, ast.Call) else None
+        if isinstance(method, ast.Attribute) and method.attr in _CHANGING:
+            return None, []
         if isinstance(part, ast.Attribute) and isinstance(part.ctx, ast.Store):
             return None, []
         if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id not in own:
@@ -266,6 +266,7 @@ class Loop:
         self.later: set[Expr] = set()
         self.before: dict[str, Any] = {}
         self.copies: dict[str, Any] = {}
+        self.others: dict[str, Any] = {}
         self.names: Sequence[str] = ()
         self.guards = 0
 
@@ -276,7 +277,7 @@ class Loop:
             self.graph.passing.append(self.first)
         elif self.passes == 2:
             self.graph.passing[-1] = self.later
-        return self.running.op == "const" or self.passes <= PASSES
+        return self.running.op == "const" or self.passes <= _MOST
 
     def goes_on(self, test: Callable[[], Any]) -> bool:
         """Note the condition of another pass."""
@@ -308,6 +309,7 @@ class Loop:
             return
         self.before = {name: values.get(name, _MISSING) for name in (*names, *written)}
         self.copies = {name: _copied(self.before[name]) for name in written}
+        self.others = {k: (v, _content(v)) for k, v in values.items() if k not in self.copies}
 
     def chosen(self) -> tuple[Any, ...]:
         """Return what the names have now where the loop runs, what they had elsewhere."""
@@ -315,9 +317,12 @@ class Loop:
         now = [values.get(name, _MISSING) for name in self.names]
         if self._is_sure:
             return tuple(now)
+        kept = ((v, c) for k, (v, c) in self.others.items() if values.get(k) is v)
+        if any(_content(value) != content for value, content in kept):
+            raise Untraceable("a loop that changes an array or an object in a function it calls")
         self._guarded(self.guards)
-        for name, kept in self.copies.items():
-            self._restored(self.before[name], kept)
+        for name, copy in self.copies.items():
+            self._restored(self.before[name], copy)
         pairs = zip(self.names, now, strict=True)
         return tuple(self._either(value, self.before[name]) for name, value in pairs)
 
@@ -333,7 +338,7 @@ class Loop:
         if self.passes:
             self.graph.passing.pop()
         self.graph.of_passes |= self.later - self.first
-        if self.passes > PASSES and self.running.op != "const":
+        if self.passes > _MOST and self.running.op != "const":
             self.fails()
 
     def fails(self) -> None:
@@ -369,7 +374,7 @@ class Loop:
 
     def _truth(self, value: Any) -> Expr:
         if isinstance(value, Tracer) and not value.shape:
-            return asked(self.graph, value).only
+            return truth_value(self.graph, value).only
         return self.graph.const(bool(value))
 
     def _guarded(self, since: int, where: Expr | None = None) -> None:
@@ -417,3 +422,18 @@ def _copied(value: Any) -> Any:
     if isinstance(value, Tracer):
         return value.copy()
     return list(value) if isinstance(value, list) else value
+
+
+def _content(value: Any, depth: int = 3) -> Any:
+    """Return what tells whether a value has been written into."""
+    if isinstance(value, Tracer):
+        return tuple(map(id, value.elements().flat)) if value.shape else id(value.only)
+    if not depth or isinstance(value, Loop | type):
+        return id(value)
+    if isinstance(value, list | tuple | dict):
+        parts = value.values() if isinstance(value, dict) else value
+        return id(value), tuple(_content(v, depth - 1) for v in parts)
+    held = getattr(value, "__dict__", None)
+    if type(held) is dict and "_real" not in held and not callable(value):
+        return id(value), tuple(_content(v, depth - 1) for v in held.values())
+    return id(value)

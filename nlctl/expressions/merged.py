@@ -42,17 +42,17 @@ class Merger(ast.NodeTransformer):
         self.generic_visit(node)
         if any(isinstance(n, _BINDING) for n in ast.walk(node)):
             return node
-        return call_instead("choice", truth(node.test), later(node.body), later(node.orelse))
+        return call_instead("choice", truth_test(node.test), later(node.body), later(node.orelse))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Ask comparisons without a decision; of other values one of them is the result."""
         self.generic_visit(node)
-        return truth(node) if all(isinstance(v, ast.Compare) for v in node.values) else node
+        return truth_test(node) if all(isinstance(v, ast.Compare) for v in node.values) else node
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
         if not node.orelse and isinstance(node.body[0], ast.Raise):
-            node.test = call_instead("fails", truth(node.test))
+            node.test = call_instead("fails", truth_test(node.test))
             return node
         if (appended := _appended([node])) is not None:
             return self.visit(ast.copy_location(ast.Expr(appended), node))
@@ -62,7 +62,7 @@ class Merger(ast.NodeTransformer):
             return node
         self.count += 1
         test, result = (f"{name}@{self.count}" for name in ("test", "result"))
-        question = ast.Assign([ast.Name(test, ast.Store())], truth(node.test))
+        question = ast.Assign([ast.Name(test, ast.Store())], truth_test(node.test))
         node.test = ast.Name(test, ast.Load())
         targets = [target for target, _, _ in values]
         branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
@@ -174,19 +174,19 @@ def _as_read(target: Any) -> ast.expr:
     return same
 
 
-def truth(test: ast.expr) -> ast.expr:
+def truth_test(test: ast.expr) -> ast.expr:
     """Return a test whose parts are asked without a decision, where that is possible."""
     if isinstance(test, ast.BoolOp):
         kind = ast.Constant("and" if isinstance(test.op, ast.And) else "or")
-        return call_instead("logic", kind, *(later(truth(v)) for v in test.values))
+        return call_instead("logic", kind, *(later(truth_test(v)) for v in test.values))
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        return call_instead("opposite", truth(test.operand))
+        return call_instead("opposite", truth_test(test.operand))
     if isinstance(test, ast.Compare) and len(test.ops) > 1:
         sides = [test.left, *test.comparators]
         pairs: list[ast.expr] = [
             ast.Compare(sides[i], [op], [sides[i + 1]]) for i, op in enumerate(test.ops)
         ]
-        return truth(ast.BoolOp(ast.And(), pairs))
+        return truth_test(ast.BoolOp(ast.And(), pairs))
     return test
 
 
@@ -252,7 +252,7 @@ def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
 
 
 def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
-    ask = lambda: (asked(graph, part()),)  # noqa: E731
+    ask = lambda: (truth_value(graph, part()),)  # noqa: E731
     if kind == "and":
         both = _choices(graph, value, ask, lambda: (False,))
         return both[0] if both else value and part()
@@ -263,10 +263,10 @@ def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
 def _opposite(graph: Graph, value: Any) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
-    return not value if condition is None else elementwise(graph, "not", asked(graph, value))
+    return not value if condition is None else elementwise(graph, "not", truth_value(graph, value))
 
 
-def asked(graph: Graph, value: Any) -> Any:
+def truth_value(graph: Graph, value: Any) -> Any:
     """Return the truth of a number."""
     number = traced(graph, value)
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
@@ -276,7 +276,7 @@ def _open(graph: Graph, test: Any) -> Expr | None:
     """Return a condition that is not known, and not decided on this path."""
     if not isinstance(test, Tracer) or test.shape:
         return None
-    condition = asked(graph, test).only
+    condition = truth_value(graph, test).only
     known = condition.op == "const" or condition in graph.implied or condition in graph.decisions
     return None if known or condition.value is not None else condition
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
-from .iterated import Loop, LoopWriter
+from .iterated import Loop, PassWriter
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
@@ -50,7 +50,7 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
             raise Untraceable("try in a method that calls super()")
         return function.__code__
     body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
-    body = Merger().visit(LoopWriter().visit(body)) if merging else body
+    body = Merger().visit(PassWriter().visit(body)) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
 

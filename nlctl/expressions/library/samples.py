@@ -19,45 +19,45 @@ def _numbers(values: Any, fewest: int) -> Tracer:
 
 
 @formula(statistics.fmean)
-def fmean(np: Facade, data: Any) -> Any:
+def _fmean(np: Facade, data: Any) -> Any:
     """Return the mean of numbers, as one of Python's own."""
     return _of_python(np.mean(_numbers(data, 1)))
 
 
 @formula(statistics.mean)
-def mean(np: Facade, data: Any) -> Any:
+def _mean(np: Facade, data: Any) -> Any:
     """Return the mean of numbers."""
     return _of_kind(data, np.mean(_numbers(data, 1)))
 
 
 @formula(statistics.median)
-def median(np: Facade, data: Any) -> Any:
+def _median(np: Facade, data: Any) -> Any:
     """Return the median of numbers."""
     return _of_kind(data, np.median(_numbers(data, 1)))
 
 
 @formula(statistics.pvariance)
-def pvariance(np: Facade, data: Any, mu: Any = None) -> Any:
+def _pvariance(np: Facade, data: Any, mu: Any = None) -> Any:
     """Return the variance of all numbers that there are."""
     return _of_kind(data, _squares(np, _numbers(data, 1), mu) / float(len(data)))
 
 
 @formula(statistics.variance)
-def variance(np: Facade, data: Any, xbar: Any = None) -> Any:
+def _variance(np: Facade, data: Any, xbar: Any = None) -> Any:
     """Return the variance that a sample lets expect."""
     return _of_kind(data, _squares(np, _numbers(data, 2), xbar) / float(len(data) - 1))
 
 
 @formula(statistics.pstdev)
-def pstdev(np: Facade, data: Any, mu: Any = None) -> Any:
+def _pstdev(np: Facade, data: Any, mu: Any = None) -> Any:
     """Return the standard deviation of all numbers that there are."""
-    return _of_python(np.sqrt(pvariance(np, data, mu)))
+    return _of_python(np.sqrt(_pvariance(np, data, mu)))
 
 
 @formula(statistics.stdev)
-def stdev(np: Facade, data: Any, xbar: Any = None) -> Any:
+def _stdev(np: Facade, data: Any, xbar: Any = None) -> Any:
     """Return the standard deviation that a sample lets expect."""
-    return _of_python(np.sqrt(variance(np, data, xbar)))
+    return _of_python(np.sqrt(_variance(np, data, xbar)))
 
 
 def _squares(np_: Facade, data: Tracer, middle: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Loops that end at a tolerance, and roots that are sought: as many passes as the values ask for."""
+"""Loops that end at a tolerance, and roots that are sought: how many passes, the values say."""
 
 import math
 
@@ -69,8 +69,9 @@ def linkage(t, x, u, params):
     """An array that is written into, and passes that are counted."""
     angles, passes = np.array([0.5, 1.5]), 0
     for _ in range(20):
-        closed = np.array([np.cos(x[0]) + 3 * np.cos(angles[0]) - 2.5 * np.cos(angles[1]) - 3.2,
-                           np.sin(x[0]) + 3 * np.sin(angles[0]) - 2.5 * np.sin(angles[1])])  # fmt: skip
+        closed = 3 * np.array([np.cos(angles[0]), np.sin(angles[0])])
+        closed += np.array([np.cos(x[0]) - 3.2, np.sin(x[0])])
+        closed -= 2.5 * np.array([np.cos(angles[1]), np.sin(angles[1])])
         if np.linalg.norm(closed) < 1e-12 or not np.isfinite(closed).all():
             break
         slope = np.array([[-3 * np.sin(angles[0]), 2.5 * np.sin(angles[1])],
@@ -137,7 +138,8 @@ def beyond_the_end_of_a_list(t, x, u, params):
 @engineered(1)
 def root_by_brents_method(t, x, u, params):
     pressure = 760 * min(max(x[0], 0.2), 3.0)
-    boiling = optimize.brentq(lambda T: 10 ** (8.07131 - 1730.63 / (233.4 + T)) - pressure, 20, 180)
+    vapour = lambda T: 10 ** (8.07131 - 1730.63 / (233.4 + T))  # noqa: E731
+    boiling = optimize.brentq(lambda T: vapour(T) - pressure, 20, 180)
     return [0.01 * (100 + u[0] - boiling)]
 
 
@@ -153,3 +155,19 @@ def root_by_secants(t, x, u, params):
     volume = optimize.newton(lambda v, p: (p + 0.364 / v**2) * (v - 0.04) - 25, 2.0,
                              args=(8.0 + math.tanh(x[0]),))  # fmt: skip
     return [u[0] - volume]
+
+
+def improve(guess, y):
+    guess[0] -= (guess[0] + 0.5 * np.sin(guess[0]) - y) / (1 + 0.5 * np.cos(guess[0]))
+    guess[1] += 1.0
+
+
+@engineered(1)
+def written_by_a_function(t, x, u, params):
+    guess = np.array([x[0], 0.0])
+    for _ in range(6):
+        before = guess[0]
+        improve(guess, x[0])
+        if abs(guess[0] - before) < 1e-3:
+            break
+    return [-guess[0] - 0.01 * guess[1]]

@@ -112,7 +112,7 @@ def flags(t, x, u, params):
 def sums_by_name(t, x, u, params):
     names = ["a", "b", "c"]
     level = dict(zip(names, x, strict=True))
-    rate = {k: 0.0 for k in names}
+    rate = {k: 0.0 for k in names}  # noqa: C420 (as users write it)
     for source, target in [("a", "b"), ("b", "c"), ("c", "a")]:
         rate[target] += 1 / (1 + level[source] ** 2)
     return [rate[k] - level[k] for k in names]
