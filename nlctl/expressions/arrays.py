@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -77,6 +77,7 @@ class Tracer:
     # elements of which this long array was made as another shape, and what they were then
     watched: tuple[np.ndarray, tuple[Expr, ...]] | None = None
     is_pythons: bool = False  # whether it is known to be a number of Python's own, not NumPy's
+    labels: Mapping[str, int] = field(default_factory=dict)  # of a column of pandas: where each is
 
     __array_ufunc__ = None  # NumPy's arrays leave arithmetic with tracers to these
     methods: ClassVar[Callable[[Tracer, str], Any] | None] = None  # what finds those of arrays
@@ -403,18 +404,18 @@ def leaf_vector(
     """Return part of an argument of the program as an array of the given shape."""
     numbers = np.arange(start, start + int(np.prod(shape))).reshape(shape)
     long = [i for i, n in enumerate(shape) if n > SMALL]
-    if not long or len(long) > 1 or len(shape) > 2:
+    if not long or len(shape) > 2:
         if numbers.size > _MOST:
             raise Untraceable("a large matrix")
         return Tracer(graph, mapped(lambda i: graph.leaf(array, int(i), None, kind), numbers))
-    moved = np.moveaxis(numbers, long[0], -1)
+    moved = np.moveaxis(numbers, long[-1], -1)  # of a large matrix the rows stay in one piece
     step, size = int(moved.flat[1] - moved.flat[0]), moved.shape[-1]
 
     def column(i: int) -> Expr:
         where = (array, int(i), step)
         return graph.node("leaf", data=where, size=size, varies=array != "p")
 
-    return Tracer(graph, mapped(column, moved[..., 0]), long[0], size)
+    return Tracer(graph, mapped(column, moved[..., 0]), long[-1], size)
 
 
 def full(graph: Graph, shape: Any, value: object) -> Tracer:

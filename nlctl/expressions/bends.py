@@ -84,10 +84,10 @@ def _free(
     others = [n for n in needed(roots) if n.op in COMPARISONS and n not in tied]
     truths: dict[Expr, Expr] = {}
     row = 0
-    for node, there in zip(others, replaced_parts(graph, others, on_it), strict=True):
-        leaves = (e for e in needed([there]) if e.op in ("leaf", "call", "solve"))
-        decided = all(leaf.op == "leaf" and leaf.data[0] == "p" for leaf in leaves)
-        if not decided or _is_met(there, p):
+    placed = replaced_parts(graph, others, on_it)
+    moving = _moving(placed)
+    for node, there in zip(others, placed, strict=True):
+        if there in moving or _is_met(there, p):
             where = (_TRUTHS, row, 1 if node.size else 0)
             truth = graph.node("leaf", data=where, size=node.size, varies=True)
             truths[node], row = graph.op("gt", truth, graph.const(0.0)), row + (node.size or 1)
@@ -101,6 +101,16 @@ def _is_met(comparison: Expr, p: np.ndarray) -> bool:
     a, b = evaluate_expressions(list(comparison.args), _at_random([comparison], p))
     with np.errstate(invalid="ignore"):
         return bool(np.all(abs(a - b) <= _SAME * (abs(a) + abs(b))))
+
+
+def _moving(exprs: Sequence[Expr]) -> set[Expr]:
+    """Return what depends on more than parameters."""
+    moving: set[Expr] = set()
+    for node in needed(exprs):
+        is_read = node.op == "leaf" and node.data[0] != "p"
+        if is_read or node.op in ("call", "solve") or any(a in moving for a in node.args):
+            moving.add(node)
+    return moving
 
 
 def _at_random(exprs: Sequence[Expr], p: np.ndarray) -> dict[str, np.ndarray]:

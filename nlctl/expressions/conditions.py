@@ -27,12 +27,15 @@ _OF_QUOTIENTS = ("remainder", "fmod")
 JUMPING = (*_OF_INTEGERS, *_OF_QUOTIENTS, "sign", "heaviside", "copysign", "arctan2")
 
 
-def conditions(exprs: Iterable[Expr], known: Collection[Expr] = ()) -> tuple[Expr, ...]:
-    """Return all that expressions switch at, parts first."""
+def conditions(
+    exprs: Iterable[Expr], known: Collection[Expr] = (), unseen: Collection[Expr] = ()
+) -> tuple[Expr, ...]:
+    """Return all that expressions switch at, parts first; none of what is known, or unseen."""
     roots = list(exprs)
-    always = (n for n in needed(roots, known) if n.op in ORDERS and _is_always(n))
+    nodes = [n for n in needed(roots, known) if n not in unseen]
+    always = (n for n in nodes if n.op in ORDERS and _is_always(n))
     passed = {*known, *always}  # what has one value, whatever is compared
-    nodes = needed(roots, passed)
+    nodes = [n for n in needed(roots, passed) if n not in unseen]
     return tuple(node for node in nodes if node.varies and node not in passed and _switches(node))
 
 

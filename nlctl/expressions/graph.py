@@ -162,6 +162,9 @@ class Graph:
         self.implied: dict[Expr, bool] = {}  # what follows from that
         # integer parameters that steer what is computed: place in `p`, and value
         self.assumptions: dict[int, int] = {}
+        # what is computed in passes of loops that may have ended, a set for each such loop
+        self.passing: list[set[Expr]] = []
+        self.of_passes: set[Expr] = set()  # what only later passes of such loops compute
         self._known: dict[Any, Expr] = {}
         self._results: dict[tuple[Any, ...], Expr] = {}
 
@@ -269,6 +272,8 @@ class Graph:
         key = (name, *args)  # every way through a function begins as others did
         if key not in self._results:
             self._results[key] = self._operation(name, *args)
+        for computed in self.passing:
+            computed.add(self._results[key])
         return self._results[key]
 
     def _operation(self, name: str, *args: Expr) -> Expr:

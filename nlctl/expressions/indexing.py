@@ -20,6 +20,8 @@ GATHERED = 64  # places among which an integer may choose
 def _item(self: Tracer, key: Any) -> Any:
     """Return elements; those of a mask, or at a place that the state decides, as choices."""
     key = _settled(key)
+    if isinstance(key, str) and key in self.labels:
+        return self.item_at(self.labels[key])
     if _is_mask(key):
         return Masked(self, key)
     if isinstance(key, Tracer) and key.shape:
@@ -202,8 +204,10 @@ def _assign_to_part(self: Tracer, key: object, value: Tracer) -> None:
 
 def _write(whole: Tracer, places: range, value: Tracer) -> None:
     """Assign to consecutive elements of a long array of one dimension."""
-    if places.step != 1 or value.ndim > 1:
-        raise Untraceable("assignment with a step, or of another shape")
+    if value.ndim > 1:
+        raise Untraceable("assignment of another shape")
+    if places.step != 1:
+        return _assign_at(whole, list(places), value)
     if not value.shape or value.shape == (1,):
         middle = full(whole.graph, (len(places),), value.reshape(1)[0])
     elif value.size == len(places):

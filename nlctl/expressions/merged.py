@@ -42,10 +42,18 @@ class Merger(ast.NodeTransformer):
         self.generic_visit(node)
         if any(isinstance(n, _BINDING) for n in ast.walk(node)):
             return node
-        return call_instead("choice", _truth(node.test), _later(node.body), _later(node.orelse))
+        return call_instead("choice", truth_test(node.test), later(node.body), later(node.orelse))
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        """Ask comparisons without a decision; of other values one of them is the result."""
+        self.generic_visit(node)
+        return truth_test(node) if all(isinstance(v, ast.Compare) for v in node.values) else node
 
     def visit_If(self, node: ast.If) -> Any:
         """Assign what a choice returns; None says that the branches are followed as they are."""
+        if not node.orelse and isinstance(node.body[0], ast.Raise):
+            node.test = call_instead("fails", truth_test(node.test))
+            return node
         if (appended := _appended([node])) is not None:
             return self.visit(ast.copy_location(ast.Expr(appended), node))
         values = _of_branches(copy.deepcopy(node))
@@ -54,15 +62,15 @@ class Merger(ast.NodeTransformer):
             return node
         self.count += 1
         test, result = (f"{name}@{self.count}" for name in ("test", "result"))
-        asked = ast.Assign([ast.Name(test, ast.Store())], _truth(node.test))
+        question = ast.Assign([ast.Name(test, ast.Store())], truth_test(node.test))
         node.test = ast.Name(test, ast.Load())
         targets = [target for target, _, _ in values]
         branches = [ast.Tuple([v[k] for v in values], ast.Load()) for k in (1, 2)]
         branches = [self.visit(copy.deepcopy(b)) for b in branches]
-        chosen = call_instead("choices", node.test, *map(_later, branches))
+        picked = call_instead("choices", node.test, *map(later, branches))
         is_missing = ast.Compare(ast.Name(result, ast.Load()), [ast.Is()], [ast.Constant(None)])
         stored = ast.Assign([ast.Tuple(targets, ast.Store())], ast.Name(result, ast.Load()))
-        whole = [asked, ast.Assign([ast.Name(result, ast.Store())], chosen),
+        whole = [question, ast.Assign([ast.Name(result, ast.Store())], picked),
                  ast.If(is_missing, [node], [stored])]  # fmt: skip
         return [ast.copy_location(ast.fix_missing_locations(_placed(s, node)), node) for s in whole]
 
@@ -166,23 +174,24 @@ def _as_read(target: Any) -> ast.expr:
     return same
 
 
-def _truth(test: ast.expr) -> ast.expr:
+def truth_test(test: ast.expr) -> ast.expr:
     """Return a test whose parts are asked without a decision, where that is possible."""
     if isinstance(test, ast.BoolOp):
         kind = ast.Constant("and" if isinstance(test.op, ast.And) else "or")
-        return call_instead("logic", kind, *(_later(_truth(v)) for v in test.values))
+        return call_instead("logic", kind, *(later(truth_test(v)) for v in test.values))
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        return call_instead("opposite", _truth(test.operand))
+        return call_instead("opposite", truth_test(test.operand))
     if isinstance(test, ast.Compare) and len(test.ops) > 1:
         sides = [test.left, *test.comparators]
         pairs: list[ast.expr] = [
             ast.Compare(sides[i], [op], [sides[i + 1]]) for i, op in enumerate(test.ops)
         ]
-        return _truth(ast.BoolOp(ast.And(), pairs))
+        return truth_test(ast.BoolOp(ast.And(), pairs))
     return test
 
 
-def _later(value: ast.expr) -> ast.Lambda:
+def later(value: ast.expr) -> ast.Lambda:
+    """Return a function of an expression."""
     nothing = ast.arguments([], [], None, [], [], None, [])
     return ast.Lambda(nothing, value)
 
@@ -197,7 +206,8 @@ def call_instead(name: str, *given: ast.expr) -> ast.Call:
 
 def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     """Return what the names stand for that `Merger` writes."""
-    functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite}
+    functions = {"choice": _choice, "choices": _choices, "logic": _logic, "opposite": _opposite,
+                 "fails": _fails}  # fmt: skip
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
@@ -210,7 +220,7 @@ def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], A
     try:
         one = _under(graph, condition, True, yes)
         other = _under(graph, condition, False, no)
-        return tuple(_selected(graph, condition, a, b) for a, b in zip(one, other, strict=True))
+        return tuple(chosen(graph, condition, a, b) for a, b in zip(one, other, strict=True))
     except Exception:  # of the branch that is not taken, or no numbers
         del graph.guards[guards:]
         return None
@@ -218,10 +228,19 @@ def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], A
 
 def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return ``yes() if test else no()``."""
-    chosen = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
-    if chosen is None:
+    both = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
+    if both is None:
         return yes() if test else no()
-    return chosen[0]
+    return both[0]
+
+
+def _fails(graph: Graph, test: Any) -> Any:
+    """Return whether an error is raised, False where that is only known when it runs."""
+    condition = _open(graph, test)
+    if condition is None or graph.attempts:
+        return test
+    graph.guard(graph.op("not", condition), RuntimeError)
+    return False
 
 
 def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
@@ -233,7 +252,7 @@ def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
 
 
 def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
-    ask = lambda: (_asked(graph, part()),)  # noqa: E731
+    ask = lambda: (truth_value(graph, part()),)  # noqa: E731
     if kind == "and":
         both = _choices(graph, value, ask, lambda: (False,))
         return both[0] if both else value and part()
@@ -244,10 +263,10 @@ def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
 def _opposite(graph: Graph, value: Any) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
-    return not value if condition is None else elementwise(graph, "not", _asked(graph, value))
+    return not value if condition is None else elementwise(graph, "not", truth_value(graph, value))
 
 
-def _asked(graph: Graph, value: Any) -> Any:
+def truth_value(graph: Graph, value: Any) -> Any:
     """Return the truth of a number."""
     number = traced(graph, value)
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
@@ -257,7 +276,7 @@ def _open(graph: Graph, test: Any) -> Expr | None:
     """Return a condition that is not known, and not decided on this path."""
     if not isinstance(test, Tracer) or test.shape:
         return None
-    condition = _asked(graph, test).only
+    condition = truth_value(graph, test).only
     known = condition.op == "const" or condition in graph.implied or condition in graph.decisions
     return None if known or condition.value is not None else condition
 
@@ -272,7 +291,8 @@ def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]
     return values
 
 
-def _selected(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
+def chosen(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
+    """Return one number or array where a condition holds, another elsewhere."""
     a, b = traced(graph, one), traced(graph, other)
     kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
     if not kinds or ("b" in kinds and len(kinds) > 1):

@@ -21,6 +21,7 @@ import numpy as np
 
 from .arrays import Tracer, traced
 from .graph import CATCHABLE, Ambiguous, Graph, Namespace, Untraceable, catchable
+from .iterated import Loop, PassWriter
 from .merged import INSTEAD_NAME, Merger, call_instead, names_of_choices
 from .operators import elementwise
 from .source import Definition, Unreadable, definition
@@ -49,7 +50,7 @@ def followable_code(function: FunctionType, merging: bool) -> CodeType:
             raise Untraceable("try in a method that calls super()")
         return function.__code__
     body = _Rewriter(function.__globals__).visit(copy.deepcopy(tree))
-    body = Merger().visit(body) if merging else body
+    body = Merger().visit(PassWriter().visit(body)) if merging else body
     body.decorator_list = []
     return _compiled(body, function.__code__)
 
@@ -132,8 +133,18 @@ class _Rewriter(ast.NodeTransformer):
             return node
         return call_instead("item", node.value, _key(node.slice))
 
-    def visit_Call(self, node: ast.Call) -> Any:
+    def visit_Attribute(self, node: ast.Attribute) -> Any:
         self.generic_visit(node)
+        return call_instead("values", node.value) if node.attr == "values" else node
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        if isinstance(node.func, ast.Attribute):  # a method: what it is asked of alone
+            node.func.value = self.visit(node.func.value)
+            func, node.func = node.func, ast.Name("method", ast.Load())
+            self.generic_visit(node)
+            node.func = func
+        else:
+            self.generic_visit(node)
         plain = len(node.args) == 1 and not node.keywords and isinstance(node.func, ast.Attribute)
         if not plain or node.func.attr != "index":  # type: ignore[attr-defined]
             return node
@@ -207,8 +218,10 @@ def names_for(graph: Graph) -> dict[str, Callable[..., Any]]:
         INSTEAD_NAME.format("moved"): functools.partial(_moved, graph),
         INSTEAD_NAME.format("item"): functools.partial(_item, graph),
         INSTEAD_NAME.format("slice"): slice,
+        INSTEAD_NAME.format("loop"): lambda: Loop(graph, is_raised),
         INSTEAD_NAME.format("text"): _text,
         INSTEAD_NAME.format("index"): _index,
+        INSTEAD_NAME.format("values"): lambda v: v if isinstance(v, Tracer) else v.values,
     }
 
 

@@ -12,8 +12,8 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .edges import is_positive, is_square
-from .graph import Expr, Graph, needed
+from .graph import Expr, Graph, deduce, needed
+from .signs import POSITIVE
 
 RANGE = 36.0  # e^-36 is less than rounding
 ITSELF, AREA = 0, -1  # kinds; others are exponents
@@ -52,7 +52,7 @@ def sharp_arguments(graph: Graph, nodes: Iterable[Expr]) -> tuple[SharpArgument,
         elif node.op == "arctan":
             arguments[SharpArgument(graph.number(node.args[0]), AREA)] = None
         else:
-            divides = node.op == "div" and is_positive(node.args[1])
+            divides = node.op == "div" and node.args[1].sign == POSITIVE
             base, exponent = as_power(node.args[1] if divides else node)
             if base.varies and (divides or exponent >= _HIGH) and _is_gentle(base):
                 powers[base] = max(powers.get(base, 0), exponent)
@@ -70,14 +70,20 @@ def as_power(expr: Expr) -> tuple[Expr, int]:
 
     Of products those are seen that are written as such, as x**6 is: x x x x x x.
     """
+    powers: dict[Expr, tuple[Expr, int]] = {}
+    return deduce(powers, expr, _factors, lambda product: _power(product, powers))
+
+
+def _factors(expr: Expr) -> tuple[Expr, ...]:
+    return expr.args if expr.op == "mul" else ()
+
+
+def _power(expr: Expr, powers: dict[Expr, tuple[Expr, int]]) -> tuple[Expr, int]:
     if expr.op == "power" and expr.args[1].op == "const":
         exponent = abs(float(expr.args[1].data))
         return (expr.args[0], int(exponent)) if exponent.is_integer() else (expr, 1)
-    if is_square(expr):
-        base, exponent = as_power(expr.args[0])
-        return base, 2 * exponent
     if expr.op == "mul":
-        (base, exponent), (other, more) = map(as_power, expr.args)
+        (base, exponent), (other, more) = (powers[factor] for factor in expr.args)
         if base is other:
             return base, exponent + more
     return expr, 1

@@ -18,6 +18,7 @@ import logging
 import math
 import warnings
 from collections.abc import Callable
+from fractions import Fraction
 from types import BuiltinFunctionType, CellType, FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -30,6 +31,7 @@ from .functions import MATH
 from .graph import Graph, Untraceable, numpy_function
 from .library.creation import Joined
 from .library.python import NUMBER_SAMPLES, Builtins, of_math
+from .library.roots import roots
 from .library.rotations import enter_rotations, turn_of
 from .library.special import enter_scipy
 from .library.splines import called_object, enter_splines
@@ -38,7 +40,7 @@ from .operators import elementwise
 from .rewritten import NumberKeys, followable_code, names_for
 from .source import codes_in, is_dispatcher
 
-_RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice)
+_RAW = (bool, int, float, complex, str, bytes, type(None), np.generic, range, slice, Fraction)
 _OPERATORS = ("_functools", "_operator", "operator", "functools", "itertools")
 _OF_MATRICES = ("numpy.linalg", "scipy.linalg")  # what they return is nobody else's
 _KEPT = ("__dict__", "__weakref__", "__slots__")  # of a class: what Python makes itself
@@ -142,8 +144,15 @@ class Stage:
         if isinstance(value, np.vectorize):
             return self._vectorized(value)
         if _is_column(value):
-            return self.fresh(np.array(value, dtype=float))
+            return self._column(value)
         return self._instead_of_object(value)
+
+    def _column(self, value: Any) -> Any:
+        """Return a column of numbers of pandas: an array, and by labels its elements."""
+        array = self.fresh(np.array(value, dtype=float))
+        if isinstance(array, Tracer) and value.index.is_unique:
+            array.labels = {k: i for i, k in enumerate(value.index) if isinstance(k, str)}
+        return array
 
     def _is_known(self, value: object) -> bool:
         module = getattr(value, "__module__", None) or ""
@@ -179,7 +188,9 @@ class Stage:
         if isinstance(value, CPUDispatcher | FunctionType):
             if value is dataclasses.dataclass:  # it looks at types and defaults alone
                 return value
-            return self.for_numbers(value) if staged.is_of_a_library(value) else self.copied(value)
+            if staged.is_of_a_library(value):
+                return self._library("", value)
+            return self.copied(value)
         if isinstance(value, functools._lru_cache_wrapper):
             return self.instead(value.__wrapped__)
         if isinstance(value, tuple) and hasattr(value, "_fields"):
@@ -238,6 +249,10 @@ class Stage:
             return Joined(self.graph, real)
         if not callable(real):
             return real
+        if (getattr(real, "__module__", None) or "").startswith("scipy.optimize") and (
+            search := roots().get(real)
+        ):
+            return self.copied(search)
         if isinstance(real, np.ufunc):
             self._is_known(real)
             is_written = real in WRITTEN or real.__name__ in UFUNC_OPERATIONS
@@ -346,9 +361,9 @@ class Stage:
             return self._builtins[cls.__name__] if cls in (complex, float, int) else cls
         if staged.is_of_a_library(cls):
             return staged.StagedType(cls, self)
-        if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "functools",
-                                                "itertools", "operator", "_operator", "numbers",
-                                                "control", "nlctl"):  # fmt: skip
+        if cls.__module__.partition(".")[0] in ("collections", "types", "decimal", "fractions",
+                                                "functools", "itertools", "operator", "_operator",
+                                                "numbers", "control", "nlctl"):  # fmt: skip
             return cls
         if issubclass(cls, tuple):
             return self._copied_tuple(cls)

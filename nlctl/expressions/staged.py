@@ -28,6 +28,9 @@ from .operators import elementwise
 LIBRARIES = ("numpy", "scipy", "numba", "pandas")
 
 
+_PLACES = ("loc", "iloc", "at", "iat")  # of a table of pandas: what is indexed
+
+
 class OnStage(Protocol):
     """What stands for modules, classes and objects asks of the stage that it stands on."""
 
@@ -149,6 +152,8 @@ class StagedObject:
             return functools.partial(stage.copied(attribute), self)
         if name == "ev" and is_of_a_library(real):  # a spline of two variables, point by point
             return functools.partial(self, grid=False)
+        if name in _PLACES and is_of_a_library(real):
+            return StagedObject(getattr(real, name), stage)
         if is_of_a_library(real) and callable(getattr(real, name)):
             return stage.for_numbers(getattr(real, name))
         return stage.instead(getattr(real, name))

@@ -74,7 +74,7 @@ def _traced(
     *, merging: bool = False,
 ) -> Tracer:  # fmt: skip
     """Follow every way; with `merging`, branches that only compute numbers are one."""
-    graph.limit = len(graph.nodes) + BUDGET
+    graph.limit = len(graph.nodes) + BUDGET * (1 + merging)  # passes of loops are alike
     assumptions = dict(graph.assumptions)
     try:
         stage = Stage(graph, merging=merging)
@@ -98,7 +98,7 @@ def _followed(
     graph: Graph, run: Callable[[], Tracer], decisions: dict[Expr, bool], left: list[int]
 ) -> Tracer | None:
     """Follow a function from where the decisions have led; None where it raises an error."""
-    graph.decisions, graph.implied, graph.guards = decisions, {}, []
+    graph.decisions, graph.implied, graph.guards, graph.passing = decisions, {}, [], []
     graph.attempts = 0
     try:
         result = _guarded(graph, run())

@@ -91,7 +91,6 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
         if wanted != _EVERY and any(known.code is code for known in done):
             return
         _, c = prepared_parameters(compiled, trial.p, width, due)
-        done.append(_Audited(code=code))
         evaluated, own = _evaluated(compiled, code, c), apart(compiled.schedule.system)
         params = override(own.system, trial.params)  # nobody else writes into that diagram
         trial = replace(trial, meetings=code.meetings, apart=own, params=params)
@@ -101,6 +100,7 @@ def audit(compiled: Compiled, trial: Trial, wanted: Audit = True) -> None:
             every = outputs(point) if outputs else {}
             known = {i: float(every[i][0]) for i in relays}
             _compare(compiled, replace(trial, relays=known), evaluated, point)
+        done.append(_Audited(code=code))  # what failed is compared again
 
 
 def _points(trial: Trial) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:

@@ -123,8 +123,10 @@ def test_a_planted_defect_is_found(defect, monkeypatch):
 def test_the_block_is_named_and_not_the_one_behind_it(monkeypatch):
     """A wrong output shows first in the derivatives of another block."""
     lost_sign(monkeypatch)  # of the wire from the chain to the sensor
-    with pytest.raises(AuditError, match=r"'y\[0\]' of block 'sensor'"):
-        nlctl.input_output_response(nlctl.compile(diagram()), TIMES, 0, X0)
+    compiled = nlctl.compile(diagram())
+    for _ in range(2):  # what has failed is not believed the next time
+        with pytest.raises(AuditError, match=r"'y\[0\]' of block 'sensor'"):
+            nlctl.input_output_response(compiled, TIMES, 0, X0)
 
 
 @pytest.fixture

@@ -94,6 +94,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["bends"],
         ["library"],
         ["merged"],
+        ["iterated"],
         ["rewritten"],
         ["staged", "stage"],
         ["derivatives", "trace"],

@@ -166,6 +166,13 @@ def whole_numbers(graph: Graph, values: Tracer) -> Tracer:
     return Tracer(graph, box, values.axis, values.length)
 
 
+@of(np.ndenumerate)
+def ndenumerate(graph: Graph, values: Any) -> Any:
+    """Return pairs of a place and the element there."""
+    array = traced(graph, values)
+    return ((place, array[place]) for place in np.ndindex(array.shape))
+
+
 class Joined:
     """``np.r_`` and ``np.c_``: arrays and numbers in brackets, next to each other."""
 
@@ -190,7 +197,7 @@ class Joined:
         return by_moving(np.concatenate)(self.graph, [a.short() for a in arrays])
 
 
-ARRAY_METHODS.update(astype=as_type)
+ARRAY_METHODS.update(astype=as_type, to_numpy=lambda _, values: values)  # of a column of pandas
 
 # what is one expression, of the graph
 _OF_GRAPHS = (

@@ -14,7 +14,7 @@ from ..elimination import eliminated, is_zero, substituted
 from ..graph import SMALL, Expr, Graph, Untraceable
 from ..linear_systems import determinant, factors, regular, solution
 from ..operators import elementwise, product, total
-from .table import Facade, constant_value, of
+from .table import WRITTEN, Facade, constant_value, of
 
 __all__: list[str] = []
 
@@ -239,12 +239,23 @@ def _any_is_zero(np_: Facade, pivots: Sequence[Any]) -> Any:
     return any_is_zero
 
 
+class _NotComputed:
+    """What a function returns besides, of which nothing can be asked."""
+
+    def _asked(self, *_: Any) -> Any:
+        raise Untraceable("rank, residuals or singular values of a matrix that the state decides")
+
+    __getattr__ = __bool__ = __eq__ = __hash__ = __len__ = __iter__ = __getitem__ = _asked
+
+
 @of(np.linalg.lstsq)
 def lstsq(graph: Graph, a: Any, b: Any, rcond: Any = None) -> tuple[Any, ...]:
-    """Return the least squares solution for a matrix that is constant."""
+    """Return the least squares solution; of a matrix that is constant the rest, too."""
     matrix = constant_value(traced(graph, a))
     if not isinstance(matrix, np.ndarray):
-        raise Untraceable("least squares with a matrix that depends on the state")
+        rcond = np.finfo(float).eps * max(matrix.shape) if rcond is None else rcond
+        inverse = WRITTEN[np.linalg.pinv](graph, matrix, rcond)
+        return product(inverse, traced(graph, b)), *[_NotComputed()] * 3
     b = traced(graph, b)
     solution = product(traced(graph, np.linalg.pinv(matrix)), b)
     singular = np.linalg.svd(matrix, compute_uv=False)
@@ -277,6 +288,18 @@ def cholesky(graph: Graph, a: Any) -> Tracer:
                 rest = rest - lower[i][k] * lower[j][k]
             lower[i][j] = rest / lower[j][j]
     return traced(graph, lower)
+
+
+@of(np.linalg.cond)
+def cond(graph: Graph, x: Any, p: Any = None) -> Any:
+    """Return the condition number of a matrix of two rows: the ratio of its singular values."""
+    rows, np_ = _square(graph, x), Facade(graph)
+    if len(rows) != 2 or p not in (None, 2):
+        raise Untraceable("the condition number of a matrix of more than two rows")
+    (a, b), (c, d) = rows
+    largest = 0.5 * (np_.hypot(a + d, b - c) + np_.hypot(a - d, b + c))
+    smallest = np_.abs(a * d - b * c) / largest
+    return np_.where(largest == 0.0, np.inf, largest / smallest)
 
 
 @of(np.linalg.eigvalsh)

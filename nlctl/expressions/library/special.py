@@ -12,6 +12,8 @@ from ..arrays import Tracer, traced
 from ..graph import Graph, Untraceable
 from ..operators import elementwise
 from .creation import whole_numbers
+from .exponential import expm
+from .gamma import gamma, loggamma_of_size
 from .linear_algebra import cholesky_factor, of_cholesky, of_triangle, of_triangles
 from .python import guard_whole
 from .reductions import prod, sum_along
@@ -35,6 +37,9 @@ def enter_scipy() -> None:
     for name, solution in (("cho_solve", of_cholesky), ("lu_solve", of_triangles)):
         enter([getattr(linalg, name)], solution)
     enter([linalg.solve_triangular], of_triangle)
+    enter([linalg.expm], expm)
+    for name, of_gamma in (("gamma", gamma), ("gammaln", loggamma_of_size)):
+        formula(getattr(special, name))(of_gamma)
     enter([linalg.cho_factor], cholesky_factor)
     for name, formula_of in _FORMULAS.items():
         formula(getattr(special, name))(formula_of)
@@ -43,6 +48,10 @@ def enter_scipy() -> None:
     for name in ("log1p", "expm1", "exp2", "cbrt"):
         if getattr(special, name) is not getattr(np, name):
             enter([getattr(special, name)], functools.partial(_elementwise, name))
+
+
+formula(math.lgamma)(loggamma_of_size)
+formula(math.gamma)(gamma)
 
 
 def cumulative_trapezoid(

@@ -13,7 +13,7 @@ from ...expressions.arrays import Tracer
 from ...expressions.bends import only_bends
 from ...expressions.conditions import at_integers, conditions, switching_functions
 from ...expressions.derivatives import tangents
-from ...expressions.graph import Expr, Graph, needed, parts_first
+from ...expressions.graph import ORDERS, Expr, Graph, needed, parts_first
 from ...expressions.sharp import SharpArgument, sharp_arguments
 from ..diagram.nodes import Node
 from ..diagram.parameters import length
@@ -115,7 +115,7 @@ def found_conditions(
     known = {_key(e) for e in _pieces(declared)}
     located: dict[object, Located] = {}
     of_time: dict[Expr, None] = {}
-    rows = beyond = count = 0
+    rows, count, beyond = 0, 0, sum(n.op in ORDERS for n in inside & reader.graph.of_passes)
     only_shown = set(needed(list(shown))) - inside
     # Towards rest in a finite time, x' = -sign(x) sqrt(|x|), nothing jumps within tolerances of 0.
     steep = any(node.op in _STEEP and node.varies for node in moving)
@@ -211,7 +211,7 @@ def _undeclared(
             continue
         given = set(_pieces([reader.wired(node.inputs)]))
         parts = [reader.signals[i], rates[i], *([guards[i]] if i in guards else [])]
-        for condition in conditions(_pieces(parts), given):
+        for condition in conditions(_pieces(parts), given, reader.graph.of_passes):
             yield condition, node
     # What signals are, and memories become, is of blocks.
     for condition in conditions(watched, {*_pieces(reader.signals.values()), *others}):

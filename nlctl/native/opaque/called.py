@@ -25,7 +25,6 @@ from ...upstream.control_internals import current_parameters
 from ...upstream.numba_internals import CPUDispatcher
 from ...upstream.systems import System
 from ...wording import counted
-from ..diagram.checks import refused_block
 from ..diagram.parameters import Slot, current_values
 from ..purity import dicts
 from ..purity.dicts import (
@@ -95,8 +94,6 @@ def call_of(
     count: int, reason: str,
 ) -> Call:  # fmt: skip
     """Return a call of a block's functions."""
-    for message in node.messages:  # nobody knows how often machine code calls it
-        raise refused_block(node.path, kind, message)
     size = sum(s.size for s in slots.values())
     stands = _AsItStands(
         path=node.path,
@@ -107,8 +104,12 @@ def call_of(
         record=type(current_parameters(node.system)) if isinstance(node.system, Block) else None,
         lengths=(1, node.system.nstates or 0, len(node.inputs), size, count),
     )
+    reason = "; ".join([reason, *(f"it {m.reason} ({m.place})" for m in node.messages)])
     # a name without a value is an error in Python, and 0 in numba's machine code
-    source = None if node.numba_differs else partial(_source, name, stands, node.system)
+    # and a message of Python's is written by Python
+    source = (
+        None if node.numba_differs or node.messages else partial(_source, name, stands, node.system)
+    )
     return Call(
         name=name, block=node.path, kind=kind, lengths=stands.lengths, reason=reason,
         function=stands, source=source,

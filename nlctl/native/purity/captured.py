@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, compress
 from operator import getitem, is_, not_
-from types import CellType, CodeType, FunctionType, MethodType
+from types import CellType, CodeType, FunctionType, MappingProxyType, MethodType
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from .values import PLAIN
 GONE = object()
 _SEQUENCES = (list, tuple, deque, bytearray, array)
 _OF_PARTIALS = ("func", "args", "keywords")
+_TABLES = ("scipy.interpolate", "scipy.spatial.transform", "numpy.polynomial")
 
 
 @dataclass(frozen=True)
@@ -110,12 +111,14 @@ def recorded(value: Any) -> Any:
     """Return what a value is compared with: copies of arrays and containers, else itself."""
     if isinstance(value, np.ndarray):
         return value.copy()
-    if isinstance(value, dict):
+    if isinstance(value, dict | MappingProxyType):
         return _Kept(type(value), tuple((k, recorded(v)) for k, v in value.items()))
     if isinstance(value, _SEQUENCES):
         return _Kept(type(value), tuple(map(recorded, value)))
     if isinstance(value, set | frozenset):
         return _Kept(type(value), frozenset(value))
+    if isinstance(value, np.poly1d) or type(value).__module__.startswith(_TABLES):
+        return _Content(value, {k: recorded(v) for k, v in _content(value).items()})
     return value.copy() if _is_table(value) else value
 
 
@@ -131,13 +134,35 @@ class _Kept:
     held: Any
 
     def __repr__(self) -> str:
-        if issubclass(self.kind, dict):
+        if issubclass(self.kind, dict | MappingProxyType):
             return repr(dict(self.held))
         return repr(list(self.held) if self.kind is list else self.held)
 
 
+@dataclass(frozen=True)
+class _Content:
+    """A spline, a table or a polynomial, and the arrays that it holds: they may be written."""
+
+    thing: Any
+    held: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"{self.thing!r} with other content"
+
+
+def _content(value: Any) -> dict[str, Any]:
+    """Return the numbers and containers that an object of a library holds."""
+    slots = [name for cls in type(value).__mro__ for name in getattr(cls, "__slots__", ())]
+    held = {name: getattr(value, name) for name in slots if hasattr(value, name)}
+    held |= getattr(value, "__dict__", {})
+    return {k: v for k, v in held.items() if isinstance(v, (np.ndarray, tuple, list, *PLAIN))}
+
+
 def same(now: Any, then: Any) -> bool:
     """Whether a value is what was recorded."""
+    if isinstance(then, _Content):
+        held = _content(now) if now is then.thing else None
+        return held is not None and all(same(held.get(k, GONE), v) for k, v in then.held.items())
     if isinstance(then, _Kept):
         return type(now) is then.kind and _same_held(now, then.held)
     if type(now) is not type(then):
@@ -161,7 +186,7 @@ def same(now: Any, then: Any) -> bool:
 
 def _same_held(now: Any, held: Any) -> bool:
     """Whether a container holds what it held."""
-    if isinstance(now, dict):
+    if isinstance(now, dict | MappingProxyType):
         if len(now) != len(held):
             return False
         return all(k in now and same(now[k], v) for k, v in held)

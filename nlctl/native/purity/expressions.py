@@ -106,7 +106,7 @@ class Expressions(ast.NodeVisitor):
         builtin = builtin if isinstance(builtin, dict) else vars(builtin)
         if name in function.__globals__:
             return self.walk.captured(function.__globals__, name, function.__globals__[name])
-        return captured(builtin[name]) if name in builtin else OUTSIDE
+        return self.walk.captured(builtin, name, builtin[name]) if name in builtin else OUTSIDE
 
     def assign(self, name: str, value: KnownValue) -> None:
         kind = self.frame.shared.get(name)
@@ -297,6 +297,9 @@ class Expressions(ast.NodeVisitor):
         if isinstance(base.known, dict | list | tuple):
             try:
                 key: Any = keys[0] if len(keys) == 1 else tuple(keys)
+                missing = getattr(type(base.known), "__missing__", None)
+                if isinstance(missing, FunctionType) and key not in base.known:
+                    return self.walk.function(missing, Given((base, captured(key))))
                 return captured(base.known[key])
             except (LookupError, TypeError):
                 return OUTSIDE  # it raises where it runs
@@ -333,17 +336,21 @@ class Expressions(ast.NodeVisitor):
             self.walk.captured(type(thing), name, entry)
             getter = entry.fget if isinstance(entry, property) else entry.func
             result = self.walk.call(captured(getter), Given((base,)))
-            if getter is not getattr(entry, "fget", None):
+            if isinstance(entry, functools.cached_property):
+                kept = getattr(thing, name, None)  # Python would compute it at the first call
+                self.walk.captured(vars(thing), name, kept)
                 return handed_out_again(result)
             return result if not result.own else FRESH
         if isinstance(thing, enum.Enum) and entry is inspect.getattr_static(enum.Enum, name, None):
-            return captured(getattr(thing, name))  # its name or its value
+            return self.walk.captured(thing, name, getattr(thing, name))  # its name or its value
         if isinstance(thing, ModuleType) or _is_plain_attribute(thing, name):
             value = getattr(thing, name, UNKNOWN_VALUE)
             if isinstance(value, Unknown):  # it raises where it runs, if it does
                 return KnownValue(False, False, True, known=Pure())
             if isinstance(value, BuiltinFunctionType) and isinstance(thing, known_calls.CONTAINERS):
                 return captured(value)  # a method, a new one each time it is read
+            if (library(type(thing)) or "").startswith("pandas"):
+                return captured(value)  # a part of a table that is noted
             return self.walk.captured(thing, name, value)
         raise Impure(f"reads '.{name}' of an object that computes it", "use a plain attribute")
 
@@ -399,11 +406,13 @@ class Expressions(ast.NodeVisitor):
     visit_SetComp = visit_GeneratorExp = visit_ListComp
 
     def visit_DictComp(self, node: ast.DictComp) -> KnownValue:
-        return self.comprehended(node.generators, [node.key, node.value])
+        return self.comprehended(node.generators, [node.value], [node.key])
 
     def comprehended(
-        self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr]
-    ) -> KnownValue:
+        self, loops: Sequence[ast.comprehension], parts: Sequence[ast.expr],
+        keys: Sequence[ast.expr] = (),
+    ) -> KnownValue:  # fmt: skip
+        """Return what is known of a list or dict of parts; keys never change."""
         before = dict(self.frame.names)
         for loop in loops:
             over = self.visit(loop.iter)
@@ -411,6 +420,8 @@ class Expressions(ast.NodeVisitor):
             self.bind(loop.target, element(over))
             for condition in loop.ifs:
                 self.condition(condition)
+        for key in keys:
+            self.visit(key)
         held = holder([self.visit(part) for part in parts])
         self.frame.names = before
         return held

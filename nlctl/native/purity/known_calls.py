@@ -58,7 +58,8 @@ VIEWS = {"asarray", "asanyarray", "ascontiguousarray", "atleast_1d", "atleast_2d
          "reshape", "ravel", "squeeze", "transpose", "swapaxes", "moveaxis", "rollaxis",
          "expand_dims", "broadcast_to", "broadcast_arrays", "split", "array_split", "hsplit",
          "vsplit", "dsplit", "diagonal", "diag", "flip", "fliplr", "flipud", "rot90", "real",
-         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack"}  # fmt: skip
+         "imag", "view", "matrix_transpose", "permute_dims", "nan_to_num", "unstack",
+         "to_numpy"}  # fmt: skip
 WRITERS = {"copyto", "put", "place", "putmask", "fill_diagonal", "put_along_axis", "insort",
            "insort_left", "insort_right"}  # fmt: skip
 IN_PLACE = {"setitem", "delitem", "iadd", "isub", "imul", "itruediv", "ifloordiv", "imod",
@@ -73,7 +74,8 @@ _OTHERS |= dict.fromkeys(("save", "savez", "savez_compressed", "savetxt", "load"
                          "read files before the run, and write them after it")  # fmt: skip
 _TABLES = ("scipy.interpolate", "scipy.spatial", "numpy.polynomial")
 _OF_LAWS = ("pdf", "logpdf", "cdf", "logcdf", "sf", "ppf", "pmf", "isf", "mean", "std", "var")
-_OF_TABLES = ("to_numpy", "tolist")
+_OF_TABLES = ("to_numpy", "tolist", "to_list", "to_dict", "itertuples", "iterrows", "items", "get",
+              "keys", "max", "min", "mean", "sum", "head", "squeeze", "copy")  # fmt: skip
 VARYING = ("numpy.random", "scipy.stats", "scipy.io", "numpy.testing", "numpy.lib")
 _SEEDED = ("default_rng", "RandomState")
 # methods that change nothing, of arrays, numbers, texts, dicts and lists

@@ -180,5 +180,7 @@ def operator_of(walk: Walk, value: KnownValue, name: str) -> FunctionType | None
     function = inspect.getattr_static(cls, name, None)
     if not isinstance(function, FunctionType) or _is_generated(function):
         return None
+    if function.__module__ == "enum":  # a member or a combination of members
+        return None
     walk.captured(cls, name, function)
     return function

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import importlib
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -239,13 +240,17 @@ class CallWalker(Expressions):
         for alias in node.names:
             module = _imported(alias.name)
             top = _imported(alias.name.partition(".")[0])
+            for imported in (module, top):  # a test may have put another in its place
+                self.walk.captured(sys.modules, imported.__name__, imported)
             self.assign(alias.asname or top.__name__, captured(module if alias.asname else top))
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
         package = self.frame.function.__globals__.get("__package__")
         module = _imported("." * node.level + (node.module or ""), package)
+        self.walk.captured(sys.modules, module.__name__, module)
         for alias in node.names:
-            self.assign(alias.asname or alias.name, captured(getattr(module, alias.name)))
+            value = getattr(module, alias.name)
+            self.assign(alias.asname or alias.name, self.walk.captured(module, alias.name, value))
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         value = KnownValue(True, True, known=Local(node, self.frame))

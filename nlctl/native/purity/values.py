@@ -23,7 +23,7 @@ _CHOICES = 64  # functions in a list, beyond which it is too much to follow
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, slice)  # never change
 _LIBRARIES = ("numpy", "scipy", "math", "cmath", "numba", "builtins", "operator", "_operator",
               "functools", "_functools", "itertools", "bisect", "_bisect", "control", "copy",
-              "statistics", "pandas")  # fmt: skip
+              "statistics", "fractions", "pandas")  # fmt: skip
 
 
 class Impure(Exception):  # noqa: N818 (it is what a walk finds)
@@ -190,7 +190,9 @@ def captured(thing: object) -> KnownValue:
         return KnownValue(True, True, known=thing)
     if isinstance(thing, np.ndarray):
         return KnownValue(False, thing.ndim <= 1, known=thing)
-    numbers = isinstance(thing, tuple) and all(isinstance(v, PLAIN) for v in thing)
+    parts = thing.values() if isinstance(thing, dict) else thing
+    held = isinstance(thing, tuple | list | dict | set | frozenset)
+    numbers = held and all(isinstance(v, PLAIN) for v in parts)
     return KnownValue(False, numbers, True, known=thing)
 
 

@@ -6,12 +6,14 @@ Each change is one that python-control sees: its next run computes the new loop.
 import collections
 import functools
 import importlib
+import sys
 import types
 from dataclasses import dataclass, field
 
 import control as ct
 import numpy as np
 import pytest
+from scipy import interpolate
 
 import nlctl
 
@@ -290,6 +292,72 @@ def changed_cached():
         gain.cache_clear()
 
     return system(lambda t, x, u, p: [-gain() * x[0]]), change
+
+
+def changed_builtin(monkeypatch):
+    import builtins
+
+    made = system(lambda t, x, u, p: [-pow(x[0], 3)])
+    return made, lambda: monkeypatch.setattr(builtins, "pow", lambda v, k: 5.0)
+
+
+def changed_module_of_an_import(monkeypatch):
+    def update(t, x, u, p):
+        import math
+
+        return [-math.cosh(x[0])]
+
+    other = types.SimpleNamespace(__name__="math", cosh=lambda v: 3.0)
+    return system(update), lambda: monkeypatch.setitem(sys.modules, "math", other)
+
+
+class Kept:
+    """An object whose gain is computed once, or assigned."""
+
+    gain = functools.cached_property(lambda self: 2.0)
+
+
+def changed_cached_property_of_its_own():
+    thing = Kept()
+    return system(lambda t, x, u, p: [-thing.gain * x[0]]), lambda: setattr(thing, "gain", 9.0)
+
+
+def changed_coefficients():
+    law = np.poly1d([2.0, 0.5])
+    return system(lambda t, x, u, p: -law(x)), lambda: law.coeffs.__setitem__(0, 9.0)
+
+
+def changed_content_of_a_spline():
+    laws = {"drag": [interpolate.CubicSpline([0.0, 1.0, 2.0], [0.0, 1.0, 4.0])]}
+    change = lambda: laws["drag"][0].c.__setitem__((2, 0), 9.0)  # noqa: E731
+    return system(lambda t, x, u, p: -laws["drag"][0](x)), change
+
+
+def changed_content_of_a_table():
+    table = interpolate.RegularGridInterpolator(([0.0, 2.0], [0.0, 1.0]), np.eye(2))
+    change = lambda: table.values.__setitem__((1, 1), 9.0)  # noqa: E731
+    return system(lambda t, x, u, p: -table((abs(x[0]), 0.5))), change
+
+
+def changed_through_a_view_of_a_dict():
+    content = {"k": 2.0}
+    view = types.MappingProxyType(content)
+    return system(lambda t, x, u, p: [-view["k"] * x[0]]), lambda: content.update(k=9.0)
+
+
+class Otherwise(dict):
+    """A dict with a value for keys that it does not have."""
+
+    gain = 2.0
+
+    def __missing__(self, key):
+        return self.gain
+
+
+def changed_value_of_missing_keys(monkeypatch):
+    table = Otherwise()
+    change = lambda: monkeypatch.setattr(Otherwise, "gain", 9.0)  # noqa: E731
+    return system(lambda t, x, u, p: [-table["k"] * x[0]]), change
 
 
 def changed_record_of_a_block():

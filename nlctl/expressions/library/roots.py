@@ -1,0 +1,119 @@
+"""Roots of functions of one number: SciPy's methods in Python, pass by pass as these have them.
+
+A traced function finds these instead of `scipy.optimize`'s.  Where SciPy raises an error, or
+needs more passes than are written out, the result is NaN.
+
+Source: `scipy/optimize/Zeros/brentq.c`, `bisect.c`, `scipy/optimize/_zeros_py.py`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+_PASSES = 30  # that are written out of Brent's method: it takes 5 to 12
+
+
+@functools.cache
+def roots() -> dict[Any, Callable[..., Any]]:
+    """Return what stands for functions of SciPy."""
+    from scipy import optimize
+
+    return {optimize.brentq: brentq, optimize.bisect: bisect, optimize.newton: newton}
+
+
+def brentq(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
+    """Return a root between two places with values of opposite signs, by Brent's method."""
+    xpre, xcur = np.multiply(1.0, a), np.multiply(1.0, b)  # in C nothing raises errors
+    fpre, fcur = f(xpre, *args), f(xcur, *args)
+    if fpre * fcur > 0:
+        raise ValueError("f(a) and f(b) must have different signs")
+    fpre, fcur = np.multiply(1.0, fpre), np.multiply(1.0, fcur)
+    xblk, fblk, spre, scur = xpre, fpre, xcur - xpre, xcur - xpre
+    stop = (fpre == 0) | (fcur == 0)
+    xcur = np.where(fpre == 0, xpre, xcur)
+    for _ in range(min(maxiter, _PASSES)):
+        if stop:
+            return xcur
+        if fpre * fcur < 0:
+            xblk, fblk, spre, scur = xpre, fpre, xcur - xpre, xcur - xpre
+        if abs(fblk) < abs(fcur):
+            xpre, xcur, xblk, fpre, fcur, fblk = xcur, xblk, xcur, fcur, fblk, fcur
+        delta = (xtol + rtol * abs(xcur)) / 2
+        sbis = (xblk - xcur) / 2
+        if fcur == 0 or abs(sbis) < delta:
+            return xcur
+        line = -fcur * (xcur - xpre) / (fcur - fpre)
+        dpre, dblk = (fpre - fcur) / (xpre - xcur), (fblk - fcur) / (xblk - xcur)
+        bent = -fcur * (fblk * dblk - fpre * dpre) / (dblk * dpre * (fblk - fpre))
+        stry = np.where(xpre == xblk, line, bent)
+        short = 2 * abs(stry) < np.minimum(abs(spre), 3 * abs(sbis) - delta)
+        taken = (abs(spre) > delta) & (abs(fcur) < abs(fpre)) & short
+        spre, scur = np.where(taken, scur, sbis), np.where(taken, stry, sbis)
+        xpre, fpre = xcur, fcur
+        xcur = xcur + np.where(abs(scur) > delta, scur, np.where(sbis > 0, delta, -delta))
+        fcur = np.multiply(1.0, f(xcur, *args))
+    raise RuntimeError("Failed to converge")
+
+
+def bisect(f, a, b, args=(), xtol=2e-12, rtol=8.881784197001252e-16, maxiter=100):
+    """Return a root between two places with values of opposite signs, by halving."""
+    left, right = np.multiply(1.0, a), np.multiply(1.0, b)
+    width, first, last = right - left, f(left, *args), f(right, *args)
+    if first * last > 0:
+        raise ValueError("f(a) and f(b) must have different signs")
+    found, root = (first == 0) | (last == 0), np.where(first == 0, left, right)
+    for _ in range(maxiter):
+        if found:
+            return root
+        width = 0.5 * width
+        root = left + width
+        value = f(root, *args)
+        left = np.where(value * first > 0, root, left)
+        if value == 0 or abs(width) < xtol + rtol * abs(root):
+            return root
+    raise RuntimeError("Failed to converge")
+
+
+def newton(func, x0, fprime=None, args=(), tol=1.48e-8, maxiter=50, rtol=0.0):
+    """Return a root near a place, by Newton's method or that of secants."""
+    if fprime is not None:
+        return _tangents(func, np.multiply(1.0, x0), fprime, args, tol, maxiter, rtol)
+    p0 = np.multiply(1.0, x0)
+    p1 = p0 * (1 + 1e-4)
+    p1 = np.where(p1 >= 0, p1 + 1e-4, p1 - 1e-4)
+    return _secants(func, p0, p1, args, tol, maxiter, rtol)
+
+
+def _tangents(func, p0, fprime, args, tol, maxiter, rtol):
+    for _ in range(maxiter):
+        value = func(p0, *args)
+        if value == 0:
+            return p0
+        p = p0 - value / fprime(p0, *args)
+        if abs(p - p0) <= tol + rtol * abs(p0):
+            return p
+        p0 = p
+    raise RuntimeError("Failed to converge")
+
+
+def _secants(func, p0, p1, args, tol, maxiter, rtol):
+    q0, q1 = func(p0, *args), func(p1, *args)
+    swaps = abs(q1) < abs(q0)
+    p0, p1, q0, q1 = (np.where(swaps, p1, p0), np.where(swaps, p0, p1),
+                      np.where(swaps, q1, q0), np.where(swaps, q0, q1))  # fmt: skip
+    for _ in range(maxiter):
+        if q1 == q0:
+            return np.where(p1 == p0, (p1 + p0) / 2.0, np.nan)
+        one = (-q0 / q1 * p1 + p0) / (1 - q0 / q1)
+        other = (-q1 / q0 * p0 + p1) / (1 - q1 / q0)
+        p = np.where(abs(q1) > abs(q0), one, other)
+        if abs(p - p1) <= tol + rtol * abs(p1):
+            return p
+        p0, q0 = p1, q1
+        p1 = p
+        q1 = func(p1, *args)
+    raise RuntimeError("Failed to converge")
