@@ -15,7 +15,7 @@ from .candidates import GENERATION, Search, evolve, in_batches, some_corners, un
 from .first_order import FirstOrder, FirstOrderOf, lowest_nearby
 
 _DRAWS = 4  # corners, and uniform draws, of each round
-_CHANGES = (0, 1, 0, 2, 0, 1, 0, 2)  # of the simple signals of each round: they are constant apart
+_CHANGES = (0, 1, 0, 2)  # of the simple signals of each round: they are constant apart
 _GENERATIONS = 2  # of CMA-ES in each round
 _STEPS = 4  # descents have at most so many steps
 _SHORTEST = 1 / 256  # shortest step of a descent, in units of the boxes
@@ -24,7 +24,7 @@ _SHORTER = 4  # by what a step is shortened that did not go down
 # the first order says, and shorter where it gains less than the second one.
 _TRUSTED, _DOUBTED = 0.5, 0.25
 _SHORTEST_FIRST = 1 / 16  # descents begin with no shorter step
-_RESTARTS = 3  # times that simple signals are drawn in each round
+_RESTARTS = 5  # times that simple signals are drawn in each round
 _KINDS = 3  # test signals before anything else, one of each kind: alternating, a step, constant
 _MOST_CONSTANT = 16  # test signals that are constant
 _STEPS_OF_ROUND = 40  # steps of one signal in each round
@@ -52,8 +52,8 @@ def search_with_derivatives(
             in_batches(search, "simple signals", _simple_signals(search.space, pieces, rng))
             radius = _descend(search, derivatives, reasons, first, radius)
         first = search.margins.size
-        for k in range(0, min(len(steps), _STEPS_OF_ROUND), len(_CHANGES)):
-            in_batches(search, "steps", steps.iloc[k : min(k + len(_CHANGES), _STEPS_OF_ROUND)])
+        for k in range(0, min(len(steps), _STEPS_OF_ROUND), _DRAWS):
+            in_batches(search, "steps", steps.iloc[k : k + _DRAWS])
         steps = steps.iloc[_STEPS_OF_ROUND:]
         _one_by_one(search, tests.iloc[kinds:])
         kinds = len(tests)

@@ -117,7 +117,7 @@ def worst_case(
     With `derivatives` the order is another one, for few runs: a test signal of each kind
     (quantities ``name[0]``, ``name[1]``, ... are the pieces of a signal: all alternate between
     their ends, all step halfway, all are constant at an end), a descent from the worst of them
-    that ends where the first order fails, and then in turn signals drawn with few changes, three
+    that ends where the first order fails, and then in turn signals drawn with few changes, five
     times with a descent from the worst of these, signals of which one steps from end to end and
     the others stay at one (each once, after a number of pieces in a geometric sequence), uniform
     draws and at first the other test signals, a descent from the worst of those, and CMA-ES; a

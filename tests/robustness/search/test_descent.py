@@ -213,9 +213,9 @@ def test_every_test_signal_is_run_and_those_of_each_kind_are_first():
     np.testing.assert_array_equal(rows[:3], [[1, 0, 1, 0, 1, 0], [0, 0, 0, 1, 1, 1], [1] * 6])
     np.testing.assert_array_equal(rows[found.searchers == "test signals"], tests)
     drawn = found.searchers[found.searchers != "derivatives"]
-    assert set(drawn[3:27]) == {"simple signals"}
-    assert set(drawn[27:35]) == {"steps"}  # behind 1, 2, 3, 4 pieces, upwards and downwards
-    assert set(drawn[35 : 32 + len(tests)]) == {"test signals"}
+    assert set(drawn[3:23]) == {"simple signals"}
+    assert set(drawn[23:31]) == {"steps"}  # behind 1, 2, 3, 4 pieces, upwards and downwards
+    assert set(drawn[31 : 28 + len(tests)]) == {"test signals"}
 
 
 def test_steps_are_of_one_signal_between_its_ends_behind_times_in_a_geometric_sequence():
