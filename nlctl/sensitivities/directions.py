@@ -101,24 +101,35 @@ def _part(graph: Graph, expr: Expr, start: int, size: int) -> SomeRows:
     return (graph.item(expr, start) if size == 1 else graph.part(expr, start, 1, size)), size
 
 
-def one_sided(graph: Graph, exprs: Sequence[Expr], direction: Direction) -> list[Expr]:
+def one_sided(
+    graph: Graph,
+    exprs: Sequence[Expr],
+    direction: Direction,
+    solutions: Mapping[str, Sequence[Expr]],
+) -> list[Expr]:
     """Return expressions in which `max`, `min` and `abs` at a tie go where the direction leads."""
     # Their derivatives along that direction are those to its own side.
     new: dict[Expr, Expr] = {}
     for node in needed(exprs):
         args = tuple(new.get(a, a) for a in node.args)
         if node.op in ("maximum", "minimum", "absolute") and node.varies:
-            new[node] = _leading(graph, node.op, args, direction)
+            new[node] = _leading(graph, node.op, args, direction, solutions)
         elif args != node.args:
             new[node] = graph.like(node, *args)
     return [new.get(e, e) for e in exprs]
 
 
-def _leading(graph: Graph, op: str, args: Sequence[Expr], direction: Direction) -> Expr:
+def _leading(
+    graph: Graph,
+    op: str,
+    args: Sequence[Expr],
+    direction: Direction,
+    solutions: Mapping[str, Sequence[Expr]],
+) -> Expr:
     pair = list(map(graph.number, args))
     if op == "absolute":
         pair.append(graph.op("neg", pair[0]))
-    changes = slopes(graph, pair, direction, {})
+    changes = slopes(graph, pair, direction, solutions)
     rates = [graph.const(0.0) if rate is None else rate for rate in changes]
     order = "lt" if op == "minimum" else "gt"
     ahead = graph.op("and", graph.op("eq", *pair), graph.op(order, *rates))

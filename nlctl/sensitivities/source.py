@@ -168,7 +168,8 @@ class EquationParts:
         if not driven:
             return list(flow)
         direction = self.time(flow)
-        ahead = one_sided(self.graph, list(driven.values()), direction)
+        solutions = self.equations.fixed_points
+        ahead = one_sided(self.graph, list(driven.values()), direction, solutions)
         rates = self.changes(ahead, direction)
         return rows_replaced(self.graph, flow, dict(zip(driven, rates, strict=True)))
 

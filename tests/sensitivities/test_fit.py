@@ -121,6 +121,24 @@ def test_what_data_do_not_tell():
     assert "not identifiable from these data: plant.a, plant.b, plant.c" in repr(found)
 
 
+def test_start_at_a_kink():
+    """x' = p - |x| from 0 with p = 0 has no derivative: the text says so, with the time."""
+    plant = block(lambda t, x, u, p: [p["p"] - abs(x[0])], {"p": 0.0})
+    found = nlctl.fit(plant, T, {"x": np.tanh(T)}, {"plant.p": 0.0})
+    assert found.unidentifiable == ("plant.p",)
+    assert "no derivative by plant.p from t = 0 s on" in repr(found)
+    assert "kink" in repr(found)
+
+
+def test_search_that_is_given_up():
+    """One run is too few, and the text says that it has not converged."""
+    found = nlctl.fit(
+        decay(), T, {"x": np.exp(-T)}, {"plant.a": 3.0}, 0.0, [1.0], max_evaluations=1
+    )
+    assert not found.success
+    assert "has not converged" in repr(found)
+
+
 @pytest.mark.parametrize(
     ("data", "parameters", "more", "match"),
     [

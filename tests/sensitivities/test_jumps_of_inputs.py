@@ -201,3 +201,32 @@ def test_turns_at_all_tolerances(rtol):
         loop, [0, 2.0], with_respect_to=["source.w", "source.A"], rtol=rtol, atol=0.01 * rtol
     )
     assert np.allclose(made.derivatives[0, :, -1], [0.0, 1.0], rtol=0, atol=max(1e-8, 5 * rtol))
+
+
+def test_play_in_an_algebraic_loop():
+    """w = play(A sin t - q w): (A sin t - c) / (1 + q) on its right side, and held from pi / 2."""
+    source = ct.nlsys(
+        None, lambda t, x, u, p: [p["A"] * np.sin(t) - p["q"] * u[0]], inputs=["w"],
+        outputs=["e"], params={"A": 2.0, "q": 0.5}, name="source",
+    )  # fmt: skip
+    integral = ct.nlsys(
+        lambda t, x, u, p: u, lambda t, x, u, p: x, inputs=["w"], outputs=["y"], states=["y"],
+        name="integral",
+    )  # fmt: skip
+    loop = nlctl.compile(
+        nlctl.interconnect(
+            {"source": source, "gap": play(), "integral": integral},
+            connections=[["source.w", "gap.v"], ["gap.u", "source.e"], ["integral.w", "gap.v"]],
+            inplist=[], outlist=["gap.v"], outputs=["w"],
+        ), algebraic_loops="solve",
+    )  # fmt: skip
+    t = np.array([0.0, 1.0, 1.5, 1.8])
+    made = nlctl.sensitivity_response(loop, t, with_respect_to=["source.A", "source.q", "gap.c_r"])
+    s = np.sin(np.minimum(t[1:], np.pi / 2))
+    assert made.success
+    for name, slope in (
+        ("source.A", s / 1.5),
+        ("source.q", -(2 * s - 0.5) / 1.5**2),
+        ("gap.c_r", -np.ones(3) / 1.5),
+    ):
+        assert np.allclose(made["w", name][1:], slope, rtol=0, atol=1e-7)

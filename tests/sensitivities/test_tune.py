@@ -186,6 +186,17 @@ def test_start_that_diverges():
     assert any("does not reach its end" in note for note in found.notes)
 
 
+def test_no_run_reaches_its_end():
+    """x' = a x^2 from 1 has no state at 1 / a: nothing is said of what nobody has seen."""
+    plant = block(lambda t, x, u, p: [p["a"] * x[0] ** 2], {"a": 2.0})
+    spec = Requirement(key="small", formula=always(in_band("x", upper=9.0)), until=2.0)
+    found = nlctl.tune(
+        plant, {"plant.a": (1.0, 3.0)}, spec, budget=20, initial_state={"plant.x": 1.0}
+    )
+    assert any("no run that was tried reaches its end" in note for note in found.notes)
+    assert not any("flat" in note or "depends on" in note for note in found.notes)
+
+
 def test_values_that_a_block_refuses_together():
     """A dead zone whose ends would cross is as good as a run that does not reach its end."""
     source = ct.nlsys(None, lambda t, x, u, p: [np.sin(t)], inputs=0, outputs=["u"], name="source")
@@ -234,6 +245,8 @@ def test_nothing_is_lost_by_an_interrupt():
         ({"plant.a": (0.1, 1.0)}, small, {"samples": {"plant.a": [1.0]}}, "leave it out"),
         ({"plant.a": (0.1, 1.0)}, small, {"samples": {"plant.b": [np.nan]}}, "finite numbers"),
         (3.0, small, {}, "gains with their bounds"),
+        ({"plant.a": (0.1, 1.0)}, lambda: [small(), small()], {}, "have the key 'small'"),
+        ({"plant.a": (0.1, 1.0)}, small, {"timepts": [0, 0.5]}, "timepts end at 0.5 s"),
     ],
 )
 def test_bad_input(space, spec, more, words):
