@@ -201,7 +201,7 @@ def names_of_choices(graph: Graph) -> dict[str, Callable[..., Any]]:
     return {INSTEAD_NAME.format(k): functools.partial(f, graph) for k, f in functions.items()}
 
 
-def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choices(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return what either branch assigns, by a condition that is not known; None if it is."""
     condition = _open(graph, test)
     if condition is None:
@@ -216,7 +216,7 @@ def _choices(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], A
         return None
 
 
-def _choice(graph: Graph, test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+def _choice(graph: Graph, test: object, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
     """Return ``yes() if test else no()``."""
     chosen = _choices(graph, test, lambda: (yes(),), lambda: (no(),))
     if chosen is None:
@@ -232,7 +232,7 @@ def _logic(graph: Graph, kind: str, *parts: Callable[[], Any]) -> Any:
     return value
 
 
-def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
+def _with(graph: Graph, kind: str, value: object, part: Callable[[], Any]) -> Any:
     ask = lambda: (_asked(graph, part()),)  # noqa: E731
     if kind == "and":
         both = _choices(graph, value, ask, lambda: (False,))
@@ -241,19 +241,19 @@ def _with(graph: Graph, kind: str, value: Any, part: Callable[[], Any]) -> Any:
     return either[0] if either else value or part()
 
 
-def _opposite(graph: Graph, value: Any) -> Any:
+def _opposite(graph: Graph, value: object) -> Any:
     """Return ``not value``."""
     condition = _open(graph, value)
     return not value if condition is None else elementwise(graph, "not", _asked(graph, value))
 
 
-def _asked(graph: Graph, value: Any) -> Any:
+def _asked(graph: Graph, value: object) -> Any:
     """Return the truth of a number."""
     number = traced(graph, value)
     return number if number.only.kind == "b" else elementwise(graph, "ne", number, 0.0)
 
 
-def _open(graph: Graph, test: Any) -> Expr | None:
+def _open(graph: Graph, test: object) -> Expr | None:
     """Return a condition that is not known, and not decided on this path."""
     if not isinstance(test, Tracer) or test.shape:
         return None
@@ -272,7 +272,7 @@ def _under(graph: Graph, condition: Expr, holds: bool, branch: Callable[[], Any]
     return values
 
 
-def _selected(graph: Graph, condition: Expr, one: Any, other: Any) -> Tracer:
+def _selected(graph: Graph, condition: Expr, one: object, other: object) -> Tracer:
     a, b = traced(graph, one), traced(graph, other)
     kinds = {a.only.kind, b.only.kind} if not (a.shape or b.shape) else set()
     if not kinds or ("b" in kinds and len(kinds) > 1):

@@ -78,7 +78,7 @@ INSIDE = {  # the same within large packages: their rooms and single modules, fr
         ["stepping", "operating_points", "frequency"],
     ],
     "nlctl.expressions": [
-        ["graph", "source"],
+        ["arithmetic", "graph", "source"],
         ["functions", "elimination", "linear_systems"],
         ["arrays", "operators", "masked", "indexing", "edges"],
         ["without_poles"],

@@ -122,7 +122,7 @@ def _metric(metric: Metric) -> dict[str, Any]:
     }
 
 
-def _function(function: Any) -> str:
+def _function(function: object) -> str:
     """Return a function's name, and a key of it and of all that it reaches."""
     plain = function
     while isinstance(plain, functools.partial):

@@ -176,7 +176,7 @@ def _reason(name: str, grant: Grant) -> str:
     return grant.admits(path) if path.is_file() else ""
 
 
-def check_defined(function: Any, name: str, grant: Grant) -> None:
+def check_defined(function: object, name: str, grant: Grant) -> None:
     """Refuse a function that another module defines than one that may run."""
     # A file may have the names of others: ``from pandas import read_pickle``.
     module = getattr(_plain(function), "__module__", None) or ""
@@ -302,7 +302,7 @@ def _installed(top: str) -> tuple[Path, ...]:
     return tuple(sites)
 
 
-def check_function(function: Any, name: str) -> None:
+def check_function(function: object, name: str) -> None:
     """Refuse what no study needs to be called: functions of the standard library, builtins."""
     if isinstance(function, ct.InputOutputSystem):
         raise ParameterError(
@@ -317,7 +317,7 @@ def check_function(function: Any, name: str) -> None:
         )
 
 
-def check_loop_function(function: Any, name: str) -> None:
+def check_loop_function(function: object, name: str) -> None:
     """Refuse, without calling it, a function that is not known to return a diagram."""
     # That is known by its return annotation, or because it, or what it calls, uses control or
     # nlctl.

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arithmetic import Arithmetic
 from ..arrays import Tracer, mapped, scalar, traced
 from ..graph import Expr, Graph, Untraceable
 from .surfaces import surface
@@ -15,7 +16,7 @@ from .table import enter
 from .tables import MOST_PIECES, constant_cells, interval_choice, interval_polynomial, polynomial
 
 
-def called_object(graph: Graph, thing: object, *arguments: Any, **options: Any) -> Any:
+def called_object(graph: Graph, thing: object, *arguments: object, **options: object) -> Any:
     """Return what an object of a library, that can be called, makes of arrays of expressions."""
     for kinds, written in _kinds():
         if isinstance(thing, kinds):
@@ -51,7 +52,7 @@ def enter_splines() -> None:
     enter([interpolate.interpn], at_grid)
 
 
-def _floats(values: Any) -> np.ndarray:
+def _floats(values: object) -> np.ndarray:
     return np.asarray(values, dtype=float)
 
 
@@ -61,13 +62,13 @@ def _mapped_polynomial(graph: Graph, p: Any, x: Any) -> Any:
     return polynomial(graph, float(off) + float(scale) * traced(graph, x), _floats(p.coef))
 
 
-def _elementwise(graph: Graph, x: Any, function: Callable[[Expr], Expr]) -> Tracer:
+def _elementwise(graph: Graph, x: object, function: Callable[[Expr], Expr]) -> Tracer:
     cells = mapped(lambda e: function(graph.number(e)), traced(graph, x).elements())
     return Tracer(graph, cells)
 
 
 def piecewise_polynomial(
-    graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = None
+    graph: Graph, thing: Any, x: Arithmetic, nu: int = 0, extrapolate: Any = None
 ) -> Any:
     """Return SciPy's piecewise polynomial, or a derivative."""
     if nu:
@@ -115,7 +116,7 @@ def b_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, extrapolate: Any = N
     return piecewise_polynomial(graph, unwrapped, x, nu)
 
 
-def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
+def splev(graph: Graph, x: object, tck: Any, der: int = 0, ext: int = 0) -> Any:
     """Return a spline that is given by knots, coefficients and degree."""
     from scipy.interpolate import BSpline
 
@@ -142,7 +143,7 @@ def splev(graph: Graph, x: Any, tck: Any, der: int = 0, ext: int = 0) -> Any:
     return Tracer(graph, cells)
 
 
-def _numbers(values: Any) -> Any:
+def _numbers(values: object) -> Any:
     from .table import constant_value
 
     constant = constant_value(values) if isinstance(values, Tracer) else values
@@ -151,7 +152,7 @@ def _numbers(values: Any) -> Any:
     return constant
 
 
-def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None) -> Any:
+def fitted_spline(graph: Graph, thing: Any, x: Arithmetic, nu: int = 0, ext: Any = None) -> Any:
     """Return one of SciPy's splines that are fitted to data."""
     codes = {"extrapolate": 0, "zeros": 1, "raise": 2, "const": 3}
     how = thing.ext if ext is None else ext
@@ -159,7 +160,7 @@ def fitted_spline(graph: Graph, thing: Any, x: Any, nu: int = 0, ext: Any = None
     return splev(graph, x, thing._eval_args, nu, code)
 
 
-def table_of_one(graph: Graph, thing: Any, x: Any) -> Any:
+def table_of_one(graph: Graph, thing: Any, x: Arithmetic) -> Any:
     """Return SciPy's interp1d."""
     kind = getattr(thing, "_kind", "")
     values = np.asarray(thing.y, dtype=float)
@@ -201,7 +202,7 @@ def _fill(thing: Any) -> tuple[Any, Any]:
     return thing._fill_value_below, thing._fill_value_above
 
 
-def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
+def _grid(graph: Graph, thing: Any, xi: object, method: Any = None) -> Any:
     """Return SciPy's interpolation on a grid: linear along one axis after the other."""
     values = np.asarray(thing.values, dtype=float)
     if (method or thing.method) != "linear" or values.ndim != len(thing.grid):
@@ -219,7 +220,9 @@ def _grid(graph: Graph, thing: Any, xi: Any, method: Any = None) -> Any:
     return whole[0] if flat else whole
 
 
-def at_grid(graph: Graph, points: Any, values: Any, xi: Any, *rest: Any, **options: Any) -> Any:
+def at_grid(
+    graph: Graph, points: Any, values: object, xi: object, *rest: Any, **options: object
+) -> Any:
     """Return SciPy's `interpn`."""
     from scipy.interpolate import RegularGridInterpolator
 

@@ -13,7 +13,7 @@ from .tables import MOST_PIECES, constant_cells, interval_polynomial
 
 
 def surface(
-    graph: Graph, thing: Any, x: Any, y: Any, dx: int = 0, dy: int = 0, grid: bool = True
+    graph: Graph, thing: Any, x: object, y: object, dx: int = 0, dy: int = 0, grid: bool = True
 ) -> Tracer:
     """Return SciPy's spline of two variables; beyond its ends it is what it is there."""
     if dx or dy or len(thing.tck) != 3:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -169,7 +169,7 @@ class CallWalker(Expressions):
     def visit_While(self, node: ast.While) -> None:
         self.repeated(node, lambda: self.condition(node.test))
 
-    def repeated(self, node: ast.For | ast.While, begin: Any) -> None:
+    def repeated(self, node: ast.For | ast.While, begin: Callable[..., Any]) -> None:
         """Walk a loop until nothing new is learnt."""
         while True:
             before = dict(self.frame.names)

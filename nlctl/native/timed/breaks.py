@@ -27,29 +27,29 @@ def break_points(
     """Return when conditions of t alone switch within a run with one parameter vector."""
 
     def values(exprs: Sequence[Expr], t: np.ndarray) -> list[np.ndarray]:
-        found = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
-        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in found]
+        instants = evaluate_expressions(exprs, {"t": t[None, :], "p": p[:, None]})
+        return [np.broadcast_to(each, t.shape) if each.ndim < 2 else each for each in instants]
 
     def constant(expr: Expr) -> np.ndarray:
-        (found,) = evaluate_expressions([expr], {"p": p[:, None]})
-        return np.squeeze(found)
+        (instants,) = evaluate_expressions([expr], {"p": p[:, None]})
+        return np.squeeze(instants)
 
     args = [arg for c in conditions for arg in c.args if arg.size is None]
     lines = as_lines(args, constant, span)
-    found = [np.zeros(0)]
+    instants = [np.zeros(0)]
     for condition in conditions:
-        places, elements = _known(condition, lines), range(condition.size or 1)
+        crossed, elements = _known(condition, lines), range(condition.size or 1)
         indicators: list[Indicator] = [partial(_level, condition, values, k) for k in elements]
-        if places is None:
-            places = levels_met(condition, lines, constant)
-            if places is not None:  # how many elements hold
+        if crossed is None:
+            crossed = levels_met(condition, lines, constant)
+            if crossed is not None:  # how many elements hold
                 indicators = [lambda t, c=condition: values([c], t)[0].sum(axis=0) * 1.0]
         for indicator in indicators:
-            if places is None:
-                found.append(_sought(indicator, span, fastest))
+            if crossed is None:
+                instants.append(_sought(indicator, span, fastest))
             else:
-                found.append(_exact(indicator, places, span))
-    every = np.unique(np.concatenate(found))
+                instants.append(_exact(indicator, crossed, span))
+    every = np.unique(np.concatenate(instants))
     return every[(every > span[0]) & (every <= span[1])]
 
 
