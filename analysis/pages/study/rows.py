@@ -166,8 +166,8 @@ def fan_items(histories: Histories, key: str) -> Iterator[Item]:
     worst = margin_text(histories.margin)
     caption = (
         f"The first {counted(count, 'row')} simulated again: {_bands(histories)}, the nominal run, "
-        f"and the worst run that is known (margin {worst}).{_limits(histories)}{ended} What leaves the "
-        "picture is cut off."
+        f"and the worst run that is known (margin {worst}).{_limits(histories)}{ended} What "
+        "leaves the picture is cut off."
     )
     drawn = figures.fans(
         histories.time, histories.signals, histories.nominal, histories.worst,
