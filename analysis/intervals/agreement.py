@@ -275,24 +275,28 @@ class _Point:
         self.any = self.lost = False
         self.slope: float | None = None
 
-    def inside(self, thing: Any) -> Any:
+    def inside(self, argument: Any) -> Any:
         """Return an argument with floats instead of balls."""
-        if thing is UNREAD:
+        if argument is UNREAD:
             return 0.0
-        if isinstance(thing, Slope):
-            number = self._number(thing.here.value)  # at rest, too: the others stay where they are
+        if isinstance(argument, Slope):
+            number = self._number(
+                argument.here.value
+            )  # at rest, too: the others stay where they are
             self.slope = 0.0 if self.rest else number
             return self.slope
-        if isinstance(thing, Ball):
-            return self._number(thing.value)
-        if type(thing) in (tuple, list):
-            return type(thing)(map(self.inside, thing))
-        if isinstance(thing, np.ndarray) and thing.dtype == object:
-            return np.array([self.inside(v) for v in thing.flat], dtype=float).reshape(thing.shape)
-        if isinstance(thing, Sum | Written):  # it has no point
+        if isinstance(argument, Ball):
+            return self._number(argument.value)
+        if type(argument) in (tuple, list):
+            return type(argument)(map(self.inside, argument))
+        if isinstance(argument, np.ndarray) and argument.dtype == object:
+            return np.array([self.inside(v) for v in argument.flat], dtype=float).reshape(
+                argument.shape
+            )
+        if isinstance(argument, Sum | Written):  # it has no point
             self.lost = True
             return math.nan
-        return thing
+        return argument
 
     def _number(self, ball: arb) -> float:
         self.any = True

@@ -41,23 +41,23 @@ def texts_of(function: object) -> frozenset[str]:
     return frozenset(texts)
 
 
-def _reached(thing: object) -> Iterator[Any]:
+def _reached(member: object) -> Iterator[Any]:
     """Yield what one thing leads to."""
-    if isinstance(thing, CodeType):
-        yield from thing.co_consts
-    elif isinstance(thing, FunctionType):
-        yield from _of_function(thing)
-    elif isinstance(thing, MethodType):
-        yield from (thing.__func__, thing.__self__)
-    elif isinstance(thing, functools.partial):
-        yield from (thing.func, *thing.args, *thing.keywords.values())
-    elif isinstance(thing, _CONTAINERS):
-        yield from thing
-    elif isinstance(thing, dict):
-        yield from (*thing, *thing.values())
-    elif _is_users(thing):
-        yield from vars(thing).values()
-        for kind in type(thing).__mro__[:-1]:
+    if isinstance(member, CodeType):
+        yield from member.co_consts
+    elif isinstance(member, FunctionType):
+        yield from _of_function(member)
+    elif isinstance(member, MethodType):
+        yield from (member.__func__, member.__self__)
+    elif isinstance(member, functools.partial):
+        yield from (member.func, *member.args, *member.keywords.values())
+    elif isinstance(member, _CONTAINERS):
+        yield from member
+    elif isinstance(member, dict):
+        yield from (*member, *member.values())
+    elif _is_users(member):
+        yield from vars(member).values()
+        for kind in type(member).__mro__[:-1]:
             yield from (f for f in vars(kind).values() if isinstance(f, FunctionType | str))
 
 

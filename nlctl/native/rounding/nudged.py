@@ -77,15 +77,15 @@ class Shaken(np.ndarray):
         return Shaken.of(values, self.drawn)
 
 
-def _plain(given: Any) -> Any:
+def _plain(argument: Any) -> Any:
     """Return arguments with plain arrays in them."""
-    if isinstance(given, Shaken):
-        return given.view(np.ndarray)[()] if given.ndim == 0 else given.view(np.ndarray)
-    if type(given) in (tuple, list):
-        return type(given)(map(_plain, given))
-    if type(given) is dict:
-        return {name: _plain(value) for name, value in given.items()}
-    return given
+    if isinstance(argument, Shaken):
+        return argument.view(np.ndarray)[()] if argument.ndim == 0 else argument.view(np.ndarray)
+    if type(argument) in (tuple, list):
+        return type(argument)(map(_plain, argument))
+    if type(argument) is dict:
+        return {name: _plain(value) for name, value in argument.items()}
+    return argument
 
 
 ROUNDINGS = 24  # ways of rounding that are tried; the first is none
